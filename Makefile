@@ -1,0 +1,32 @@
+# From a fresh checkout: `make fit` fits a shipped board, `make test` runs every quick check.
+
+PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
+VENV ?= .venv
+BIN = $(VENV)/bin
+
+.PHONY: fit test calibration benchmarks
+
+fit: $(VENV)/installed
+	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
+
+test: $(VENV)/tested-with
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+calibration: $(VENV)/tested-with
+	$(BIN)/python -m pytest tests/calibration -m slow
+
+benchmarks: $(VENV)/installed
+	$(BIN)/python tests/benchmarks/run.py
+
+# The stamps: an environment is made again when pyproject.toml changes. pip knows dependency groups from 25.1 on.
+$(VENV)/installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+$(VENV)/tested-with: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --group dev
+	touch $@

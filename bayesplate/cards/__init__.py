@@ -1,0 +1,33 @@
+"""Cards: boards, priors and coefficient tables in TOML, read into frozen models with every fault named at once."""
+
+from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, load_board, read_board_text
+from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
+from bayesplate.cards.physical import physical_faults, plate_mass_g
+from bayesplate.cards.prior import Density, PriorCard, load_prior
+from bayesplate.cards.setup import AirSection, AttachedItem, Edges, HammerSection, SetupSection
+from bayesplate.cards.shelf import card_names
+from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
+
+__all__ = [
+    "EDGE_NAMES",
+    "EDGE_WORDS",
+    "EFFECT_NAMES",
+    "AirSection",
+    "AttachedItem",
+    "BoardCard",
+    "CoefficientCard",
+    "Density",
+    "Edges",
+    "HammerSection",
+    "MaterialSection",
+    "PlateSection",
+    "PriorCard",
+    "SetupSection",
+    "card_names",
+    "load_board",
+    "load_coefficients",
+    "load_prior",
+    "physical_faults",
+    "plate_mass_g",
+    "read_board_text",
+]

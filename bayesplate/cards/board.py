@@ -1,0 +1,195 @@
+"""The board card: what lies on the bench, what is known about its material, and its setups."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, PlainValidator, PrivateAttr
+
+from bayesplate.cards.measures import QuantityReader
+from bayesplate.cards.reading import read_file, read_table
+from bayesplate.cards.schema import Section, place, validated
+from bayesplate.cards.setup import SetupSection
+from bayesplate.cards.shelf import find
+from bayesplate.cards.values import (
+    Number,
+    read_format,
+    read_list,
+    read_name,
+    read_reference,
+    read_text,
+    read_words,
+)
+from bayesplate.cards.words import EFFECT_NAMES, plain, quoted, shown
+from bayesplate.errors import Fault
+from bayesplate.quantities import Quantity
+
+DEFAULT_PRIOR = "weakly-informative"
+DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
+LARGEST_POISSON = 1.5
+MOST_SETUPS = 20
+_LENGTH = Number(1, 100_000, "mm")
+_THICKNESS = Number(0.01, 1000, "mm")
+_MASS = Number(1e-3, 1e8, "g")
+_DENSITY = Number(1, 30_000, "kg/m3", "in kg/m3: 1 g/cm3 is 1000 kg/m3")
+_SHEAR = QuantityReader(Number(1e-4, 1000, "GPa"))
+
+
+class PlateSection(Section):
+    """The whole board before clamping: lengths in mm; its mass in g or its density in kg/m3, one of the two."""
+
+    length_x_mm: Annotated[Quantity, PlainValidator(QuantityReader(_LENGTH, places=("at_y_mm",)))] = Field(
+        description="the length along the grain in mm"
+    )
+    length_y_mm: Annotated[Quantity, PlainValidator(QuantityReader(_LENGTH, places=("at_x_mm",)))] = Field(
+        description="the length across the grain in mm"
+    )
+    thickness_mm: Annotated[Quantity, PlainValidator(QuantityReader(_THICKNESS, places=("at_x_mm", "at_y_mm")))] = (
+        Field(description="the thickness in mm")
+    )
+    mass_g: Annotated[Quantity | None, PlainValidator(QuantityReader(_MASS))] = None
+    density_kg_m3: Annotated[Quantity | None, PlainValidator(QuantityReader(_DENSITY))] = None
+
+
+class MaterialSection(Section):
+    """What is known of the material: nu_xy, thick-plate shear moduli in GPa, and the prior card of the constants."""
+
+    poisson_xy: Annotated[
+        Quantity, PlainValidator(QuantityReader(Number(-LARGEST_POISSON, LARGEST_POISSON), "normal"))
+    ] = DEFAULT_POISSON
+    shear_xz_gpa: Annotated[Quantity | None, PlainValidator(_SHEAR)] = None
+    shear_yz_gpa: Annotated[Quantity | None, PlainValidator(_SHEAR)] = None
+    prior: Annotated[str, PlainValidator(read_reference)] = DEFAULT_PRIOR
+
+    @property
+    def poisson_is_default(self) -> bool:
+        """Whether the card gives no Poisson ratio, so that the default stands in its place."""
+        return "poisson_xy" not in self.model_fields_set
+
+
+def _as_list(value: object) -> list[Any]:
+    """One [setup] is a list of one; the tables themselves are read by SetupSection."""
+    if isinstance(value, dict):
+        return [value]
+    return read_list(value, "[[setup]] tables", MOST_SETUPS)
+
+
+class BoardCard(Section):
+    """A board and what was measured on it; values stay in the units of their keys.
+
+    `load_board` and `read_board_text` make one.
+    """
+
+    format: Annotated[Literal[1], PlainValidator(read_format)] = Field(description="1")
+    name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, PlainValidator(read_text)] = ""
+    source: Annotated[str, PlainValidator(read_text)] = ""
+    effects: Annotated[
+        tuple[str, ...], PlainValidator(lambda value: read_words(value, "names of effects", EFFECT_NAMES))
+    ] = ()
+    plate: PlateSection = Field(description="a [plate] table")
+    material: MaterialSection = MaterialSection()
+    setups: Annotated[tuple[SetupSection, ...], BeforeValidator(_as_list)] = Field(
+        alias="setup", description="a [setup] table, or several [[setup]]"
+    )
+    _path: Path | None = PrivateAttr(None)
+    _sha256: str = PrivateAttr("")
+
+    def model_post_init(self, context: Any) -> None:
+        """Keep where the card comes from."""
+        self._path = (context or {}).get("path")
+        self._sha256 = (context or {}).get("sha256", "")
+
+    @property
+    def path(self) -> Path | None:
+        """The card's file; None if it was read from a text."""
+        return self._path
+
+    @property
+    def sha256(self) -> str:
+        """Hexadecimal SHA-256 of the file's bytes."""
+        return self._sha256
+
+    def setup(self, name: str) -> SetupSection:
+        """The setup of a name."""
+        return next(setup for setup in self.setups if setup.name == name)
+
+
+def load_board(name_or_path: str | os.PathLike[str]) -> BoardCard:
+    """Read a board card.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        Name of a shipped card, or a path: it contains a separator or ends in .toml.
+
+    Returns
+    -------
+    BoardCard
+
+    Raises
+    ------
+    InputError
+        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
+    """
+    path = find("boards", name_or_path)
+    return _read_board(read_file(path), plain(path.name), path.stem, path)
+
+
+def read_board_text(text: str, name: str) -> BoardCard:
+    """Read a board card from a text, as if it stood in NAME.toml; raises InputError like `load_board`."""
+    stem = name.removesuffix(".toml")
+    return _read_board(text.encode("utf-8", "surrogatepass"), f"{plain(stem)}.toml", stem, None)
+
+
+def _read_board(data: bytes, file: str, stem: str, path: Path | None) -> BoardCard:
+    table = read_table(data, file)
+    faults = [*name_faults(table, file, stem), *_mass_faults(table, file), *_setup_name_faults(table, file)]
+    context = {"path": path, "sha256": hashlib.sha256(data).hexdigest()}
+    return validated(BoardCard, table, file, context, faults)
+
+
+# These compare keys with one another or with the file. They look at the raw table, so that they are reported
+# together with the faults of single keys.
+
+
+def name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
+    """The name of a card must be the name of its file."""
+    name = table.get("name")
+    if isinstance(name, str) and name != stem:
+        return [Fault(f"{file} name", f"{quoted(stem)}, the name of the file", quoted(name))]
+    return []
+
+
+def _mass_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+    plate = table.get("plate")
+    if not isinstance(plate, dict):
+        return []
+    given = [key for key in ("mass_g", "density_kg_m3") if key in plate]
+    if len(given) == 1:
+        return []
+    got = f"both, {shown(plate['mass_g'])} and {shown(plate['density_kg_m3'])}" if given else "neither"
+    return [Fault(place(file, table, ("plate",)), "exactly one of mass_g and density_kg_m3", got)]
+
+
+def _setup_name_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+    setups = table.get("setup")
+    if not isinstance(setups, list) or len(setups) < 2 or len(setups) > MOST_SETUPS:
+        return []
+    faults = []
+    seen: set[str] = set()
+    for index, setup in enumerate(setups):
+        if not isinstance(setup, dict):
+            continue
+        name = setup.get("name")
+        where = place(file, table, ("setup", index, "name"))
+        if name is None:
+            faults.append(Fault(where, "a name, because there are several setups", "nothing"))
+        elif isinstance(name, str) and name.casefold() in seen:
+            faults.append(Fault(where, "a name of its own", f"{quoted(name)} again"))
+        seen.add(str(name).casefold())
+    return faults

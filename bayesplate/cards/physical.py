@@ -1,0 +1,192 @@
+"""What a well-written board card cannot mean: things off the board, impossible masses, labels below the first."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from bayesplate.cards.board import BoardCard
+from bayesplate.cards.coefficients import load_coefficients
+from bayesplate.cards.prior import load_prior
+from bayesplate.cards.setup import SetupSection
+from bayesplate.cards.words import plain
+from bayesplate.errors import Fault, InputError
+from bayesplate.labels import Label
+from bayesplate.quantities import Quantity
+
+LIGHTEST, HEAVIEST = 20.0, 25_000.0  # kg/m3: lighter than balsa foam, heavier than any metal in use
+THICKEST_SHARE = 0.5  # of the shorter side; beyond it no plate theory holds
+_HELD = ("clamped", "supported")
+_NEEDS_EDGE = {"clamp_rotation": ("clamped",), "clamp_translation": _HELD, "support_mass": _HELD}
+
+
+def physical_faults(card: BoardCard) -> list[Fault]:
+    """Every physical fault of a card that follows the format.
+
+    Parameters
+    ----------
+    card : BoardCard
+
+    Returns
+    -------
+    list of Fault
+        Empty if there is none. Labels that no mode of the board has are found where modes are computed, not here.
+    """
+    file = plain(card.path.name) if card.path else f"{card.name}.toml"
+    faults = [*_plate_faults(card, file), *_effect_faults(card, file), *_prior_faults(card, file)]
+    for index, setup in enumerate(card.setups):
+        where = f"{file} [setup]" if len(card.setups) == 1 else f'{file} [[setup]] {index + 1} "{setup.name}"'
+        faults += [
+            *_clamp_faults(card, setup, where),
+            *_label_faults(setup, where),
+            *_place_faults(card, setup, where),
+            *_mass_faults(card, setup, where),
+            *_reference_faults(card, setup, where),
+        ]
+    return faults
+
+
+def plate_mass_g(card: BoardCard) -> float:
+    """Mean mass of the whole board in g, from its mass or its density."""
+    plate = card.plate
+    if plate.mass_g is not None:
+        return plate.mass_g.mean
+    assert plate.density_kg_m3 is not None  # the schema wants one of the two
+    return plate.density_kg_m3.mean * _volume_mm3(card) * 1e-6
+
+
+def _volume_mm3(card: BoardCard) -> float:
+    plate = card.plate
+    return plate.length_x_mm.mean * plate.length_y_mm.mean * plate.thickness_mm.mean
+
+
+def _reach(quantity: Quantity) -> float:
+    """The largest value that the card itself holds possible."""
+    return max(quantity.mean + 3 * quantity.sd, *quantity.readings, quantity.mean)
+
+
+def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
+    plate = card.plate
+    density = plate_mass_g(card) / _volume_mm3(card) * 1e6
+    if not LIGHTEST <= density <= HEAVIEST:
+        key = "mass_g" if plate.mass_g is not None else "density_kg_m3"
+        wanted = f"a density from {LIGHTEST:g} to {HEAVIEST:g} kg/m3"
+        remedy = "mass in g, density in kg/m3, lengths in mm"
+        if plate.mass_g is not None:
+            kilograms = LIGHTEST <= density * 1000 <= HEAVIEST
+            remedy = f"{plate.mass_g.mean:g} kg is {plate.mass_g.mean * 1000:g} g" if kilograms else remedy
+        yield Fault(f"{file} [plate] {key}", wanted, f"{density:.3g} kg/m3", remedy)
+    shorter = min(plate.length_x_mm.mean, plate.length_y_mm.mean)
+    if plate.thickness_mm.mean > THICKEST_SHARE * shorter:
+        wanted = f"at most half the shorter side, {THICKEST_SHARE * shorter:g} mm"
+        yield Fault(f"{file} [plate] thickness_mm", wanted, f"{plate.thickness_mm.mean:g} mm", "no plate is so thick")
+    limits = {"at_x_mm": _reach(plate.length_x_mm), "at_y_mm": _reach(plate.length_y_mm)}
+    for key in ("length_x_mm", "length_y_mm", "thickness_mm"):
+        quantity: Quantity = getattr(plate, key)
+        for axis, places in (("at_x_mm", quantity.at_x), ("at_y_mm", quantity.at_y)):
+            for number, value in enumerate(places, start=1):
+                if not 0 <= value <= limits[axis]:
+                    wanted = f"a place on the board, 0 to {limits[axis]:g} mm"
+                    yield Fault(f"{file} [plate] {key}.{axis} {number}", wanted, f"{value:g} mm")
+
+
+def _effect_faults(card: BoardCard, file: str) -> Iterator[Fault]:
+    held = {word for setup in card.setups for word in setup.edges.words.values()}
+    for effect in card.effects:
+        needed = _NEEDS_EDGE.get(effect)
+        if needed and not held & set(needed):
+            wanted = f"a setup with a {' or '.join(needed)} edge for {effect}"
+            yield Fault(f"{file} effects", wanted, f"edges that are all {' or '.join(sorted(held))}")
+
+
+def _prior_faults(card: BoardCard, file: str) -> Iterator[Fault]:
+    try:
+        load_prior(card.material.prior, beside=card.path.parent if card.path else None)
+    except InputError as error:
+        yield from _through(f"{file} [material] prior", error)
+
+
+def _reference_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
+    if setup.published_coefficients is None:
+        return
+    place = f"{where} published_coefficients"
+    try:
+        table = load_coefficients(setup.published_coefficients, beside=card.path.parent if card.path else None)
+    except InputError as error:
+        yield from _through(place, error)
+        return
+    if table.edges != setup.edges:
+        wanted = f"a table for the edges {setup.edges.letters}"
+        yield Fault(place, wanted, f"{table.name}, made for {table.edges.letters}", "letters in the order x0 y0 x1 y1")
+
+
+def _through(place: str, error: InputError) -> Iterator[Fault]:
+    """The faults of another card, with the place where it was named."""
+    for fault in error.faults:
+        yield Fault(f"{place} -> {fault.place}", fault.wanted, fault.got, fault.remedy)
+
+
+def _free_span(length: Quantity, clamped: dict[str, float], start: str, end: str) -> tuple[float, float]:
+    """From where to where the board is not covered by a clamp, in mm."""
+    reach = _reach(length) if end not in clamped else length.mean
+    return clamped.get(start, 0.0), reach - clamped.get(end, 0.0)
+
+
+def _spans(card: BoardCard, setup: SetupSection) -> dict[str, tuple[float, float]]:
+    clamped = {edge: quantity.mean for edge, quantity in setup.clamped_mm.items()}
+    return {
+        "x": _free_span(card.plate.length_x_mm, clamped, "x0", "x1"),
+        "y": _free_span(card.plate.length_y_mm, clamped, "y0", "y1"),
+    }
+
+
+def _clamp_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
+    for axis, (start, end) in _spans(card, setup).items():
+        if start >= end:
+            length: Quantity = getattr(card.plate, f"length_{axis}_mm")
+            wanted = f"clamps that leave a part of the {length.mean:g} mm along {axis} free"
+            yield Fault(f"{where} clamped_mm", wanted, f"{start:g} mm clamped at {axis}0, free only up to {end:g} mm")
+
+
+def _label_faults(setup: SetupSection, where: str) -> Iterator[Fault]:
+    first = setup.first_label
+    for label in setup.frequencies_hz:
+        if label.m < first.m or label.n < first.n:
+            wanted = f"labels not below first_label, {first}"
+            remedy = f"first_label = [{min(label.m, first.m)}, {min(label.n, first.n)}]?"
+            yield Fault(f'{where} frequencies_hz."{label}"', wanted, str(label), remedy)
+    if setup.resolution_hz is None:
+        return
+    ascending = sorted(setup.frequencies_hz.items(), key=lambda item: (item[1].mean, item[0]))
+    for (below, low), (above, high) in itertools.pairwise(ascending):
+        if high.mean - low.mean < setup.resolution_hz:
+            yield _unresolved(where, setup.resolution_hz, (below, above), high.mean - low.mean)
+
+
+def _unresolved(where: str, resolution: float, pair: tuple[Label, Label], spacing: float) -> Fault:
+    wanted = f"a rounding finer than the spacing of {pair[0]} and {pair[1]}, {spacing:g} Hz"
+    return Fault(f"{where} resolution_hz", wanted, f"{resolution:g} Hz", "these labels cannot be told apart")
+
+
+def _place_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
+    spans = _spans(card, setup)
+    places = [
+        (f"attached {number} at_mm" + (f" {position}" if len(item.at_mm) > 1 else ""), place)
+        for number, item in enumerate(setup.attached, start=1)
+        for position, place in enumerate(item.at_mm, start=1)
+    ]
+    if setup.hammer is not None:
+        places.append(("hammer.at_mm", setup.hammer.at_mm))
+    for key, (x, y) in places:
+        (left, right), (bottom, top) = spans["x"], spans["y"]
+        if left < right and bottom < top and not (left <= x <= right and bottom <= y <= top):
+            wanted = f"a place on the free part of the board, x {left:g} to {right:g} mm, y {bottom:g} to {top:g} mm"
+            yield Fault(f"{where} {key}", wanted, f"[{x:g}, {y:g}]", "from the corner of x0 and y0 of the whole board")
+
+
+def _mass_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
+    board = plate_mass_g(card)
+    for number, item in enumerate(setup.attached, start=1):
+        if item.mass_g is not None and item.mass_g.mean >= board:
+            got = f"{item.mass_g.mean:g} g"
+            yield Fault(f"{where} attached {number} mass_g", f"less than the board's own {board:.4g} g", got)

@@ -1,0 +1,220 @@
+"""The prior card: densities of the elastic constants, or of the rigidities, each with its source."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, PlainValidator
+
+from bayesplate.cards.board import LARGEST_POISSON, name_faults
+from bayesplate.cards.measures import QuantityReader, read_factor, read_noise, read_whole_table
+from bayesplate.cards.reading import read_file, read_table
+from bayesplate.cards.schema import Section, validated
+from bayesplate.cards.shelf import find
+from bayesplate.cards.values import Choice, Complaint, Number, Refusal, read_format, read_name, read_text
+from bayesplate.cards.words import plain, shown
+from bayesplate.errors import Fault
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+ELASTIC = ("E_x", "E_y", "G_xy")
+RIGIDITY = ("D_x", "D_y", "D_s")
+
+
+@dataclass(frozen=True)
+class Density:
+    """A proper density of a positive constant, in SI units (Pa or N m).
+
+    Attributes
+    ----------
+    kind : {"log-normal", "log-uniform"}
+    median, factor : float
+        Of a log-normal density; the logarithm has the standard deviation ln(factor).
+    lower, upper : float
+        Limits of a log-uniform density.
+    source : str
+        Where the numbers come from.
+    """
+
+    kind: Literal["log-normal", "log-uniform"]
+    median: float = math.nan
+    factor: float = math.nan
+    lower: float = 0.0
+    upper: float = math.inf
+    source: str = ""
+
+    @property
+    def log_mean(self) -> float:
+        """Mean of the logarithm."""
+        if self.kind == "log-normal":
+            return math.log(self.median)
+        return 0.5 * (math.log(self.lower) + math.log(self.upper))
+
+    @property
+    def log_sd(self) -> float:
+        """Standard deviation of the logarithm."""
+        if self.kind == "log-normal":
+            return math.log(self.factor)
+        return math.log(self.upper / self.lower) / math.sqrt(12)
+
+    def log_density(self, log_value: ArrayLike) -> Floats:
+        """Logarithm of the normalised density of the logarithm of the constant.
+
+        Parameters
+        ----------
+        log_value : array of any shape, logarithm of the constant in SI units
+
+        Returns
+        -------
+        array of the same shape, no unit
+        """
+        logarithm = np.asarray(log_value, dtype=np.float64)
+        if self.kind == "log-normal":
+            z = (logarithm - self.log_mean) / self.log_sd
+            return np.asarray(-0.5 * z**2 - math.log(self.log_sd * math.sqrt(2 * math.pi)))[()]
+        low, high = math.log(self.lower), math.log(self.upper)
+        inside = (logarithm >= low) & (logarithm <= high)
+        return np.where(inside, -math.log(high - low), -np.inf)[()]
+
+    def sample(self, rng: np.random.Generator, n: int) -> Floats:
+        """Draws of the constant: (n,) array in SI units."""
+        if self.kind == "log-normal":
+            return np.exp(self.log_mean + self.log_sd * rng.standard_normal(n))
+        return np.exp(rng.uniform(math.log(self.lower), math.log(self.upper), n))
+
+
+@dataclass(frozen=True)
+class _DensityReader:
+    """Reads { distribution, median_gpa, factor, source } or { distribution, lower_gpa, upper_gpa, source }."""
+
+    unit: Literal["gpa", "n_m"]
+
+    def __call__(self, value: object) -> Density:
+        distributions = ("log-normal", "log-uniform")
+        if not isinstance(value, dict):
+            raise Refusal(Complaint("a table with a distribution", shown(value)))
+        if value.get("distribution") not in distributions:
+            raise Refusal(_distribution_complaint(value.get("distribution"), distributions))
+        si, number = (1e9, Number(1e-6, 1e6, "GPa")) if self.unit == "gpa" else (1.0, Number(1e-9, 1e9, "N m"))
+        median, lower, upper = (f"{key}_{self.unit}" for key in ("median", "lower", "upper"))
+        common: dict[str, Any] = {"distribution": Choice(distributions), "source": read_text}
+        if value["distribution"] == "log-normal":
+            read = read_whole_table(value, {**common, median: number, "factor": read_factor})
+            return Density("log-normal", read[median] * si, read["factor"], source=read["source"])
+        read = read_whole_table(value, {**common, lower: number, upper: number})
+        if not read[lower] < read[upper]:
+            both = f"{shown(value[lower])} and {shown(value[upper])}"
+            raise Refusal(Complaint(f"{lower} below {upper}", both))
+        return Density("log-uniform", lower=read[lower] * si, upper=read[upper] * si, source=read["source"])
+
+
+def _distribution_complaint(value: object, distributions: tuple[str, ...]) -> Complaint:
+    try:
+        Choice(distributions)(value)
+    except Refusal as refusal:
+        (one,) = refusal.complaints
+        return Complaint(one.wanted, one.got, one.remedy, ("distribution",))
+    raise AssertionError("unreachable: the word was refused before")
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """A quantity of a prior card and the source it was taken from."""
+
+    quantity: Quantity
+    source: str
+
+
+def _stated(value: object, read: Any) -> _Stated:
+    """Read a quantity whose table holds its source too."""
+    if not isinstance(value, dict):
+        raise Refusal(Complaint("a table with a source", shown(value)))
+    if "source" not in value:
+        raise Refusal(Complaint("where the numbers come from", "nothing", inside=("source",)))
+    return _Stated(read({key: entry for key, entry in value.items() if key != "source"}), read_text(value["source"]))
+
+
+_Elastic = Annotated[Density | None, PlainValidator(_DensityReader("gpa"))]
+_Rigidity = Annotated[Density | None, PlainValidator(_DensityReader("n_m"))]
+_POISSON = QuantityReader(Number(-LARGEST_POISSON, LARGEST_POISSON), "normal")
+
+
+class PriorCard(Section):
+    """Densities of E_x, E_y, G_xy or of D_x, D_y, D_s, and optionally the noise and nu_xy. `load_prior` makes one."""
+
+    format: Annotated[Literal[1], PlainValidator(read_format)] = Field(description="1")
+    name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, PlainValidator(read_text)] = ""
+    E_x: _Elastic = None
+    E_y: _Elastic = None
+    G_xy: _Elastic = None
+    D_x: _Rigidity = None
+    D_y: _Rigidity = None
+    D_s: _Rigidity = None
+    stated_noise: Annotated[_Stated | None, PlainValidator(lambda value: _stated(value, read_noise))] = Field(
+        default=None, alias="noise_percent"
+    )
+    stated_poisson: Annotated[_Stated | None, PlainValidator(lambda value: _stated(value, _POISSON))] = Field(
+        default=None, alias="poisson_xy"
+    )
+
+    @property
+    def densities(self) -> dict[str, Density]:
+        """Name of the constant to its density; the names are all of E_x, E_y, G_xy or all of D_x, D_y, D_s."""
+        return {name: density for name in (*ELASTIC, *RIGIDITY) if (density := getattr(self, name)) is not None}
+
+    @property
+    def noise_percent(self) -> Quantity | None:
+        """Prior of the noise in percent, if the card states one."""
+        return self.stated_noise.quantity if self.stated_noise else None
+
+    @property
+    def poisson_xy(self) -> Quantity | None:
+        """Prior of nu_xy, if the card states one."""
+        return self.stated_poisson.quantity if self.stated_poisson else None
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """Name of each stated density to its source."""
+        stated = {"noise_percent": self.stated_noise, "poisson_xy": self.stated_poisson}
+        return {
+            **{name: density.source for name, density in self.densities.items()},
+            **{name: one.source for name, one in stated.items() if one},
+        }
+
+
+def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
+    """Read a prior card.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        Name of a shipped card, or a path: it contains a separator or ends in .toml.
+    beside : Path, optional
+        Folder that a relative path starts from: that of the board card which names the prior.
+
+    Raises
+    ------
+    InputError
+        If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
+    """
+    path = find("priors", name_or_path, beside)
+    file = plain(path.name)
+    table = read_table(read_file(path), file)
+    return validated(PriorCard, table, file, faults=[*name_faults(table, file, path.stem), *_set_faults(table, file)])
+
+
+def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
+    """Three densities that belong together, no mixture and no gap."""
+    given = [name for name in (*ELASTIC, *RIGIDITY) if name in table]
+    if tuple(given) in (ELASTIC, RIGIDITY):
+        return []
+    wanted = f"all of {', '.join(ELASTIC)} or all of {', '.join(RIGIDITY)}"
+    return [Fault(file, wanted, ", ".join(given) or "none of them")]

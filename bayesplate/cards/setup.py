@@ -1,0 +1,159 @@
+"""One setup of a board: how its edges are held, and the frequencies that were measured that way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator
+
+from bayesplate.cards.measures import (
+    MOST_MODES,
+    WHY_MOST_MODES,
+    Place,
+    QuantityReader,
+    read_by_label,
+    read_first_label,
+    read_noise,
+    read_place,
+    read_places,
+)
+from bayesplate.cards.schema import Section
+from bayesplate.cards.values import Choice, Complaint, Number, Refusal, read_each, read_list, read_name, read_reference
+from bayesplate.cards.values import read_table as read_entries
+from bayesplate.cards.words import ATTACHED_KINDS, BAFFLES, EDGE_NAMES, EDGE_WORDS, shown
+from bayesplate.labels import Label
+from bayesplate.quantities import Quantity
+
+MOST_ATTACHED = 50
+DEFAULT_SETUP_NAME = "setup"
+_FREQUENCY = QuantityReader(Number(0.1, 1e6, "Hz", "in Hz; the zero-frequency modes of a free board are not listed"))
+_CLAMPED_LENGTH = QuantityReader(Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing"))
+_EDGE_WANTED = 'a word for each of the four edges x0, x1, y0, y1: "clamped", "supported" or "free"'
+
+EdgeWord = Literal["clamped", "supported", "free"]
+ReadEdge = Annotated[EdgeWord, PlainValidator(Choice(EDGE_WORDS))]
+
+
+class Edges(Section):
+    """How the four edges are held; x0 is the edge at x = 0."""
+
+    x0: ReadEdge = Field(description=_EDGE_WANTED)
+    x1: ReadEdge = Field(description=_EDGE_WANTED)
+    y0: ReadEdge = Field(description=_EDGE_WANTED)
+    y1: ReadEdge = Field(description=_EDGE_WANTED)
+
+    @property
+    def words(self) -> dict[str, EdgeWord]:
+        """Edge name to word, in the order x0, x1, y0, y1."""
+        return {"x0": self.x0, "x1": self.x1, "y0": self.y0, "y1": self.y1}
+
+    @property
+    def letters(self) -> str:
+        """The paper's four letters, "CFFF", in its order x0, y0, x1, y1."""
+        return "".join(word[0].upper() for word in (self.x0, self.y0, self.x1, self.y1))
+
+
+class AttachedItem(Section):
+    """A thing fixed to the board: declared if it has a mass, otherwise a candidate at its place."""
+
+    kind: Annotated[Literal["accelerometer", "exciter", "shaker", "weight"], PlainValidator(Choice(ATTACHED_KINDS))] = (
+        Field(description="what it is")
+    )
+    mass_g: Annotated[Quantity | None, PlainValidator(QuantityReader(Number(1e-4, 1e6, "g")))] = None
+    at_mm: Annotated[tuple[Place, ...], PlainValidator(read_places)] = Field(
+        description="its place [x, y] in mm from the corner of the edges x0 and y0"
+    )
+
+
+class HammerSection(Section):
+    """Where the hammer hit."""
+
+    at_mm: Annotated[Place, PlainValidator(read_place)] = Field(description="the place [x, y] in mm")
+
+
+class AirSection(Section):
+    """The air around the board; a value that is absent keeps the effect's own prior."""
+
+    density_kg_m3: Annotated[
+        Quantity | None, PlainValidator(QuantityReader(Number(1e-6, 100, "kg/m3", "air at the ground is 1.2 kg/m3")))
+    ] = None
+    baffle: Annotated[Literal["none", "full"] | None, PlainValidator(Choice(BAFFLES))] = None
+
+
+def _read_setup_name(value: object) -> str:
+    name = read_name(value)
+    if name.casefold() == "board":
+        raise Refusal(Complaint("another name", '"board"', "results use it for the board's own effects"))
+    return name
+
+
+def _read_unlabelled(value: object) -> tuple[Quantity, ...]:
+    if value == []:
+        return ()
+    return tuple(read_each(enumerate(read_list(value, "frequencies", MOST_MODES, WHY_MOST_MODES)), _FREQUENCY))
+
+
+def _read_frequencies(value: object) -> dict[Label, Quantity]:
+    return read_by_label(value, _FREQUENCY)
+
+
+def _read_signs(value: object) -> dict[Label, str]:
+    return read_by_label(value, Choice(("+", "-")))
+
+
+def _read_clamped(value: object) -> dict[str, Quantity]:
+    if not isinstance(value, dict):
+        raise Refusal(Complaint("a table of clamped edges, { x0 = 30 }", shown(value)))
+    return read_entries(value, dict.fromkeys(EDGE_NAMES, _CLAMPED_LENGTH))
+
+
+class SetupSection(Section):
+    """A [setup] of a board card. Frequencies are in Hz, lengths in mm, keyed by label or by edge, never by position."""
+
+    name: Annotated[str, PlainValidator(_read_setup_name)] = DEFAULT_SETUP_NAME
+    edges: Edges = Field(description=_EDGE_WANTED)
+    clamped_mm: Annotated[Mapping[str, Quantity], PlainValidator(_read_clamped)] = Field(default_factory=dict)
+    first_label: Annotated[Label, PlainValidator(read_first_label)] = Label(0, 0)
+    resolution_hz: Annotated[float | None, PlainValidator(Number(1e-6, 1000, "Hz"))] = None
+    published_coefficients: Annotated[str | None, PlainValidator(read_reference)] = None
+    noise_percent: Annotated[Quantity | None, PlainValidator(read_noise)] = None
+    unlabelled_hz: Annotated[tuple[Quantity, ...], PlainValidator(_read_unlabelled)] = ()
+    frequencies_hz: Annotated[Mapping[Label, Quantity], PlainValidator(_read_frequencies)] = Field(
+        default_factory=dict, validate_default=True
+    )
+    signs: Annotated[Mapping[Label, str], PlainValidator(_read_signs)] = Field(default_factory=dict)
+    attached: tuple[AttachedItem, ...] = Field(default=(), max_length=MOST_ATTACHED)
+    hammer: HammerSection | None = None
+    air: AirSection | None = None
+
+    # These compare two keys. They read info.data, which holds the earlier keys that were themselves in order, so that
+    # they complain beside the faults of other keys and never because of one.
+
+    @field_validator("clamped_mm")
+    @classmethod
+    def _names_clamped_edges(cls, value: Mapping[str, Quantity], info: ValidationInfo) -> Mapping[str, Quantity]:
+        edges = info.data.get("edges")
+        if edges is not None:
+            loose = [edge for edge in value if edges.words[edge] != "clamped"]
+            if loose:
+                raise Refusal(*(Complaint("a clamped edge", f"a {edges.words[e]} one", inside=(e,)) for e in loose))
+        return value
+
+    @field_validator("frequencies_hz")
+    @classmethod
+    def _holds_a_frequency(cls, value: Mapping[Label, Quantity], info: ValidationInfo) -> Mapping[Label, Quantity]:
+        if not value and info.data.get("unlabelled_hz") == ():
+            raise Refusal(Complaint('measured frequencies, "(1,0)" = 52', "no modes"))
+        return value
+
+    @field_validator("signs")
+    @classmethod
+    def _have_a_frequency(cls, value: Mapping[Label, str], info: ValidationInfo) -> Mapping[Label, str]:
+        frequencies: Mapping[Label, Any] | None = info.data.get("frequencies_hz")
+        if frequencies is not None:
+            stray = [str(label) for label in value if label not in frequencies]
+            if stray:
+                wanted = "a label among the frequencies_hz"
+                raise Refusal(*(Complaint(wanted, text, inside=(text,)) for text in stray))
+        return value

@@ -1,0 +1,117 @@
+"""Relative weighted least squares: the constants that bring all frequencies closest in relative terms.
+
+Gauss-Newton on the logarithms of D_x, D_y, D_s with the law made anew at each step, so that the result is the
+least-squares estimate of the exact frequencies; the sensitivities come with each solve for nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.terms import rigidity_columns
+from bayesplate.modes.naming import product_coefficients
+from bayesplate.modes.plate import thin_plate
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.setup import Setup
+
+_MOST_STEPS = 40
+_LONGEST_STEP = 0.7
+_CONVERGED = 1e-9
+_COARSE_MESH = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A point estimate of the rigidities, and how well the readings determine it.
+
+    Attributes
+    ----------
+    rigidities : (3,) array, N m
+        D_x, D_y, D_s.
+    values : dict of float
+        The rigidities and the nominal inputs by name.
+    models : tuple of SetupModel
+        One a setup, solved at the estimate.
+    sensitivities : (n_modes, 3) array
+        d ln f / d ln D of all readings, setup after setup.
+    residuals : (n_modes,) array
+        ln measured - ln predicted.
+    scales : (n_modes,) array
+        Relative uncertainty of each reading that weighs it: the setup's noise joined with the reading's own.
+    converged : bool
+    """
+
+    rigidities: NDArray[np.float64]
+    values: Mapping[str, NDArray[np.float64]]
+    models: tuple[SetupModel, ...]
+    sensitivities: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    scales: NDArray[np.float64]
+    converged: bool
+
+
+def reading_scales(board: Board) -> NDArray[np.float64]:
+    """Relative uncertainty of each reading: its own joined with the median noise of its setup, (n_modes,) array."""
+    return np.concatenate([np.hypot(setup.noise.median, setup.relative_sd) for setup in board.setups])
+
+
+def log_measured(board: Board) -> NDArray[np.float64]:
+    """ln of the measured frequencies (Hz), setup after setup: (n_modes,) array."""
+    return np.log(np.concatenate([setup.measured for setup in board.setups]))
+
+
+def weighted_least_squares(board: Board) -> Estimate:
+    """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
+
+    Parameters
+    ----------
+    board : Board
+        Every setup with at least one reading.
+
+    Returns
+    -------
+    Estimate
+        `converged` is False where the steps did not settle, as at a veering whose names swap back and forth. A
+        direction that the readings do not determine keeps its starting value.
+    """
+    inputs = board.nominal()
+    log_rigidities = np.log(starting_rigidities(board))
+    target, scales = log_measured(board), reading_scales(board)
+    settled = False
+    for _ in range(_MOST_STEPS):
+        values = inputs | dict(zip(RIGIDITIES, np.exp(log_rigidities), strict=True))
+        models = tuple(setup_model(setup, values) for setup in board.setups)
+        predicted = np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
+        sensitivities = np.concatenate([m.sensitivities(values) for m in models])
+        residuals = target - predicted
+        if settled:
+            break
+        step = np.linalg.lstsq(sensitivities / scales[:, None], residuals / scales, rcond=1e-8)[0]
+        step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+        log_rigidities = log_rigidities + step
+        settled = bool(np.abs(step).max() < _CONVERGED)
+    return Estimate(np.exp(log_rigidities), values, models, sensitivities, residuals, scales, settled)
+
+
+def starting_rigidities(board: Board) -> NDArray[np.float64]:
+    """Rough rigidities from Rayleigh quotients of beam-function products, which need no constants: (3,) array, N m."""
+    from scipy.optimize import nnls
+
+    inputs = board.nominal()
+    rows = np.concatenate([_rayleigh_rows(setup, inputs) for setup in board.setups])
+    squared = np.exp(2.0 * (log_measured(board) + np.log(2.0 * np.pi)))
+    constants, _ = nnls(rows / squared[:, None], np.ones(squared.size))
+    return np.maximum(constants, 1e-2 * constants.max())
+
+
+def _rayleigh_rows(setup: Setup, inputs: Values) -> NDArray[np.float64]:
+    plate = thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH)
+    products = product_coefficients(plate)
+    columns = rigidity_columns(inputs, setup)
+    return np.stack([products[:, i, j] for i, j in (reading.beams for reading in setup.readings)]) @ columns

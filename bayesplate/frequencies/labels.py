@@ -1,0 +1,52 @@
+"""Labels that no mode of the board has: rigid motions, and modes beyond those that can be resolved."""
+
+from __future__ import annotations
+
+from bayesplate.errors import Fault
+from bayesplate.labels import Label
+from bayesplate.modes.plate import is_rigid
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Setup
+
+HIGHEST_ORDER = 9
+"""Highest order of a beam function along either side that the production mesh resolves."""
+
+
+def label_faults(board: Board) -> list[Fault]:
+    """Every label of a board that is not in its model.
+
+    Parameters
+    ----------
+    board : Board
+
+    Returns
+    -------
+    list of Fault
+    """
+    return [
+        Fault(
+            f'{board.name}.toml setup "{setup.name}" frequencies_hz "{reading.label}"',
+            f"a mode of a plate with edges {', '.join(f'{e} {w}' for e, w in setup.edges.items())}",
+            problem,
+            f"the lowest are {', '.join(str(label) for label in _examples(setup))}",
+        )
+        for setup in board.setups
+        for reading in setup.readings
+        if (problem := _problem(setup, reading.beams))
+    ]
+
+
+def _problem(setup: Setup, beams: tuple[int, int]) -> str:
+    if min(beams) < 0:
+        return f"a label below first_label {setup.first_label}"
+    if max(beams) > HIGHEST_ORDER:
+        return f"more than {HIGHEST_ORDER} nodal lines one way"
+    if is_rigid(beams, setup.ends_x, setup.ends_y):
+        return "a motion without bending, at 0 Hz"
+    return ""
+
+
+def _examples(setup: Setup) -> list[Label]:
+    first = setup.first_label
+    beams = [(i, j) for i in range(4) for j in range(4) if not is_rigid((i, j), setup.ends_x, setup.ends_y)]
+    return [Label(i + first.m, j + first.n) for i, j in sorted(beams, key=sum)[:5]]

@@ -1,0 +1,66 @@
+"""The two laws that take weights of terms to frequencies: linear, and exact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.modes.plate import Weights
+from bayesplate.modes.reduced import ModalMatrices
+
+LawName = Literal["linear", "exact"]
+
+
+class Law(Protocol):
+    """omega^2 of the wanted modes from the weights of the terms."""
+
+    @property
+    def name(self) -> LawName:
+        """ "linear" or "exact"."""
+
+    def squared(self, weights: Weights) -> NDArray[np.float64]:
+        """omega^2 in s^-2: (n_draws, n_modes) array."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearLaw:
+    """omega^2 as a ratio of weighted energies of the modes at the estimate: the paper's law.
+
+    Attributes
+    ----------
+    stiffness : (n_modes, n_terms) array
+    mass : (n_modes, n_masses) array
+    """
+
+    stiffness: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    name: LawName = "linear"
+
+    def squared(self, weights: Weights) -> NDArray[np.float64]:
+        """omega^2 in s^-2: (n_draws, n_modes) array; negative where the law has left the region it is made for."""
+        return np.asarray((weights.stiffness @ self.stiffness.T) / (weights.mass @ self.mass.T))
+
+
+@dataclass(frozen=True, eq=False)
+class ExactLaw:
+    """omega^2 as eigenvalues of small modal matrices."""
+
+    matrices: ModalMatrices
+    name: LawName = "exact"
+
+    def squared(self, weights: Weights) -> NDArray[np.float64]:
+        """omega^2 in s^-2: (n_draws, n_modes) array."""
+        return self.matrices.eigenvalues(weights)
+
+
+def log_frequency(squared: NDArray[np.float64]) -> NDArray[np.float64]:
+    """ln f (f in Hz) from omega^2; not a number where omega^2 is not positive."""
+    return 0.5 * np.log(np.where(squared > 0, squared, np.nan)) - np.log(2.0 * np.pi)
+
+
+def cents(log_ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+    """1200 log2 of a frequency ratio, from its natural logarithm."""
+    return np.asarray(log_ratio) * (1200.0 / np.log(2.0))

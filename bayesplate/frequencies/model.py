@@ -1,0 +1,107 @@
+"""Frequencies of one setup: its plate, the places of its labelled modes, and the two laws around an estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency
+from bayesplate.frequencies.terms import rigidity_columns, term_weights
+from bayesplate.modes.mesh import mesh
+from bayesplate.modes.naming import Place, find
+from bayesplate.modes.plate import PlateMatrices, thin_plate
+from bayesplate.modes.reduced import modal_matrices
+from bayesplate.plate.board import Values
+from bayesplate.plate.setup import Setup
+
+
+@dataclass(frozen=True, eq=False)
+class SetupModel:
+    """The frequencies of a setup's labelled modes as a function of constants and sizes.
+
+    Attributes
+    ----------
+    setup : Setup
+    plate : PlateMatrices
+    places : tuple of Place
+        Where each labelled mode stands at the estimate; from there on a label means this rank of this class.
+    linear : LinearLaw
+    exact : ExactLaw or None
+        None until `with_exact` has built it.
+    """
+
+    setup: Setup
+    plate: PlateMatrices
+    places: tuple[Place, ...]
+    linear: LinearLaw
+    exact: ExactLaw | None = None
+
+    def law(self, name: LawName) -> Law:
+        """The law of that name."""
+        if name == "linear":
+            return self.linear
+        if self.exact is None:
+            raise ValueError("the exact law of this setup has not been built yet")
+        return self.exact
+
+    def log_frequencies(self, values: Values, law: LawName) -> NDArray[np.float64]:
+        """ln f of each labelled mode: (n_draws, n_modes) array; not a number where the law gives no frequency."""
+        return log_frequency(self.law(law).squared(term_weights(values, self.setup)))
+
+    def sensitivities(self, values: Values) -> NDArray[np.float64]:
+        """d ln f / d ln D at the point where the model was made: (n_modes, 3) array, columns D_x, D_y, D_s.
+
+        Half the share of each constant in the mode's energy: rows sum to one half.
+        """
+        constants = np.array([float(values[name]) for name in ("D_x", "D_y", "D_s")])
+        energies = self.linear.stiffness @ rigidity_columns(values, self.setup) * constants
+        return np.asarray(0.5 * energies / energies.sum(axis=1, keepdims=True))
+
+
+def setup_model(setup: Setup, values: Values, plate: PlateMatrices | None = None) -> SetupModel:
+    """Solve a setup at given constants and sizes, and find its labelled modes.
+
+    Parameters
+    ----------
+    setup : Setup
+    values : dict of float
+        D_x, D_y, D_s (N m) and the board's inputs.
+    plate : PlateMatrices, optional
+        Matrices to use again; by default those of the production mesh for these values.
+
+    Returns
+    -------
+    SetupModel
+        With its linear law.
+
+    Raises
+    ------
+    KeyError
+        If a label is no mode of the plate.
+    """
+    weights = term_weights(values, setup).at(0)
+    if plate is None:
+        plate = thin_plate(setup.ends_x, setup.ends_y, *mesh(weights))
+    beams = [reading.beams for reading in setup.readings]
+    found = find(plate, weights, beams)
+    return SetupModel(
+        setup=setup,
+        plate=plate,
+        places=tuple(found[b].place for b in beams),
+        linear=LinearLaw(np.stack([found[b].stiffness for b in beams]), np.stack([found[b].mass for b in beams])),
+    )
+
+
+def with_exact(model: SetupModel, centre: Values, around: Sequence[Values], held_out: Sequence[Values]) -> SetupModel:
+    """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`."""
+    matrices = modal_matrices(
+        model.plate,
+        model.places,
+        term_weights(centre, model.setup).at(0),
+        [term_weights(values, model.setup).at(0) for values in around],
+        [term_weights(values, model.setup).at(0) for values in held_out],
+    )
+    return replace(model, exact=ExactLaw(matrices))

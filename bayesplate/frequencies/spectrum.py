@@ -1,0 +1,106 @@
+"""Every mode of a setup up to a frequency, with its label; and the signs that hammer and sensor should see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesplate.frequencies.terms import term_weights
+from bayesplate.labels import Label
+from bayesplate.modes.mesh import mesh
+from bayesplate.modes.naming import CERTAIN, name_modes
+from bayesplate.modes.plate import thin_plate
+from bayesplate.modes.solve import Modes, solve
+from bayesplate.plate.board import Values, vibrating_lengths
+from bayesplate.plate.setup import Setup
+
+_NODAL_LINE = 0.05
+
+
+@dataclass(frozen=True)
+class NamedMode:
+    """One mode of a setup.
+
+    Attributes
+    ----------
+    label : Label or None
+        None where no product of beam functions fits: "cannot tell".
+    frequency : float, Hz
+    correlation : float
+        With the product that the label names.
+    """
+
+    label: Label | None
+    frequency: float
+    correlation: float
+
+    @property
+    def name(self) -> str:
+        """The label as text."""
+        return "cannot tell" if self.label is None else str(self.label)
+
+
+def spectrum(setup: Setup, values: Values, n_modes: int) -> tuple[Modes, tuple[NamedMode, ...]]:
+    """Lowest modes of a setup at given constants and sizes.
+
+    Parameters
+    ----------
+    setup : Setup
+    values : dict of float
+        D_x, D_y, D_s (N m) and the board's inputs.
+    n_modes : int
+
+    Returns
+    -------
+    modes : Modes
+    named : tuple of NamedMode
+        In the order of frequency.
+    """
+    weights = term_weights(values, setup).at(0)
+    plate = thin_plate(setup.ends_x, setup.ends_y, *mesh(weights))
+    modes = solve(plate, weights, n_modes)
+    named = []
+    for eigenvalue, ((i, j), correlation) in zip(modes.eigenvalues, name_modes(modes), strict=True):
+        label = Label(i + setup.first_label.m, j + setup.first_label.n) if correlation >= CERTAIN else None
+        named.append(NamedMode(label, float(np.sqrt(eigenvalue) / (2.0 * np.pi)), correlation))
+    return modes, tuple(named)
+
+
+def sign_conflicts(setup: Setup, modes: Modes, named: tuple[NamedMode, ...], values: Values) -> tuple[str, ...]:
+    """Labels whose measured sign of the residue differs from the product of the shape at hammer and sensor.
+
+    Only where the setup states signs, the hammer's place and one sensor's place, and where neither stands near a nodal
+    line: there the sign tells nothing.
+
+    Returns
+    -------
+    tuple of str
+        One sentence a conflict.
+    """
+    sensors = [item for item in setup.attached if item.kind == "accelerometer" and len(item.places) == 1]
+    stated = {reading.label: reading.sign for reading in setup.readings if reading.sign}
+    if setup.hammer is None or len(sensors) != 1 or not stated:
+        return ()
+    places = [_fraction(setup, place, values) for place in (setup.hammer, sensors[0].places[0])]
+    at = [modes.displacement(np.array([x]), np.array([y]))[:, 0, 0] for x, y in places]
+    product = at[0] * at[1]
+    largest = np.max(np.abs(modes.displacement(np.linspace(0, 1, 21), np.linspace(0, 1, 21))), axis=(1, 2)) ** 2
+    sentences = []
+    for mode, value, scale in zip(named, product, largest, strict=True):
+        expected = "+" if value > 0 else "-"
+        if mode.label in stated and stated[mode.label] != expected and abs(value) > _NODAL_LINE * scale:
+            sentences.append(
+                f"setup {setup.name}: mode {mode.name} should have sign {expected} between hammer and sensor, the card "
+                f"says {stated[mode.label]}: check its label"
+            )
+    return tuple(sentences)
+
+
+def _fraction(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
+    """A place on the board (m from its corner) as fractions of the vibrating sides."""
+    fractions = []
+    for axis, position, side in zip("xy", place, vibrating_lengths(values, setup), strict=True):
+        covered = values[setup.input_name(f"{axis}0")] if f"{axis}0" in setup.clamped else 0.0
+        fractions.append(float(np.clip((position - covered) / side, 0.0, 1.0)))
+    return fractions[0], fractions[1]

@@ -1,0 +1,55 @@
+"""The label (m,n) of a mode: how many nodal lines its shape crosses along x and along y."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from bayesplate.errors import Fault, InputError
+
+HIGHEST_INDEX = 40
+_GRAMMAR = re.compile(r"[ \t]*\([ \t]*(0|[1-9][0-9]?)[ \t]*,[ \t]*(0|[1-9][0-9]?)[ \t]*\)[ \t]*")
+
+
+class Label(NamedTuple):
+    """Name of a mode.
+
+    Attributes
+    ----------
+    m : int
+        Interior nodal lines crossed along x, plus the laboratory's first label.
+    n : int
+        The same along y.
+    """
+
+    m: int
+    n: int
+
+    def __str__(self) -> str:
+        return f"({self.m},{self.n})"
+
+    @classmethod
+    def parse(cls, text: str) -> Label:
+        """Read a label such as "(1,0)"; spaces beside the numbers are ignored.
+
+        Parameters
+        ----------
+        text : str
+            Two whole numbers from 0 to 40 in round brackets, parted by a comma.
+
+        Returns
+        -------
+        Label
+
+        Raises
+        ------
+        InputError
+            If the text is anything else: "10", "(1;0)", "(1.0,0)", "(-1,0)".
+        """
+        match = _GRAMMAR.fullmatch(text)
+        label = cls(int(match[1]), int(match[2])) if match else None
+        if label is None or max(label) > HIGHEST_INDEX:
+            wanted = f'two whole numbers from 0 to {HIGHEST_INDEX}, written like "(1,0)"'
+            shown = ascii(text if len(text) <= 40 else text[:40] + "...")[1:-1]
+            raise InputError(Fault("mode label", wanted, f'"{shown}"'))
+        return label

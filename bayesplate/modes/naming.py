@@ -1,0 +1,169 @@
+"""Names of modes: which product of beam functions each mode resembles, by optimal assignment within its class."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.modes.plate import Beams, Parity, PlateMatrices, Weights, is_rigid
+from bayesplate.modes.solve import ClassModes, Modes, solve_classes
+
+CERTAIN = 0.75
+"""Correlation with its product of beam functions below which a mode's name is "cannot tell"."""
+
+_SPARE = 3
+_MOST_MODES = 40
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a named mode stands: its class, its rank there, and how well the name fits.
+
+    Attributes
+    ----------
+    parity : Parity
+    rank : int
+        Position among the elastic modes of the class, from 0.
+    correlation : float
+        Between the mode's shape and the product of beam functions, 0 to 1.
+    """
+
+    parity: Parity
+    rank: int
+    correlation: float
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the shape supports the name."""
+        return self.correlation >= CERTAIN
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A named mode: its place, its eigenvalue (s^-2), and its energy in each stiffness and mass term."""
+
+    place: Place
+    eigenvalue: float
+    stiffness: NDArray[np.float64]
+    mass: NDArray[np.float64]
+
+
+def name_shapes(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity) -> list[tuple[Beams, float]]:
+    """Beam product and correlation of each mode of a class, each product given to one mode only.
+
+    Parameters
+    ----------
+    plate : PlateMatrices
+    shapes : (n_modes, n_dof_x, n_dof_y) array
+        Mass-normalised deflections of the lowest modes of the class.
+    parity : Parity
+
+    Returns
+    -------
+    list of (tuple of int, float)
+        In the order of the modes.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    ends_x, ends_y = plate.line_x.ends, plate.line_y.ends
+    beams_x = plate.line_x.beams.T @ plate.line_x.mass
+    beams_y = plate.line_y.beams.T @ plate.line_y.mass
+    correlations = beams_x @ shapes @ beams_y.T
+    products = [
+        beams
+        for beams in np.ndindex(correlations.shape[1:])
+        if plate.parity(beams) == parity and not is_rigid(beams, ends_x, ends_y)
+    ]
+    shares = np.stack([correlations[:, i, j] ** 2 for i, j in products], axis=1)
+    rows, columns = linear_sum_assignment(shares, maximize=True)
+    return [(products[c], float(np.sqrt(shares[r, c]))) for r, c in zip(rows, columns, strict=True)]
+
+
+def name_modes(modes: Modes) -> list[tuple[Beams, float]]:
+    """Beam product and correlation of each of the lowest modes of a plate, in their order."""
+    names: dict[int, tuple[Beams, float]] = {}
+    for parity in set(modes.parities):
+        members = [i for i, p in enumerate(modes.parities) if p == parity]
+        names |= zip(members, name_shapes(modes.plate, modes.shapes[members], parity), strict=True)
+    return [names[i] for i in range(len(names))]
+
+
+def product_coefficients(plate: PlateMatrices) -> NDArray[np.float64]:
+    """Rayleigh quotients of all products of beam functions: (4, n_beams_x, n_beams_y) array.
+
+    Rough, but they need no stiffness to be known: the start of every estimate.
+    """
+    bending_x, slope_x, mixed_x = plate.line_x.beam_energies
+    bending_y, slope_y, mixed_y = plate.line_y.beam_energies
+    return np.stack(
+        [
+            np.add.outer(bending_x, np.zeros_like(bending_y)),
+            np.add.outer(np.zeros_like(bending_x), bending_y),
+            2.0 * np.outer(mixed_x, mixed_y),
+            np.outer(slope_x, slope_y),
+        ]
+    )
+
+
+def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams, Found]:
+    """Find each wanted name among the modes of a plate.
+
+    Parameters
+    ----------
+    plate : PlateMatrices
+    weights : Weights
+        Of one draw.
+    wanted : iterable of (int, int)
+        Orders of the beam functions along x and y.
+
+    Returns
+    -------
+    dict of Found
+        For every wanted name; a name without a certain mode gets its best remaining one, with the low correlation.
+
+    Raises
+    ------
+    KeyError
+        If a name is no elastic mode of this plate or lies beyond the modes that can be resolved.
+    """
+    names = list(wanted)
+    counts = {p: n + _SPARE for p, n in _expected_ranks(plate, weights, names).items()}
+    found: dict[Beams, Found] = {}
+    while counts:
+        solved = solve_classes(plate, weights, counts)
+        found |= _found(plate, solved)
+        unsure = {plate.parity(n) for n in names if n not in found or not found[n].place.is_certain}
+        counts = {p: n + 2 * _SPARE for p, n in counts.items() if p in unsure and n < _MOST_MODES // len(plate.blocks)}
+    missing = [name for name in names if name not in found]
+    if missing:
+        raise KeyError(missing)
+    return {name: found[name] for name in names}
+
+
+def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) -> dict[Parity, int]:
+    """How many products of each class lie at or below the highest wanted one, by their Rayleigh quotients."""
+    values = np.tensordot(weights.stiffness[:4], product_coefficients(plate), axes=1)
+    ends_x, ends_y = plate.line_x.ends, plate.line_y.ends
+    elastic = [beams for beams in np.ndindex(values.shape) if not is_rigid(beams, ends_x, ends_y)]
+    unknown = [name for name in names if name not in elastic]
+    if unknown:
+        raise KeyError(unknown)
+    highest: dict[Parity, float] = {}
+    for name in names:
+        parity = plate.parity(name)
+        highest[parity] = max(highest.get(parity, 0.0), values[name])
+    return {p: sum(bool(values[b] <= top) for b in elastic if plate.parity(b) == p) for p, top in highest.items()}
+
+
+def _found(plate: PlateMatrices, solved: Mapping[Parity, ClassModes]) -> dict[Beams, Found]:
+    result = {}
+    for parity, modes in solved.items():
+        stiffness, mass = modes.coefficients()
+        for rank, (beams, correlation) in enumerate(name_shapes(plate, modes.block.spread(modes.vectors), parity)):
+            result[beams] = Found(
+                Place(parity, rank, correlation), modes.eigenvalues[rank], stiffness[rank], mass[rank]
+            )
+    return result

@@ -1,0 +1,165 @@
+"""How an ideal plate rings: eigenvalues and shapes of K phi = omega^2 M phi, class by class."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
+
+
+@dataclass(frozen=True, eq=False)
+class ClassModes:
+    """Lowest elastic modes of one symmetry class.
+
+    Attributes
+    ----------
+    block : Block
+    eigenvalues : (n_modes,) array
+        omega^2, s^-2, increasing; rigid motions are left out.
+    vectors : (n_dof, n_modes) array
+        Mass-normalised.
+    """
+
+    block: Block
+    eigenvalues: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+
+    def coefficients(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """phi' K_i phi and phi' M_j phi of each mode: (n_modes, n_terms) and (n_modes, n_masses) arrays.
+
+        Weighted with the weights of the solve they sum to the eigenvalue and to 1 (the sum rule).
+        """
+        return self._energies(self.block.terms), self._energies(self.block.masses)
+
+    def _energies(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = [np.einsum("im,im->m", self.vectors, self.block.matrix(term) @ self.vectors) for term in terms]
+        return np.stack(rows, axis=1)
+
+
+def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
+    """Lowest `n_modes` elastic modes of one class.
+
+    Parameters
+    ----------
+    block : Block
+    weights : Weights
+        Of one draw.
+    n_modes : int
+
+    Returns
+    -------
+    ClassModes
+    """
+    from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+    stiffness, mass = block.stiffness(weights), block.mass(weights)
+    # A shift below zero keeps a free plate's rigid motions from making the shifted matrix singular. Its scale is the
+    # lowest Rayleigh quotient of a single unknown: the lowest modes lie far below it, so the shift stays small, and
+    # stiff shear or short elements cannot raise it.
+    shift = -1e-9 * float((stiffness.diagonal() / mass.diagonal()).min()) if block.n_rigid else 0.0
+    factors = splu(
+        stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    n_wanted = min(n_modes + block.n_rigid, block.n_dof - 1)
+    start = np.random.default_rng(0).standard_normal(block.n_dof)
+    values, vectors = eigsh(
+        stiffness,
+        k=n_wanted,
+        M=mass,
+        sigma=shift,
+        OPinv=LinearOperator(stiffness.shape, matvec=factors.solve, dtype=float),
+        v0=start,
+        ncv=min(block.n_dof, max(2 * n_wanted + 1, 20)),
+    )
+    order = np.argsort(values)[block.n_rigid :]
+    return ClassModes(block, values[order], vectors[:, order])
+
+
+def solve_classes(plate: PlateMatrices, weights: Weights, n_modes: Mapping[Parity, int]) -> dict[Parity, ClassModes]:
+    """Lowest modes of the classes asked for; see `solve_class`."""
+    return {parity: solve_class(plate.block(parity), weights, n) for parity, n in n_modes.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a plate in the order of their frequencies.
+
+    Attributes
+    ----------
+    plate : PlateMatrices
+    eigenvalues : (n_modes,) array
+        omega^2, s^-2.
+    parities : tuple of Parity
+        Symmetry class of each mode.
+    ranks : (n_modes,) array of int
+        Position of each mode among the elastic modes of its class, from 0.
+    coefficients : (n_modes, n_terms) array
+        phi' K_i phi; weighted they sum to the eigenvalue exactly (the sum rule).
+    mass_coefficients : (n_modes, n_masses) array
+        phi' M_j phi; weighted they sum to 1.
+    shapes : (n_modes, n_dof_x, n_dof_y) array
+        Mass-normalised shapes as coefficients of the two lines' functions.
+    """
+
+    plate: PlateMatrices
+    eigenvalues: NDArray[np.float64]
+    parities: tuple[Parity, ...]
+    ranks: NDArray[np.intp]
+    coefficients: NDArray[np.float64]
+    mass_coefficients: NDArray[np.float64]
+    shapes: NDArray[np.float64]
+
+    def displacement(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Shapes on a grid: (n_modes, n_x, n_y) array; x and y are fractions of the sides in [0, 1]."""
+        along_x, along_y = self.plate.line_x.shapes(x), self.plate.line_y.shapes(y)
+        return np.stack([(along_y @ (along_x @ shape).T).T for shape in self.shapes])
+
+
+def solve(plate: PlateMatrices, weights: Weights, n_modes: int) -> Modes:
+    """Lowest `n_modes` elastic modes of a plate.
+
+    Each class is solved for a few modes more than its share, and for more again until no class can hide a mode below
+    the highest that is returned.
+
+    Parameters
+    ----------
+    plate : PlateMatrices
+    weights : Weights
+        Of one draw.
+    n_modes : int
+
+    Returns
+    -------
+    Modes
+    """
+    n_each = -(-n_modes // len(plate.blocks)) + 2
+    solved = solve_classes(plate, weights, dict.fromkeys((b.parity for b in plate.blocks), n_each))
+    while True:
+        values = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
+        limit = values[min(n_modes, values.size) - 1]
+        short = {p: 2 * c.eigenvalues.size for p, c in solved.items() if c.eigenvalues[-1] < limit}
+        if not short and values.size >= n_modes:
+            return collect(plate, solved, n_modes)
+        solved |= solve_classes(plate, weights, short or {p: 2 * c.eigenvalues.size for p, c in solved.items()})
+
+
+def collect(plate: PlateMatrices, solved: Mapping[Parity, ClassModes], n_modes: int | None = None) -> Modes:
+    """Sort the modes of several classes into one list, keeping the lowest `n_modes` (all if None)."""
+    eigenvalues = np.concatenate([c.eigenvalues for c in solved.values()])
+    order = np.argsort(eigenvalues, kind="stable")[:n_modes]
+    parities = [p for p, c in solved.items() for _ in c.eigenvalues]
+    ranks = np.concatenate([np.arange(c.eigenvalues.size) for c in solved.values()])
+    stiffness, mass = zip(*(c.coefficients() for c in solved.values()), strict=True)
+    return Modes(
+        plate=plate,
+        eigenvalues=eigenvalues[order],
+        parities=tuple(parities[i] for i in order),
+        ranks=ranks[order],
+        coefficients=np.concatenate(stiffness)[order],
+        mass_coefficients=np.concatenate(mass)[order],
+        shapes=np.concatenate([c.block.spread(c.vectors) for c in solved.values()])[order],
+    )

@@ -1,0 +1,171 @@
+"""The board on the bench: its size, its mass, what is known of its material, and the setups it was measured in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import BoardCard, PriorCard, SetupSection
+from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE, AttachedItem, DeclaredAir, Reading, Setup
+from bayesplate.quantities import Quantity
+
+Values = Mapping[str, NDArray[np.float64]]
+"""Values of named quantities, SI: each a number or an (n_draws,) array."""
+
+_MILLI = 1e-3
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board and its setups, in SI units.
+
+    Attributes
+    ----------
+    name, title, source : str
+    inputs : dict of Quantity
+        What the card states: length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), poisson_xy, and the
+        length each clamp covers. A quantity with an uncertainty is a prior.
+    setups : tuple of Setup
+    prior : str
+        Name of the prior card.
+    effects : tuple of str
+        Declared effects.
+    shear_xz, shear_yz : Quantity or None, Pa
+    notes : tuple of str
+        What was assumed because the card does not say it.
+    """
+
+    name: str
+    inputs: Mapping[str, Quantity]
+    setups: tuple[Setup, ...]
+    prior: str = "weakly-informative"
+    title: str = ""
+    source: str = ""
+    effects: tuple[str, ...] = ()
+    shear_xz: Quantity | None = None
+    shear_yz: Quantity | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def uncertain_inputs(self) -> dict[str, Quantity]:
+        """Inputs that carry an uncertainty, in a fixed order."""
+        return {name: quantity for name, quantity in self.inputs.items() if not quantity.is_exact}
+
+    def nominal(self) -> dict[str, NDArray[np.float64]]:
+        """Mean of every input."""
+        return {name: np.asarray(quantity.mean) for name, quantity in self.inputs.items()}
+
+
+def board_from_card(card: BoardCard, prior: PriorCard | None = None) -> Board:
+    """Take a board card to SI units.
+
+    Parameters
+    ----------
+    card : BoardCard
+    prior : PriorCard, optional
+        Its noise and Poisson ratio stand where it states them and the board card does not.
+
+    Returns
+    -------
+    Board
+    """
+    setups = tuple(_setup(section, prior) for section in card.setups)
+    inputs = {
+        "length_x": card.plate.length_x_mm.scaled(_MILLI),
+        "length_y": card.plate.length_y_mm.scaled(_MILLI),
+        "thickness": card.plate.thickness_mm.scaled(_MILLI),
+    }
+    if card.plate.mass_g is not None:
+        inputs["mass"] = card.plate.mass_g.scaled(_MILLI)
+    elif card.plate.density_kg_m3 is not None:
+        inputs["density"] = card.plate.density_kg_m3
+    inputs["poisson_xy"] = _poisson(card, prior)
+    for setup in setups:
+        inputs |= {setup.input_name(edge): length for edge, length in setup.clamped.items()}
+    return Board(
+        name=card.name,
+        title=card.title,
+        source=card.source,
+        inputs=inputs,
+        setups=setups,
+        prior=card.material.prior,
+        effects=tuple(card.effects),
+        shear_xz=_optional(card.material.shear_xz_gpa, 1e9),
+        shear_yz=_optional(card.material.shear_yz_gpa, 1e9),
+        notes=_notes(card, inputs["poisson_xy"]),
+    )
+
+
+def density(values: Values) -> NDArray[np.float64]:
+    """Density of the board from the values of its inputs, kg m^-3."""
+    if "density" in values:
+        return np.asarray(values["density"])
+    return np.asarray(values["mass"] / (values["length_x"] * values["length_y"] * values["thickness"]))
+
+
+def vibrating_lengths(values: Values, setup: Setup) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Side lengths left free by the clamps of a setup, m."""
+    sides = []
+    for axis in ("x", "y"):
+        covered = sum(values[setup.input_name(e)] for e in setup.clamped if e.startswith(axis))
+        sides.append(np.asarray(values[f"length_{axis}"] - covered))
+    return sides[0], sides[1]
+
+
+def _optional(quantity: Quantity | None, factor: float) -> Quantity | None:
+    return None if quantity is None else quantity.scaled(factor)
+
+
+def _poisson(card: BoardCard, prior: PriorCard | None) -> Quantity:
+    if card.material.poisson_is_default and prior is not None and prior.poisson_xy is not None:
+        return prior.poisson_xy
+    return card.material.poisson_xy
+
+
+def _noise(section: SetupSection, prior: PriorCard | None) -> Quantity:
+    stated = section.noise_percent or (prior.noise_percent if prior is not None else None)
+    if stated is not None:
+        return stated.scaled(1e-2)
+    return CLAMPED_NOISE if "clamped" in section.edges.words.values() else DEFAULT_NOISE
+
+
+def _setup(section: SetupSection, prior: PriorCard | None) -> Setup:
+    edges, first = section.edges, section.first_label
+    return Setup(
+        name=section.name,
+        ends_x=(edges.x0, edges.x1),
+        ends_y=(edges.y0, edges.y1),
+        clamped={edge: length.scaled(_MILLI) for edge, length in section.clamped_mm.items()},
+        readings=tuple(
+            Reading(label, (label.m - first.m, label.n - first.n), frequency, section.signs.get(label, ""))
+            for label, frequency in section.frequencies_hz.items()
+        ),
+        resolution=section.resolution_hz or 0.0,
+        unlabelled=tuple(peak.mean for peak in section.unlabelled_hz),
+        noise=_noise(section, prior),
+        first_label=first,
+        published_coefficients=section.published_coefficients,
+        attached=tuple(
+            AttachedItem(
+                item.kind,
+                tuple((x * _MILLI, y * _MILLI) for x, y in item.at_mm),
+                _optional(item.mass_g, _MILLI),
+            )
+            for item in section.attached
+        ),
+        hammer=None if section.hammer is None else (section.hammer.at_mm[0] * _MILLI, section.hammer.at_mm[1] * _MILLI),
+        air=None if section.air is None else DeclaredAir(section.air.density_kg_m3, section.air.baffle),
+    )
+
+
+def _notes(card: BoardCard, poisson: Quantity) -> tuple[str, ...]:
+    notes = []
+    if card.material.poisson_is_default:
+        notes.append(f"the card gives no Poisson ratio: nu_xy = {poisson.mean:g} +- {poisson.sd:g} was assumed")
+    for name in ("length_x_mm", "length_y_mm", "thickness_mm"):
+        if getattr(card.plate, name).has_profile:
+            notes.append(f"{name} was read at several places: its mean is used, its profile is not part of this model")
+    return tuple(notes)

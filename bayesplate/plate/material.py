@@ -1,0 +1,116 @@
+"""Elastic moduli and rigidities of an orthotropic plate, and the wave speeds makers derive from them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+RIGIDITIES = ("D_x", "D_y", "D_s")
+MODULI = ("E_x", "E_y", "G_xy")
+
+
+class Rigidities(NamedTuple):
+    """D_x, D_y, D_s: arrays of one shape, N m."""
+
+    D_x: NDArray[np.float64]
+    D_y: NDArray[np.float64]
+    D_s: NDArray[np.float64]
+
+
+class Moduli(NamedTuple):
+    """E_x, E_y, G_xy: arrays of one shape, Pa."""
+
+    E_x: NDArray[np.float64]
+    E_y: NDArray[np.float64]
+    G_xy: NDArray[np.float64]
+
+
+def rigidities(E_x: ArrayLike, E_y: ArrayLike, G_xy: ArrayLike, thickness: ArrayLike, nu_xy: ArrayLike) -> Rigidities:
+    """Rigidities of a plate from its elastic moduli.
+
+    Parameters
+    ----------
+    E_x, E_y, G_xy : array_like, Pa
+    thickness : array_like, m
+    nu_xy : array_like
+        Major Poisson ratio; nu_yx = nu_xy E_y / E_x.
+
+    Returns
+    -------
+    Rigidities
+        N m. Not a number where nu_xy nu_yx >= 1, which no material reaches.
+
+    References
+    ----------
+    Ducceschi et al., eq. (3) and (4).
+    """
+    E_x, E_y, G_xy, h = (np.asarray(v, dtype=float) for v in (E_x, E_y, G_xy, thickness))
+    remainder = 1.0 - np.asarray(nu_xy) ** 2 * E_y / E_x
+    factor = h**3 / (12.0 * np.where(remainder > 0, remainder, np.nan))
+    return Rigidities(E_x * factor, E_y * factor, np.asarray(G_xy * h**3 / 3.0))
+
+
+def moduli(D_x: ArrayLike, D_y: ArrayLike, D_s: ArrayLike, thickness: ArrayLike, nu_xy: ArrayLike) -> Moduli:
+    """Elastic moduli of a plate from its rigidities; the inverse of `rigidities`.
+
+    Parameters
+    ----------
+    D_x, D_y, D_s : array_like, N m
+    thickness : array_like, m
+    nu_xy : array_like
+
+    Returns
+    -------
+    Moduli
+        Pa. Not a number where nu_xy nu_yx >= 1.
+
+    Notes
+    -----
+    The map (ln D_x, ln D_y, ln D_s) -> (ln E_x, ln E_y, ln G_xy) at fixed thickness and nu_xy has Jacobian determinant
+    1, so a density of one set of logarithms is a density of the other.
+
+    References
+    ----------
+    Ducceschi et al., eq. (14).
+    """
+    D_x, D_y, D_s, h = (np.asarray(v, dtype=float) for v in (D_x, D_y, D_s, thickness))
+    remainder = 1.0 - np.asarray(nu_xy) ** 2 * D_y / D_x
+    factor = 12.0 * np.where(remainder > 0, remainder, np.nan) / h**3
+    return Moduli(D_x * factor, D_y * factor, np.asarray(3.0 * D_s / h**3))
+
+
+class Derived(NamedTuple):
+    """A quantity that makers use, its values and its unit."""
+
+    values: NDArray[np.float64]
+    unit: str
+
+
+def derived_quantities(constants: Moduli, density: ArrayLike) -> dict[str, Derived]:
+    """Wave speeds, radiation ratios, impedances, specific stiffnesses and ratios of the constants.
+
+    Parameters
+    ----------
+    constants : Moduli
+    density : array_like, kg m^-3
+
+    Returns
+    -------
+    dict of Derived
+        Wave speed c = sqrt(E / rho), radiation ratio c / rho, impedance c rho and specific stiffness E / rho along (x)
+        and across (y) the grain; anisotropy E_x / E_y; E_x / G_xy.
+    """
+    rho = np.asarray(density, dtype=float)
+    result = {}
+    for axis, modulus in (("x", constants.E_x), ("y", constants.E_y)):
+        speed = np.sqrt(modulus / rho)
+        result[f"wave_speed_{axis}"] = Derived(speed, "m/s")
+        result[f"radiation_ratio_{axis}"] = Derived(speed / rho, "m^4/(kg s)")
+        result[f"impedance_{axis}"] = Derived(speed * rho, "kg/(m^2 s)")
+        result[f"specific_stiffness_{axis}"] = Derived(modulus / rho, "m^2/s^2")
+    result["anisotropy"] = Derived(constants.E_x / constants.E_y, "1")
+    result["E_x_over_G_xy"] = Derived(constants.E_x / constants.G_xy, "1")
+    result["density"] = Derived(rho + 0.0 * constants.E_x, "kg/m^3")
+    return result

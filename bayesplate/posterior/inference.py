@@ -1,0 +1,170 @@
+"""From a board to draws: the estimate, the law that serves, and the sampler; one call does it all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import PriorCard
+from bayesplate.estimates.identifiability import (
+    Identifiability,
+    identifiability,
+    require_identifiable,
+    require_labels,
+)
+from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
+from bayesplate.frequencies.laws import LawName, cents
+from bayesplate.plate.board import Board
+from bayesplate.posterior.checkpoint import Checkpoint
+from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.region import find_region, linearisation_errors
+from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
+from bayesplate.posterior.tails import TailCoordinates
+from bayesplate.posterior.target import Posterior
+
+LINEAR_SHARE = 0.25
+"""The linear law serves while its error over the posterior stays below this share of the noise."""
+
+_N_CHECKS = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A board ready to be sampled.
+
+    Attributes
+    ----------
+    board : Board
+    prior : PriorCard
+    estimate : Estimate
+    identifiability : Identifiability
+    posterior : Posterior
+        Its models hold both laws.
+    centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
+        Normal approximation of the posterior, for the starts.
+    """
+
+    board: Board
+    prior: PriorCard
+    estimate: Estimate
+    identifiability: Identifiability
+    posterior: Posterior
+    centre: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+    @property
+    def parameters(self) -> Parameters:
+        """The sampled columns."""
+        return self.posterior.parameters
+
+    def under(self, law: LawName) -> Problem:
+        """The same problem under the law of that name."""
+        return replace(self, posterior=replace_law(self.posterior, law))
+
+
+@dataclass(frozen=True, eq=False)
+class Inference:
+    """Draws of a problem and the verdict of the convergence gate."""
+
+    problem: Problem
+    chains: Chains
+    convergence: Convergence
+
+
+def replace_law(posterior: Posterior, law: LawName) -> Posterior:
+    """The same posterior under another law."""
+    return Posterior(posterior.board, posterior.prior, posterior.models, law, posterior.robust)
+
+
+def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: bool = False) -> Problem:
+    """Estimate by least squares, check that the constants are identifiable, build both laws and choose one.
+
+    Parameters
+    ----------
+    board : Board
+    prior : PriorCard
+    law : "linear" or "exact", optional
+        By default the linear law where its error over the normal approximation of the posterior stays, for every mode,
+        below a quarter of the expected noise.
+    robust : bool
+        Student's distribution for the noise.
+
+    Returns
+    -------
+    Problem
+
+    Raises
+    ------
+    NotIdentifiableError
+        If the labelled modes leave a constant open.
+    """
+    require_labels(board)
+    estimate = weighted_least_squares(board)
+    found = identifiability(estimate.sensitivities, estimate.scales)
+    require_identifiable(board, found)
+    region = find_region(board, estimate)
+    if law is None:
+        draws = np.random.default_rng(0).multivariate_normal(region.centre, region.covariance, _N_CHECKS)
+        errors = linearisation_errors(board, region.models, draws)
+        law = "linear" if linear_suffices(board, errors, [s.noise.median for s in board.setups]) else "exact"
+    posterior = Posterior(board, prior, region.models, law, robust)
+    return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance)
+
+
+def linear_suffices(board: Board, errors: NDArray[np.float64], noise: Sequence[float]) -> bool:
+    """Whether linearisation errors stay below a quarter of the noise for every mode, rms over draws.
+
+    Parameters
+    ----------
+    board : Board
+    errors : (n_draws, n_modes) array, cents
+    noise : sequence of float
+        Relative, one a setup.
+    """
+    limit = LINEAR_SHARE * cents(
+        np.concatenate([np.full(len(s.readings), n) for s, n in zip(board.setups, noise, strict=True)])
+    )
+    finite = np.isfinite(errors).all(axis=1)
+    if finite.mean() < 0.5:
+        return False
+    rms = np.sqrt(np.mean(errors[finite] ** 2, axis=0))
+    return bool(np.all(rms < limit))
+
+
+def infer(
+    problem: Problem,
+    settings: SamplerSettings,
+    *,
+    checkpoint: Checkpoint | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Inference:
+    """Sample the posterior of a problem in coordinates that shorten its tails.
+
+    Parameters
+    ----------
+    problem : Problem
+    settings : SamplerSettings
+    checkpoint, progress
+        See `bayesplate.posterior.sampling.sample`.
+
+    Returns
+    -------
+    Inference
+        Its chains are theta, the columns of `Parameters`.
+    """
+    coordinates = TailCoordinates.around(problem.centre, problem.covariance, N_RIGIDITIES)
+    chains, convergence = sample(
+        coordinates.density(problem.posterior),
+        coordinates.start,
+        coordinates.start_covariance(problem.covariance),
+        settings,
+        names=problem.parameters.names,
+        checkpoint=checkpoint,
+        progress=progress,
+    )
+    theta = Chains(coordinates.theta(chains.draws), chains.log_prob, chains.burn_in)
+    return Inference(problem, theta, convergence)

@@ -1,0 +1,154 @@
+"""Where the posterior lies, before sampling: its mode, a normal approximation, and the exact law for that region."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.least_squares import Estimate, log_measured
+from bayesplate.estimates.refit import Predict, design, refit
+from bayesplate.frequencies.laws import LawName, cents
+from bayesplate.frequencies.model import SetupModel, setup_model, with_exact
+from bayesplate.plate.board import Board, Values
+from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+
+Floats = NDArray[np.float64]
+
+_BOX_SDS = 3.0
+_NARROWEST, _WIDEST = 0.1, 0.6
+_N_HELD_OUT = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A normal approximation of the posterior, and models made at its centre.
+
+    Attributes
+    ----------
+    centre : (n_dim,) array
+        Weighted least squares under the exact law, uncertain inputs moved within their priors.
+    covariance : (n_dim, n_dim) array
+    models : tuple of SetupModel
+        With the linear law at the centre and the exact law around it.
+    """
+
+    centre: Floats
+    covariance: Floats
+    models: tuple[SetupModel, ...]
+
+
+def find_region(board: Board, estimate: Estimate) -> Region:
+    """Locate the posterior of a board.
+
+    The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise;
+    noise has its prior's. Where inputs are uncertain the fit may move them, and the models are made anew at the point
+    it finds.
+
+    Parameters
+    ----------
+    board : Board
+    estimate : Estimate
+        At the nominal inputs.
+
+    Returns
+    -------
+    Region
+    """
+    parameters = Parameters(board)
+    n_modes = estimate.residuals.size
+    misfit = float(np.sum((estimate.residuals / estimate.scales) ** 2)) / max(n_modes - N_RIGIDITIES, 1)
+    widening = np.sqrt(max(1.0, misfit))
+    noise = np.array([setup.noise.median for setup in board.setups]) * widening
+    centre = parameters.theta(estimate.values, noise)
+    models = estimate.models
+    scales = estimate.scales * widening
+    covariance = _covariance(board, models, "linear", scales, centre)
+    models = exact_models(board, models, centre, covariance)
+    if parameters.inputs:
+        columns = parameters.fitted_columns
+        centre = centre.copy()
+        predict = predictor(board, models, "exact", centre)
+        centre[columns] = refit(predict, log_measured(board), scales, centre[columns])
+        values = {name: np.ravel(value)[0] for name, value in parameters.values(centre[None, :]).items()}
+        models = tuple(setup_model(model.setup, values, model.plate) for model in models)
+        covariance = _covariance(board, models, "linear", scales, centre)
+        models = exact_models(board, models, centre, covariance)
+    return Region(centre, covariance, models)
+
+
+def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predict:
+    """Logarithms of all frequencies as a function of the fitted columns, the noise columns kept as in `centre`."""
+    parameters = Parameters(board)
+
+    def predict(x: Floats) -> Floats:
+        theta = np.tile(centre, (len(x), 1))
+        theta[:, parameters.fitted_columns] = x
+        values = parameters.values(theta)
+        return np.concatenate([model.log_frequencies(values, law) for model in models], axis=1)
+
+    return predict
+
+
+def _covariance(board: Board, models: Sequence[SetupModel], law: LawName, scales: Floats, centre: Floats) -> Floats:
+    """Covariance of all columns: of the weighted fit for the fitted ones, of the prior for the noise."""
+    parameters = Parameters(board)
+    columns = parameters.fitted_columns
+    weighted = design(predictor(board, models, law, centre), scales, centre[columns])
+    covariance = np.zeros((parameters.n_dim, parameters.n_dim))
+    covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
+    for i, setup in enumerate(board.setups, start=N_RIGIDITIES):
+        covariance[i, i] = setup.noise.log_sd**2
+    return covariance
+
+
+def exact_models(
+    board: Board, models: Sequence[SetupModel], centre: Floats, covariance: Floats
+) -> tuple[SetupModel, ...]:
+    """Models with the exact law, trained at the centre and at the corners of a box around it.
+
+    The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies are homogeneous in the
+    rigidities, so a common factor needs no training, and side lengths only rescale the same terms.
+
+    Parameters
+    ----------
+    board : Board
+    models : sequence of SetupModel
+        At the centre.
+    centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
+    """
+    parameters = Parameters(board)
+    ratios = np.eye(N_RIGIDITIES)[:2] - np.eye(N_RIGIDITIES)[2]
+    spread = ratios @ covariance[:N_RIGIDITIES, :N_RIGIDITIES] @ ratios.T
+    half_widths = np.zeros(parameters.n_dim)
+    half_widths[:2] = np.clip(_BOX_SDS * np.sqrt(np.diagonal(spread)), _NARROWEST, _WIDEST)
+    if "poisson_xy" in parameters.inputs:
+        half_widths[N_RIGIDITIES + len(board.setups) + parameters.inputs.index("poisson_xy")] = _BOX_SDS
+    axes = np.flatnonzero(half_widths)
+    corners = np.zeros((2**axes.size, parameters.n_dim))
+    corners[:, axes] = list(product((-1.0, 1.0), repeat=axes.size))
+    held_out = np.random.default_rng(0).uniform(-1.0, 1.0, (_N_HELD_OUT, parameters.n_dim))
+
+    def points(signs: Floats) -> list[Values]:
+        values = parameters.values(centre + half_widths * signs)
+        columns = {name: np.broadcast_to(value, len(signs)) for name, value in values.items()}
+        return [{name: column[i] for name, column in columns.items()} for i in range(len(signs))]
+
+    (middle,) = points(np.zeros((1, parameters.n_dim)))
+    around, checks = points(corners), points(held_out)
+    return tuple(with_exact(model, middle, around, checks) for model in models)
+
+
+def worst_cents(models: Sequence[SetupModel]) -> float:
+    """Largest error of the exact laws against full solves that they were not trained on, cents."""
+    return max(model.exact.matrices.worst_cents for model in models if model.exact is not None)
+
+
+def linearisation_errors(board: Board, models: Sequence[SetupModel], theta: Floats) -> Floats:
+    """Linear less exact law at each draw: (n_draws, n_modes) array, cents."""
+    values = Parameters(board).values(theta)
+    parts = [model.log_frequencies(values, "linear") - model.log_frequencies(values, "exact") for model in models]
+    return cents(np.concatenate(parts, axis=1))

@@ -1,0 +1,88 @@
+"""The posterior density: priors on constants, noise and inputs, and a likelihood summed over setups."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import PriorCard
+from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.model import SetupModel
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import moduli
+from bayesplate.posterior.likelihood import Readings
+from bayesplate.posterior.parameters import Parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Log posterior density of a board under one law, vectorised over draws.
+
+    Attributes
+    ----------
+    board : Board
+    prior : PriorCard
+        Densities of E_x, E_y, G_xy or of D_x, D_y, D_s.
+    models : sequence of SetupModel
+        One a setup.
+    law : "linear" or "exact"
+    robust : bool
+    """
+
+    board: Board
+    prior: PriorCard
+    models: Sequence[SetupModel]
+    law: LawName
+    robust: bool = False
+    parameters: Parameters = field(init=False)
+    readings: tuple[Readings, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", Parameters(self.board))
+        object.__setattr__(self, "readings", tuple(Readings.of(s, self.robust) for s in self.board.setups))
+
+    def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log density: (n_draws,) array from (n_draws, n_dim); -inf outside the support."""
+        total = self.log_prior(theta)
+        inside = np.isfinite(total)
+        if inside.any():
+            total[inside] += self.log_likelihood(theta[inside]).sum(axis=1)
+        return total
+
+    def log_prior(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log prior density: (n_draws,) array."""
+        total = self.parameters.log_prior_inputs(theta) + self.log_prior_constants(theta)
+        for log_noise, setup in zip(self.parameters.log_noise(theta).T, self.board.setups, strict=True):
+            total += -0.5 * ((log_noise - np.log(setup.noise.median)) / setup.noise.log_sd) ** 2
+            total -= np.log(setup.noise.log_sd) + 0.5 * np.log(2.0 * np.pi)
+        return np.where(np.isnan(total), -np.inf, total)
+
+    def log_prior_constants(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log prior density of ln D_x, ln D_y, ln D_s given the inputs: (n_draws,) array.
+
+        A density of the moduli is one of the rigidities: the Jacobian of their logarithms is 1 (`moduli`). Outside
+        nu_xy nu_yx < 1 no material exists and the density is zero.
+        """
+        values = self.parameters.values(theta)
+        constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+        by_name = values | constants._asdict()
+        with np.errstate(invalid="ignore"):
+            densities = [d.log_density(np.log(by_name[name])) for name, d in self.prior.densities.items()]
+        return np.where(np.isnan(constants.E_x), -np.inf, np.sum(densities, axis=0))
+
+    def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """ln f of the labelled modes: one (n_draws, n_modes) array a setup."""
+        values = self.parameters.values(theta)
+        return [model.log_frequencies(values, self.law) for model in self.models]
+
+    def log_likelihood(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log probability of every reading, setup after setup: (n_draws, n_modes) array."""
+        log_noise = self.parameters.log_noise(theta)
+        parts = [
+            readings.log_likelihood(predicted, log_noise[:, i])
+            for i, (readings, predicted) in enumerate(zip(self.readings, self.log_frequencies(theta), strict=True))
+        ]
+        return np.concatenate(parts, axis=1)

@@ -1,0 +1,251 @@
+"""A number with its uncertainty is a prior: readings, a standard deviation, log-normal, bounded."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import log_ndtr
+
+Kind = Literal["normal", "log-normal"]
+Floats = NDArray[np.float64]
+_LOG_ROOT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number and what is not known about it.
+
+    It is sampled in a standard coordinate z, normal with mean 0 and standard deviation 1: `value` leads from z to the
+    number, `standard` back, `log_prior` is the density of z. An exact quantity has one value whatever z is.
+
+    Attributes
+    ----------
+    mean, sd : float
+        Mean and standard deviation, in the quantity's unit, before truncation; sd = 0 says that the number is exact.
+    kind : {"normal", "log-normal"}
+        A positive physical quantity is log-normal with exactly this mean and sd; a Poisson ratio is normal.
+    lower, upper : float
+        Bounds; the density is truncated there and normalised again.
+    readings : tuple of float
+        What was read, in the quantity's unit; empty if only a mean was given.
+    resolution : float
+        Step to which the readings were rounded, in the quantity's unit.
+    at_x, at_y : tuple of float
+        Places of the readings on the plate, in the unit of the place; one a reading, or empty.
+    """
+
+    mean: float
+    sd: float = 0.0
+    kind: Kind = "log-normal"
+    lower: float = -math.inf
+    upper: float = math.inf
+    readings: tuple[float, ...] = ()
+    resolution: float = 0.0
+    at_x: tuple[float, ...] = ()
+    at_y: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.mean):
+            raise ValueError(f"mean: wanted a finite number, got {self.mean}")
+        if not (math.isfinite(self.sd) and self.sd >= 0):
+            raise ValueError(f"sd: wanted a finite number, zero or positive, got {self.sd}")
+        if self.kind == "log-normal" and self.sd > 0 and self.mean <= 0:
+            raise ValueError(f"mean: wanted a positive number for a log-normal quantity, got {self.mean}")
+        if not self.lower < self.upper:
+            raise ValueError(f"bounds: wanted lower < upper, got {self.lower} and {self.upper}")
+        for places in (self.at_x, self.at_y):
+            if places and len(places) != len(self.readings):
+                raise ValueError(f"places: wanted one a reading ({len(self.readings)}), got {len(places)}")
+
+    @classmethod
+    def exact(cls, value: float) -> Quantity:
+        """A number without uncertainty."""
+        return cls(float(value), kind="log-normal" if value > 0 else "normal")
+
+    @classmethod
+    def from_mean(
+        cls, mean: float, sd: float, kind: Kind = "log-normal", lower: float = -math.inf, upper: float = math.inf
+    ) -> Quantity:
+        """A number with a standard deviation, both in the quantity's unit; log-normal unless said otherwise."""
+        return cls(float(mean), float(sd), kind, lower, upper)
+
+    @classmethod
+    def from_median(cls, median: float, factor: float) -> Quantity:
+        """A log-normal quantity whose logarithm has the standard deviation ln(factor).
+
+        Parameters
+        ----------
+        median : float
+            Positive, in the quantity's unit.
+        factor : float
+            Above 1: about two thirds of the probability lies between median / factor and median * factor.
+        """
+        if not (median > 0 and factor > 1):
+            raise ValueError(f"wanted median > 0 and factor > 1, got {median} and {factor}")
+        variance = math.log(factor) ** 2
+        mean = median * math.exp(variance / 2)
+        return cls(mean, mean * math.sqrt(math.expm1(variance)))
+
+    @classmethod
+    def from_readings(
+        cls,
+        readings: Sequence[float],
+        resolution: float = 0.0,
+        at_x: Sequence[float] = (),
+        at_y: Sequence[float] = (),
+        kind: Kind = "log-normal",
+    ) -> Quantity:
+        """The mean of readings, with sd**2 = s**2 / n + resolution**2 / 12.
+
+        The first term is the squared standard error; the second, the rounding error, is not averaged away, because
+        readings of one thing are rounded alike. With one reading only the rounding remains.
+
+        Parameters
+        ----------
+        readings : sequence of float
+            At least one, in the quantity's unit.
+        resolution : float
+            Step to which they were rounded; 0 if they were not.
+        at_x, at_y : sequence of float
+            Places of the readings, one each; empty if they have none.
+        kind : {"normal", "log-normal"}
+            See the class.
+        """
+        values = tuple(float(value) for value in readings)
+        if not values:
+            raise ValueError("readings: wanted at least one, got none")
+        # statistics computes with fractions: equal readings have a variance of exactly zero
+        scatter = statistics.variance(values) / len(values) if len(values) > 1 else 0.0
+        sd = math.sqrt(scatter + resolution**2 / 12)
+        places_x, places_y = (tuple(float(value) for value in places) for places in (at_x, at_y))
+        return cls(statistics.mean(values), sd, kind, readings=values, resolution=float(resolution),
+                   at_x=places_x, at_y=places_y)  # fmt: skip
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the number has no uncertainty."""
+        return self.sd == 0
+
+    @property
+    def has_profile(self) -> bool:
+        """Whether the readings have places, so that they describe how the quantity varies over the plate."""
+        return bool(self.at_x or self.at_y)
+
+    @property
+    def log_sd(self) -> float:
+        """Standard deviation of the logarithm of a log-normal quantity, before truncation; 0 if exact."""
+        if self.is_exact:
+            return 0.0
+        if self.kind != "log-normal":
+            raise ValueError("log_sd: wanted a log-normal quantity, got a normal one")
+        return math.sqrt(math.log1p((self.sd / self.mean) ** 2))
+
+    @property
+    def median(self) -> float:
+        """The value at z = 0, in the quantity's unit."""
+        if self.is_exact or self.kind == "normal":
+            return self.mean
+        return self.mean * math.exp(-(self.log_sd**2) / 2)
+
+    def value(self, z: ArrayLike) -> Floats:
+        """The number at the standard coordinate z.
+
+        Parameters
+        ----------
+        z : array of any shape, no unit
+
+        Returns
+        -------
+        array of the same shape, in the quantity's unit
+        """
+        coordinate = np.asarray(z, dtype=np.float64)
+        if self.is_exact:
+            return np.full(coordinate.shape, self.mean)[()]
+        if self.kind == "normal":
+            return np.asarray(self.mean + self.sd * coordinate)[()]
+        return np.asarray(self.median * np.exp(self.log_sd * coordinate))[()]
+
+    def standard(self, value: ArrayLike) -> Floats:
+        """The standard coordinate of a value; the inverse of `value`.
+
+        Parameters
+        ----------
+        value : array of any shape, in the quantity's unit
+
+        Returns
+        -------
+        array of the same shape, no unit
+            0 if the quantity is exact; -inf where a log-normal quantity would not be positive.
+        """
+        number = np.asarray(value, dtype=np.float64)
+        if self.is_exact:
+            return np.zeros(number.shape)[()]
+        if self.kind == "normal":
+            return np.asarray((number - self.mean) / self.sd)[()]
+        positive = number > 0
+        ratio = np.where(positive, number, self.median) / self.median
+        return np.where(positive, np.log(ratio) / self.log_sd, -np.inf)[()]
+
+    def log_prior(self, z: ArrayLike) -> Floats:
+        """Logarithm of the density of z, normalised over the part within the bounds.
+
+        Parameters
+        ----------
+        z : array of any shape, no unit
+
+        Returns
+        -------
+        array of the same shape, no unit
+            -inf outside the bounds. An exact quantity has no bounds to keep and returns the standard normal density.
+        """
+        coordinate = np.asarray(z, dtype=np.float64)
+        density = -0.5 * coordinate**2 - _LOG_ROOT_TWO_PI
+        if self.is_exact or (self.lower == -math.inf and self.upper == math.inf):
+            return np.asarray(density)[()]
+        low, high = float(self.standard(self.lower)), float(self.standard(self.upper))
+        inside = (coordinate >= low) & (coordinate <= high)
+        return np.where(inside, density - _log_probability(low, high), -np.inf)[()]
+
+    def scaled(self, factor: float) -> Quantity:
+        """The same quantity in another unit.
+
+        Parameters
+        ----------
+        factor : float
+            Positive. It multiplies mean, sd, bounds, readings and resolution; the places keep their unit.
+        """
+        if not factor > 0:
+            raise ValueError(f"factor: wanted a positive number, got {factor}")
+        return replace(
+            self,
+            mean=self.mean * factor,
+            sd=self.sd * factor,
+            lower=self.lower * factor,
+            upper=self.upper * factor,
+            readings=tuple(value * factor for value in self.readings),
+            resolution=self.resolution * factor,
+        )
+
+    def with_places_scaled(self, factor: float) -> Quantity:
+        """The same quantity with the places of its readings in another unit."""
+        return replace(
+            self,
+            at_x=tuple(place * factor for place in self.at_x),
+            at_y=tuple(place * factor for place in self.at_y),
+        )
+
+
+def _log_probability(low: float, high: float) -> float:
+    """Logarithm of the standard normal probability between two bounds, stable in both tails."""
+    if low > 0:
+        low, high = -high, -low
+    log_high, log_low = float(log_ndtr(high)), float(log_ndtr(low))
+    if log_low == -math.inf:
+        return log_high
+    return log_high + math.log(-math.expm1(log_low - log_high))

@@ -1,0 +1,82 @@
+"""`check`: every fault of a card, or what would be fitted and what it can identify; nothing is sampled or written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bayesplate.estimates.identifiability import remarks
+from bayesplate.frequencies.laws import cents
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.posterior.inference import pose
+from bayesplate.workflow.prepare import prepare
+
+
+def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) -> dict[str, Any]:
+    """Say what would be fitted.
+
+    Parameters
+    ----------
+    card : str or path
+    effects : sequence of str, optional
+
+    Returns
+    -------
+    dict
+        name, title, setups, law, estimate (least squares, with the standard error expected from the noise), modes with
+        their residuals and leverages, condition_number, identifiability and notes.
+
+    Raises
+    ------
+    InputError, NotIdentifiableError
+        As `fit` would.
+    """
+    prepared = prepare(card, effects)
+    board = prepared.board
+    problem = pose(board, prepared.prior)
+    estimate, found = problem.estimate, problem.identifiability
+    D_x, D_y, D_s = estimate.rigidities
+    elastic = moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"])
+    errors = dict(zip(MODULI, found.standard_errors, strict=True))
+    constants = {**dict(zip(MODULI, elastic, strict=True)), **dict(zip(RIGIDITIES, estimate.rigidities, strict=True))}
+    rows = [(setup.name, reading) for setup in board.setups for reading in setup.readings]
+    residuals = cents(estimate.residuals)
+    correlations = [place.correlation for model in estimate.models for place in model.places]
+    return {
+        "name": board.name,
+        "title": board.title,
+        "prior": board.prior,
+        "law": problem.posterior.law,
+        "setups": [
+            {
+                "name": setup.name,
+                "edges": setup.edges,
+                "labelled": len(setup.readings),
+                "unlabelled": len(setup.unlabelled),
+                "noise_percent": 100.0 * setup.noise.median,
+            }
+            for setup in board.setups
+        ],
+        "uncertain_inputs": list(board.uncertain_inputs),
+        "estimate": {name: float(value) for name, value in constants.items()},
+        "expected_sd_percent": {name: 100.0 * float(error) for name, error in errors.items()},
+        "condition_number": found.condition_number,
+        "modes": [
+            {
+                "setup": setup,
+                "label": str(reading.label),
+                "measured_hz": reading.frequency.mean,
+                "residual_cents": float(residuals[i]),
+                "leverage": float(found.leverages[i]),
+                "share_percent": [round(100.0 * float(share), 1) for share in found.shares[i]],
+                "label_correlation": correlations[i],
+            }
+            for i, (setup, reading) in enumerate(rows)
+        ],
+        "in_sample_rms_cents": float(np.sqrt(np.mean(residuals**2))),
+        "identifiability": list(remarks(board, found)),
+        "notes": list(board.notes),
+    }

@@ -1,0 +1,54 @@
+"""What a command prints: its tables, its sentences, its JSON; the command line only lays them out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bayesplate.posterior.sampling import Progress
+from bayesplate.results.folder import json_text
+from bayesplate.results.tables import Table, check_tables, constants_table, modes_table, unlabelled_table
+
+__all__ = ["Progress", "Shown", "Table", "json_text", "progress_text", "show_check", "show_fit"]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is printed: tables, what the data tell weakly, warnings, and a closing sentence."""
+
+    tables: tuple[Table, ...]
+    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
+    closing: str
+
+
+def show_check(report: Mapping[str, Any]) -> Shown:
+    """The report of `bayesplate.workflow.check.check` for a person."""
+    closing = f"{report['law']} law; nothing was sampled. Next: bayesplate fit {report['name']}"
+    return Shown(check_tables(report), tuple(report["identifiability"]), tuple(report["notes"]), closing)
+
+
+def show_fit(summary: Mapping[str, Any]) -> Shown:
+    """The summary of `bayesplate.workflow.fit.fit` for a person."""
+    unlabelled = unlabelled_table(summary)
+    tables = (constants_table(summary), modes_table(summary), *([unlabelled] if unlabelled else []))
+    error, model = summary["error"], summary["model"]
+    left_out = error["leave_one_out_rms_cents"]
+    noise = ", ".join(f"{100 * entry['q50']:.2f} %" for entry in summary["noise"].values())
+    closing = (
+        f"{model['theory']} plate, {model['law']} law. Error rms {error['in_sample_rms_cents']:.1f} cents in sample, "
+        + (f"{left_out:.1f} left out" if left_out is not None else "too few modes to leave one out")
+        + f"; noise {noise}; the linear law is off by {error['linearisation_rms_cents']:.1f} cents."
+    )
+    return Shown(tables, tuple(summary["identifiability"]), tuple(summary["warnings"]), closing)
+
+
+def progress_text(progress: Progress) -> str:
+    """Where sampling stands, in one line."""
+    text = f"sampling: step {progress.n_steps} of at most {progress.max_steps}"
+    verdict = progress.convergence
+    if verdict is None:
+        return text
+    n_taus = verdict.n_kept_steps / verdict.tau_max
+    return f"{text}; {n_taus:.0f} of 50 autocorrelation times, R-hat {verdict.rhat_max:.4f}"

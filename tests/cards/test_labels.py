@@ -1,0 +1,34 @@
+"""A label has one grammar: (m,n)."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bayesplate.errors import InputError
+from bayesplate.labels import Label
+
+INDEX = st.integers(0, 40)
+SPACE = st.text(" \t", max_size=3)
+
+
+@given(INDEX, INDEX, SPACE, SPACE, SPACE, SPACE, SPACE)
+def test_spaces_beside_the_numbers_are_ignored(m: int, n: int, a: str, b: str, c: str, d: str, e: str) -> None:
+    label = Label.parse(f"{a}({b}{m}{c},{d}{n}{e})")
+
+    assert label == Label(m, n)
+    assert Label.parse(str(label)) == label
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["10", "(1;0)", "(1.0,0)", "(-1,0)", "(41,0)", "(0,41)", "(100,0)", "(01,0)", "(1 1,0)", "1,0", "(1,0", "",
+     "(1,0,0)",
+     "(m,n)", "(1,0)\n", "(١,٠)", "[1,0]"],
+)  # fmt: skip
+def test_anything_else_is_refused(text: str) -> None:
+    with pytest.raises(
+        InputError, match=r'mode label: wanted two whole numbers from 0 to 40, written like "\(1,0\)", got'
+    ):
+        Label.parse(text)

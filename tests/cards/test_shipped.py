@@ -1,0 +1,141 @@
+"""The shipped cards load, mean something possible, and hold the published numbers."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bayesplate.cards import (
+    card_names,
+    load_board,
+    load_coefficients,
+    load_prior,
+    physical_faults,
+    plate_mass_g,
+    read_board_text,
+)
+from bayesplate.cards.shelf import shelf_folder
+from bayesplate.labels import Label
+
+FREE = ("spruce-free-1R", "spruce-free-2L", "spruce-free-2R", "spruce-free-3L")
+CANTILEVER = [(1, 0), (1, 1), (2, 0), (1, 2), (2, 1), (2, 2)]
+CLAMPED = [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2)]
+PAPER = {
+    "finnish-spruce-cantilever": (CANTILEVER, (52, 98, 310, 337, 398, 637), (253, 114, 3, 473.9)),
+    "paper-cantilever-fe": (CANTILEVER, (51, 100, 315, 336, 394, 629), (253, 114, 3, 473.9)),
+    "fiemme-spruce-clamped": (CLAMPED, (57, 100, 130, 162, 170, 224), (600, 412, 3, 399)),
+    "paper-clamped-fe": (CLAMPED, (56, 98, 130, 161, 169, 221), (600, 412, 3, 399)),
+}
+
+
+def test_the_shelf() -> None:
+    assert card_names("boards") == tuple(sorted((*PAPER, *FREE)))
+    assert card_names("priors") == ("spruce", "weakly-informative")
+    assert card_names("coefficients") == ("paper-cantilever", "paper-clamped")
+
+
+@pytest.mark.parametrize("name", card_names("boards"))
+def test_a_shipped_board_is_sound_and_declares_nothing(name: str) -> None:
+    card = load_board(name)
+
+    assert physical_faults(card) == []
+    assert card.effects == ()
+    assert card.material.prior == "weakly-informative"
+    assert card.source
+    for setup in card.setups:
+        assert setup.air is None
+        assert all(item.mass_g is None for item in setup.attached)
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_the_boards_of_the_paper(name: str) -> None:
+    labels, frequencies, (length, width, thickness, density) = PAPER[name]
+    card = load_board(name)
+    (setup,) = card.setups
+    plate = card.plate
+
+    assert {label: quantity.mean for label, quantity in setup.frequencies_hz.items()} == dict(
+        zip(labels, frequencies, strict=True)
+    )
+    assert (plate.length_x_mm.mean, plate.length_y_mm.mean, plate.thickness_mm.mean) == (length, width, thickness)
+    assert plate.density_kg_m3 is not None
+    assert plate.density_kg_m3.mean == density
+    assert card.material.poisson_xy.is_exact
+    assert card.material.poisson_xy.mean == 0.51
+    assert setup.resolution_hz == 1
+    table = load_coefficients(str(setup.published_coefficients))
+    free_length = length - sum(quantity.mean for quantity in setup.clamped_mm.values())
+    assert table.aspect_ratio == pytest.approx(free_length / width)
+    assert set(table.table) == set(setup.frequencies_hz)
+    assert (setup.noise_percent is not None) == name.endswith("-fe")
+
+
+@pytest.mark.parametrize(
+    ("name", "mass", "labelled", "unlabelled", "some"),
+    [
+        ("spruce-free-1R", 248.0, 6, 10, {(1, 1): 55.08, (2, 2): 290.29}),
+        ("spruce-free-2L", 256.0, 9, 7, {(0, 2): 163.29, (4, 1): 455.26}),
+        ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}),
+        ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}),
+    ],
+)
+def test_the_free_boards(
+    name: str, mass: float, labelled: int, unlabelled: int, some: dict[tuple[int, int], float]
+) -> None:
+    card = load_board(name)
+    (setup,) = card.setups
+
+    assert plate_mass_g(card) == pytest.approx(mass)
+    assert (len(setup.frequencies_hz), len(setup.unlabelled_hz)) == (labelled, unlabelled)
+    assert {label: setup.frequencies_hz[Label(*label)].mean for label in some} == some
+    assert setup.resolution_hz is None
+    assert setup.edges.letters == "FFFF"
+    assert len(card.plate.length_y_mm.at_x) == 5
+    assert len(card.plate.thickness_mm.at_x) == len(card.plate.thickness_mm.at_y) == 10
+    # opposite corners: the residue is positive where m + n is even, whatever the board
+    assert setup.signs == {label: "+" if sum(label) % 2 == 0 else "-" for label in setup.frequencies_hz}
+
+
+@pytest.mark.parametrize("name", card_names("priors"))
+def test_a_shipped_prior_names_its_sources(name: str) -> None:
+    card = load_prior(name)
+
+    assert list(card.densities) == ["E_x", "E_y", "G_xy"]
+    assert all(card.sources.values())
+
+
+def readme_examples() -> list[str]:
+    text = (shelf_folder("boards").parent / "README.md").read_text(encoding="utf-8")
+    return re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+
+
+def test_the_examples_of_the_readme_are_cards(tmp_path: Path) -> None:
+    board, profile, sections, setups, prior, table = readme_examples()
+
+    card = read_board_text(board, "my-board")
+    assert physical_faults(card) == []
+    more = sections.replace('"(1,1)" = "+"', '"(1,0)" = "+"').replace("at_mm = [20, 20]", "at_mm = [60, 20]")
+    assert physical_faults(read_board_text(board + more, "my-board")) == []
+    narrow = re.sub(r"length_y_mm = 114.*\nthickness_mm = .*\n", profile.replace("580", "250"), board)
+    assert read_board_text(narrow, "my-board").plate.thickness_mm.has_profile
+    two = read_board_text(board[: board.index("[setup]")] + setups, "my-board")
+    assert [setup.name for setup in two.setups] == ["clamped", "free"]
+    (tmp_path / "my-prior.toml").write_text(prior, encoding="utf-8")
+    assert load_prior(tmp_path / "my-prior.toml").noise_percent is not None
+    (tmp_path / "my-table.toml").write_text(table, encoding="utf-8")
+    assert len(load_coefficients(tmp_path / "my-table.toml").table) == 3
+
+
+def test_reading_cards_imports_no_heavy_library() -> None:
+    code = (
+        "import sys, bayesplate.cards; "
+        "print([name for name in ('scipy.stats', 'arviz', 'matplotlib', 'emcee', 'skfem') if name in sys.modules])"
+    )
+    place = Path(__file__).parents[2]
+    result = subprocess.run([sys.executable, "-c", code], cwd=place, capture_output=True, text=True, check=True)
+
+    assert result.stdout.strip() == "[]"

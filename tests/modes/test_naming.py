@@ -1,0 +1,148 @@
+"""Names of modes: the labels of known boards, names that cannot be told, names that do not exist."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+import ritz
+
+from bayesplate.modes.mesh import mesh
+from bayesplate.modes.naming import CERTAIN, find, name_modes, product_coefficients
+from bayesplate.modes.plate import Weights, is_rigid, thin_plate
+from bayesplate.modes.solve import solve
+
+# Beam products in the order of the frequencies, (0, 0) the lowest beam function of each side.
+ORDER = {
+    "cantilever": (ritz.FINNISH, [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2)]),
+    "clamped": (ritz.FIEMME, [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2)]),
+    "free": (ritz.FREE_SPRUCE, [(1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2)]),
+}
+BOARDS = pytest.mark.parametrize(("board", "order"), ORDER.values(), ids=ORDER)
+
+
+def prepared(board, shape=None):
+    weights = Weights(board.unit_weights, np.ones(1))
+    return thin_plate(*board.ends, *(shape or mesh(weights))), weights
+
+
+def hertz(found):
+    return {beams: np.sqrt(mode.eigenvalue) / (2.0 * np.pi) for beams, mode in found.items()}
+
+
+@BOARDS
+def test_modes_of_known_boards_have_their_names_in_order(board, order):
+    plate, weights = prepared(board)
+
+    names = name_modes(solve(plate, weights, len(order)))
+
+    assert [beams for beams, _ in names] == order
+    assert all(correlation >= CERTAIN for _, correlation in names)
+
+
+@BOARDS
+def test_labelled_frequencies_are_those_of_ritz(board, order):
+    """By name, not by order; Ritz names its modes by another rule. 0.02 % is the bar of the production mesh."""
+    plate, weights = prepared(board)
+    expected = ritz.simulate(board, order)
+
+    found = hertz(find(plate, weights, order))
+
+    assert found == pytest.approx(expected, rel=2e-4)
+
+
+def test_laboratory_label_is_the_beam_product_moved_by_the_first_label():
+    """The paper counts a cantilever's modes along the clamped direction from one."""
+    by_product = ritz.simulate(ritz.FINNISH, [(0, 0), (0, 2)])
+
+    by_label = ritz.simulate(ritz.FINNISH, [(1, 0), (1, 2)], first_label=(1, 0))
+
+    assert list(by_label.values()) == list(by_product.values())
+
+
+@BOARDS
+def test_swapping_the_axes_swaps_the_names(board, order):
+    plate, weights = prepared(board)
+    turned, turned_weights = prepared(board.swapped)
+
+    found = hertz(find(turned, turned_weights, [(j, i) for i, j in order]))
+
+    expected = {(j, i): f for (i, j), f in hertz(find(plate, weights, order)).items()}
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+@BOARDS
+def test_places_lead_to_the_modes_they_name(board, order):
+    plate, weights = prepared(board)
+    modes = solve(plate, weights, 12)
+
+    for mode in find(plate, weights, order).values():
+        i = next(
+            k for k, where in enumerate(zip(modes.parities, modes.ranks, strict=True))
+            if where == (mode.place.parity, mode.place.rank)
+        )  # fmt: skip
+        assert mode.eigenvalue == pytest.approx(modes.eigenvalues[i], rel=1e-9)
+        np.testing.assert_allclose(mode.stiffness, modes.coefficients[i], atol=1e-7 * modes.coefficients[i].max())
+        np.testing.assert_allclose(mode.mass, modes.mass_coefficients[i], rtol=1e-9)
+
+
+def test_names_are_marked_as_uncertain_where_two_modes_veer():
+    """Raising D_x drives (1,0) of the cantilever through (0,2); between them neither shape is one product or the other.
+
+    The correlations are those of Ritz to 0.002, so they are the plate's own and not the mesh's.
+    """
+    names = [(1, 0), (0, 2)]
+    ranks, certain = [], []
+    for factor in (1.0, 1.11, 1.3):
+        board = replace(ritz.FINNISH, D_x=factor * ritz.FINNISH.D_x)
+        found = find(*prepared(board), names)
+        expected = dict(ritz.solve(ritz.Ritz(board)).names())
+        assert {n: found[n].place.correlation for n in names} == pytest.approx(
+            {n: expected[n] for n in names}, abs=0.002
+        )
+        ranks.append([found[name].place.rank for name in names])
+        certain.append([found[name].place.is_certain for name in names])
+
+    assert ranks[0] == [1, 2]
+    assert ranks[2] == [2, 1]
+    assert certain == [[True, True], [False, False], [True, True]]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_two_names_share_a_mode(seed):
+    """Over the range of woods and side ratios, veerings included."""
+    rng = np.random.default_rng(seed)
+    ends_x, ends_y = (tuple(str(end) for end in rng.choice(["clamped", "supported", "free"], 2)) for _ in "xy")
+    d_x, d_y, side_ratio = np.exp(rng.uniform(np.log([3.0, 0.1, 0.8]), np.log([25.0, 0.8, 2.5])))
+    weights = Weights(np.array([d_x / side_ratio**2, d_y * side_ratio**2, 0.4 * d_y, 1.0]), np.ones(1))
+    names = [beams for beams in product(range(3), range(3)) if not is_rigid(beams, ends_x, ends_y)]
+
+    found = find(thin_plate(ends_x, ends_y, 12, 12), weights, names)
+
+    assert list(found) == names
+    places = [(mode.place.parity, mode.place.rank) for mode in found.values()]
+    assert len(set(places)) == len(places)
+
+
+@pytest.mark.parametrize("beams", [(0, 0), (0, 1), (1, 0)])
+def test_rigid_motion_is_no_mode(beams):
+    with pytest.raises(KeyError, match=rf"\({beams[0]}, {beams[1]}\)"):
+        find(*prepared(ritz.FREE_SPRUCE, (8, 8)), [(1, 1), beams])
+
+
+@pytest.mark.parametrize("beams", [(40, 0), (0, 17), (15, 15)])
+def test_name_far_above_the_resolved_modes_is_refused(beams):
+    with pytest.raises(KeyError, match=rf"\({beams[0]}, {beams[1]}\)"):
+        find(*prepared(ritz.FIEMME, (8, 8)), [(0, 0), beams])
+
+
+@BOARDS
+def test_beam_products_bound_the_lowest_mode_from_above(board, order):
+    """Their Rayleigh quotients are the start of every estimate: above the lowest mode, and near it."""
+    plate, weights = prepared(board)
+    quotients = np.tensordot(weights.stiffness, product_coefficients(plate), axes=1)
+    lowest = find(plate, weights, order[:1])[order[0]].eigenvalue
+
+    assert lowest <= quotients[order[0]] < 1.2 * lowest

@@ -1,0 +1,156 @@
+"""Modal matrices: held-out accuracy, an honest check value, homogeneity, draws together and one by one, the tangent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+import ritz
+
+from bayesplate.frequencies.laws import ExactLaw, LinearLaw
+from bayesplate.modes.mesh import mesh
+from bayesplate.modes.naming import find
+from bayesplate.modes.plate import Weights, thin_plate
+from bayesplate.modes.reduced import modal_matrices
+from bayesplate.modes.solve import solve_class
+
+WANTED = {
+    "cantilever": (ritz.FINNISH, [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2)]),
+    "clamped": (ritz.FIEMME, [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2)]),
+    "free": (ritz.FREE_SPRUCE, [(1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2)]),
+}
+HALF_WIDTHS = np.array([0.3, 0.3, 0.24])
+"""Of ln(D_x / D_s), ln(D_y / D_s) and nu_xy: three standard deviations of a six-mode fit of one board."""
+
+
+def weights_at(board, point):
+    ratio_x, ratio_y, nu_xy = HALF_WIDTHS * point
+    moved = replace(board, D_x=board.D_x * np.exp(ratio_x), D_y=board.D_y * np.exp(ratio_y), nu_xy=board.nu_xy + nu_xy)
+    return Weights(moved.unit_weights, np.ones(1))
+
+
+def together(weights):
+    return Weights(np.stack([w.stiffness for w in weights]), np.stack([w.mass for w in weights]))
+
+
+def cents(eigenvalues, expected):
+    """600 log2: eigenvalues are squares of frequencies."""
+    return 600.0 * np.log2(eigenvalues / expected)
+
+
+@cache
+def prepared(name):
+    """A plate, its modes found by name at the centre, and modal matrices for a box around it."""
+    board, names = WANTED[name]
+    centre = weights_at(board, np.zeros(3))
+    plate = thin_plate(*board.ends, *mesh(centre))
+    found = find(plate, centre, names)
+    corners = [weights_at(board, np.array(signs)) for signs in product((-1.0, 1.0), repeat=3)]
+    held_out = [weights_at(board, p) for p in np.random.default_rng(5).uniform(-1.0, 1.0, (6, 3))]
+    places = [found[beams].place for beams in names]
+    return plate, found, modal_matrices(plate, places, centre, corners, held_out)
+
+
+@cache
+def trial(name, n_draws=16):
+    """Weights nobody has seen, and full solves there."""
+    plate, found, _ = prepared(name)
+    points = np.random.default_rng(99).uniform(-1.0, 1.0, (n_draws, 3))
+    draws = [weights_at(WANTED[name][0], point) for point in points]
+    exact = []
+    for weights in draws:
+        solved = {b.parity: solve_class(b, weights, 8).eigenvalues for b in plate.blocks}
+        exact.append([solved[mode.place.parity][mode.place.rank] for mode in found.values()])
+    return together(draws), np.array(exact)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_frequencies_hold_within_half_a_cent_where_nothing_was_trained(name):
+    draws, exact = trial(name)
+
+    assert np.abs(cents(prepared(name)[2].eigenvalues(draws), exact)).max() < 0.5
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_reported_error_is_honest(name):
+    """Sixteen other points may hold a worse one than the few that were held out, but not by more than a factor of 3."""
+    draws, exact = trial(name)
+    matrices = prepared(name)[2]
+
+    worst = np.abs(cents(matrices.eigenvalues(draws), exact)).max()
+
+    assert worst < 3.0 * matrices.worst_cents
+
+
+def test_reported_error_is_the_true_one_where_the_basis_is_poor():
+    """The negative control: trained at the centre alone, the matrices fail the bar at a corner and say by how much."""
+    board, names = WANTED["cantilever"]
+    plate, found, _ = prepared("cantilever")
+    places = [found[beams].place for beams in names]
+    centre, outside = weights_at(board, np.zeros(3)), weights_at(board, np.array([1.0, -1.0, 1.0]))
+    exact = [solve_class(plate.block(p.parity), outside, p.rank + 1).eigenvalues[-1] for p in places]
+
+    matrices = modal_matrices(plate, places, centre, [], [outside])
+
+    assert matrices.worst_cents > 0.5
+    errors = np.abs(cents(matrices.eigenvalues(together([outside])), [exact]))
+    assert matrices.worst_cents == pytest.approx(errors.max(), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_matrices_never_lie_below_the_full_solve(name):
+    """A Ritz value on fewer vectors is an upper bound."""
+    draws, exact = trial(name)
+
+    assert cents(prepared(name)[2].eigenvalues(draws), exact).min() > -1e-6
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_matrices_are_exact_at_the_centre(name):
+    _, found, matrices = prepared(name)
+    centre = together([weights_at(WANTED[name][0], np.zeros(3))])
+    expected = [[mode.eigenvalue for mode in found.values()]]
+
+    # Directions of less than 1e-8 of the basis are dropped, so that even a training point is not met to rounding.
+    assert np.abs(cents(matrices.eigenvalues(centre), expected)).max() < 0.01
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness(name):
+    draws, _ = trial(name)
+    matrices = prepared(name)[2]
+
+    scaled = matrices.eigenvalues(Weights(2.7 * draws.stiffness, 1.3 * draws.mass))
+
+    np.testing.assert_allclose(scaled, matrices.eigenvalues(draws) * 2.7 / 1.3, rtol=1e-11)
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_many_draws_are_the_draws_one_by_one(name):
+    draws, _ = trial(name)
+    matrices = prepared(name)[2]
+    one_by_one = [matrices.eigenvalues(together([draws.at(i)]))[0] for i in range(len(draws.stiffness))]
+
+    np.testing.assert_allclose(matrices.eigenvalues(draws), one_by_one, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", WANTED)
+@pytest.mark.parametrize("term", range(4))
+def test_linear_law_is_the_tangent_of_the_exact_law(name, term):
+    """By a central difference of the exact law at the centre."""
+    board, names = WANTED[name]
+    _, found, matrices = prepared(name)
+    linear = LinearLaw(np.stack([found[n].stiffness for n in names]), np.stack([found[n].mass for n in names]))
+    centre = weights_at(board, np.zeros(3))
+
+    def slope(law, step=1e-3):
+        moved = [centre.stiffness * (1.0 + sign * step * np.eye(4)[term]) for sign in (1.0, -1.0)]
+        above, below = law.squared(Weights(np.stack(moved), np.ones((2, 1))))
+        return (above - below) / (2.0 * step)
+
+    # As shares of the mode's energy; the tolerance is the directions that the basis drops and the step's square.
+    eigenvalues = np.array([found[n].eigenvalue for n in names])
+    np.testing.assert_allclose(slope(ExactLaw(matrices)) / eigenvalues, slope(linear) / eigenvalues, atol=2e-5)

@@ -1,0 +1,133 @@
+"""The convergence gate: what passes, what must not, and the numbers it judges by."""
+
+from __future__ import annotations
+
+import emcee
+import numpy as np
+import pytest
+
+from bayesplate.posterior.convergence import (
+    Gate,
+    acceptance_by_walker,
+    assess,
+    autocorrelation_time,
+    burn_in_steps,
+    split_rhat,
+)
+
+RHO = 0.8  # kept with probability RHO, otherwise drawn anew: autocorrelation RHO**lag, acceptance 1 - RHO
+TAU = (1 + RHO) / (1 - RHO)
+
+
+def renewal_draws(n_steps=1000, n_ensembles=4, n_walkers=16, n_dim=2, seed=0):
+    """Chains whose autocorrelation time and acceptance are known."""
+    rng = np.random.default_rng(seed)
+    draws = rng.standard_normal((n_ensembles, n_steps, n_walkers, n_dim))
+    stays = rng.random((n_ensembles, n_steps, n_walkers)) < RHO
+    for step in range(1, n_steps):
+        draws[:, step][stays[:, step]] = draws[:, step - 1][stays[:, step]]
+    return draws
+
+
+def test_good_draws_pass_with_the_known_autocorrelation_time():
+    convergence = assess(renewal_draws())
+    assert convergence.passed
+    assert convergence.reasons == ()
+    assert convergence.tau == pytest.approx(TAU, rel=0.2)
+    assert convergence.ess == pytest.approx(4 * 1000 * 16 / TAU, rel=0.2)
+    assert convergence.acceptance == pytest.approx(1 - RHO, abs=0.01)
+    assert convergence.n_kept_steps == 1000
+
+
+def test_the_autocorrelation_time_is_that_of_emcee():
+    draws = renewal_draws(n_ensembles=1, n_steps=3000)[0]
+    assert autocorrelation_time(draws) == pytest.approx(emcee.autocorr.integrated_time(draws, tol=0), rel=0.03)
+    assert autocorrelation_time(draws) == pytest.approx(TAU, rel=0.1)
+
+
+def test_a_walker_that_stays_apart_lengthens_the_time():
+    draws = renewal_draws(n_ensembles=1)[0]
+    draws[:, 0] += 20.0
+    assert autocorrelation_time(draws).min() > 100
+
+
+def test_a_stuck_ensemble_fails_rhat_only():
+    draws = renewal_draws()
+    draws[2] += 3.0
+    convergence = assess(draws, names=("D_x", "D_y"))
+    assert not convergence.passed
+    assert len(convergence.reasons) == 1
+    assert "disagree about D_" in convergence.reasons[0]
+
+
+def test_ensembles_of_unlike_width_fail_rhat():
+    draws = renewal_draws()
+    draws[1] *= 2.0
+    assert assess(draws).rhat_max > 1.01
+
+
+def test_a_drift_fails_rhat():
+    draws = renewal_draws() + np.linspace(0, 1, 1000)[:, None, None]
+    assert split_rhat(draws).min() > 1.01
+
+
+def test_rhat_is_not_taken_over_single_walkers():
+    draws = renewal_draws(n_steps=650)
+    walkers = np.moveaxis(draws, 2, 1).reshape(-1, 650, 1, 2)
+    assert split_rhat(walkers).max() > 1.01
+    convergence = assess(draws)
+    assert convergence.passed, convergence.reasons
+    assert convergence.rhat_max < 1.005
+
+
+def test_a_short_run_is_told_how_long_it_should_be():
+    convergence = assess(renewal_draws(n_steps=200))
+    assert not convergence.passed
+    assert convergence.suggested_steps == pytest.approx(100 * TAU, rel=0.3)
+    assert f"allow {convergence.suggested_steps} steps" in convergence.reasons[0]
+
+
+def test_the_effective_size_can_be_asked_for():
+    convergence = assess(renewal_draws(), Gate(ess_min=50_000))
+    assert len(convergence.reasons) == 1
+    assert "50000 is wanted" in convergence.reasons[0]
+
+
+def test_a_parameter_that_never_moves_is_named():
+    draws = renewal_draws()
+    draws[..., 1] = 7.0
+    convergence = assess(draws, names=("D_x", "tension"))
+    assert not convergence.passed
+    assert convergence.reasons[0].startswith("tension never moves")
+    assert np.isinf(convergence.tau[1])
+    assert convergence.ess[1] == 0.0
+
+
+def test_a_walker_that_hardly_moves_is_counted():
+    draws = renewal_draws()
+    draws[3, :, 5] = 0.1
+    convergence = assess(draws)
+    assert any(reason.startswith("1 of 64 walkers hardly ever move") for reason in convergence.reasons)
+    assert acceptance_by_walker(draws)[3, 5] == 0.0
+
+
+def test_too_high_an_acceptance_is_refused():
+    draws = np.random.default_rng(1).standard_normal((4, 500, 16, 2))
+    reasons = assess(draws).reasons
+    assert len(reasons) == 4
+    assert all("accepts 100 % of its proposals" in reason for reason in reasons)
+
+
+def test_a_number_that_is_none_never_passes():
+    draws = renewal_draws()
+    draws[0, 10, 3, 0] = np.nan
+    with np.errstate(invalid="ignore"):
+        assert not assess(draws).passed
+
+
+@pytest.mark.parametrize("n_steps", [1, 50, 200, 600, 3000, 20_000])
+def test_the_burn_in_leaves_fifty_times_and_takes_at_least_five(n_steps):
+    burn_in = burn_in_steps(n_steps)
+    kept = n_steps - burn_in
+    assert kept >= n_steps / 2
+    assert burn_in >= min(5 * kept / 50, n_steps // 2)

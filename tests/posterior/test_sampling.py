@@ -1,0 +1,196 @@
+"""The sampler against known posteriors, its random numbers, and what it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from statistics_checks import differences_from_normal
+
+from bayesplate.errors import BayesplateError, CheckpointError, InputError, NotConvergedError, NotIdentifiableError
+from bayesplate.posterior import sampling
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.sampling import SamplerSettings, sample
+
+MEAN = np.array([3.0, -1.0, 0.0, 10.0])
+SD = np.array([1.0, 0.01, 30.0, 2.0])
+CORRELATION = np.array([[1, 0.9, 0, 0.2], [0.9, 1, 0, 0], [0, 0, 1, -0.5], [0.2, 0, -0.5, 1]])
+COVARIANCE = CORRELATION * np.outer(SD, SD)
+PRECISION = np.linalg.inv(COVARIANCE)
+
+
+def log_normal_density(theta):
+    away = theta - MEAN
+    return -0.5 * np.einsum("ij,jk,ik->i", away, PRECISION, away)
+
+
+def short(seed=1, max_steps=100, **changes):
+    return SamplerSettings(seed=seed, chunk_steps=50, max_steps=max_steps, **changes)
+
+
+def test_a_correlated_normal_is_recovered_and_a_wider_one_is_told_apart():
+    settings = SamplerSettings(seed=11, gate=Gate(ess_min=2500))
+    chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, settings)
+    assert convergence.passed, convergence.reasons
+    assert convergence.ess_min >= 2500
+
+    assert differences_from_normal(chains.pooled, convergence.ess, MEAN, SD) == []
+
+    wider = MEAN + 1.15 * (chains.pooled - MEAN)
+    differences = differences_from_normal(wider, convergence.ess, MEAN, SD)
+    assert sum("standard deviation" in difference for difference in differences) == MEAN.size
+    assert differences_from_normal(chains.pooled[:, ::-1], convergence.ess, MEAN, SD)
+
+
+def test_a_curved_posterior_keeps_its_moments():
+    def banana(theta):
+        straight = theta[:, 1] - 0.5 * (theta[:, 0] ** 2 - 1)
+        return -0.5 * (theta[:, 0] ** 2 + straight**2 + theta[:, 2] ** 2)
+
+    chains, convergence = sample(banana, np.zeros(3), np.eye(3), SamplerSettings(seed=3, gate=Gate(ess_min=4000)))
+    assert convergence.passed, convergence.reasons
+    straight = chains.pooled.copy()
+    straight[:, 1] -= 0.5 * (straight[:, 0] ** 2 - 1)
+    assert differences_from_normal(straight, convergence.ess, np.zeros(3), np.ones(3)) == []
+
+
+def test_a_bounded_posterior_starts_and_stays_inside():
+    def half_normal(theta):
+        return np.where((theta > 0).all(axis=1), -0.5 * np.sum(theta**2, axis=1), -np.inf)
+
+    chains, convergence = sample(half_normal, np.zeros(3), np.eye(3), SamplerSettings(seed=5))
+    assert convergence.passed, convergence.reasons
+    assert (chains.draws > 0).all()
+    error = np.sqrt(1 - 2 / np.pi) / np.sqrt(convergence.ess)
+    assert np.all(np.abs(chains.pooled.mean(axis=0) - np.sqrt(2 / np.pi)) < 4 * error)
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
+    first, again, other = (sample(log_normal_density, MEAN, COVARIANCE, short(seed))[0] for seed in (1, 1, 2))
+    assert first.draws.tobytes() == again.draws.tobytes()
+    assert first.log_prob.tobytes() == again.log_prob.tobytes()
+    assert not np.any(first.draws[:, 0] == other.draws[:, 0])
+
+
+def test_two_ensembles_differ_in_their_first_step_even_from_one_start(monkeypatch):
+    starts = sampling.start_ensembles
+
+    def same_starts(*arguments, **options):
+        states = starts(*arguments, **options)
+        return [replace(state, coords=states[0].coords, log_prob=states[0].log_prob) for state in states]
+
+    monkeypatch.setattr(sampling, "start_ensembles", same_starts)
+    chains, _ = sample(log_normal_density, MEAN, COVARIANCE, short())
+    for other in (1, 2, 3):
+        assert not np.array_equal(chains.draws[0, 0], chains.draws[other, 0])
+
+
+def test_the_global_random_state_is_neither_used_nor_changed():
+    kept = np.random.get_state()  # noqa: NPY002 the point of the test
+    try:
+        draws = []
+        for seed in (1, 2):
+            np.random.seed(seed)  # noqa: NPY002
+            before = np.random.get_state()  # noqa: NPY002
+            draws.append(sample(log_normal_density, MEAN, COVARIANCE, short())[0].draws)
+            after = np.random.get_state()  # noqa: NPY002
+            assert np.array_equal(before[1], after[1])
+            assert before[2:] == after[2:]
+        assert np.array_equal(*draws)
+    finally:
+        np.random.set_state(kept)  # noqa: NPY002
+
+
+def test_the_chunk_length_does_not_change_the_draws():
+    whole, _ = sample(log_normal_density, MEAN, COVARIANCE, SamplerSettings(seed=1, chunk_steps=100, max_steps=100))
+    parts, _ = sample(log_normal_density, MEAN, COVARIANCE, SamplerSettings(seed=1, chunk_steps=20, max_steps=100))
+    assert whole.draws.tobytes() == parts.draws.tobytes()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_value_that_is_no_log_density_is_named_with_its_point(value, capsys):
+    def broken(theta):
+        return np.where(theta[:, 0] > 3.5, value, log_normal_density(theta))
+
+    with pytest.raises(BayesplateError, match=rf"got {value} at D_x = .*, D_y = .*report") as caught:
+        sample(broken, MEAN, COVARIANCE, short(), names=("D_x", "D_y", "D_s", "noise"))
+    assert caught.value.exit_code == 70
+    assert capsys.readouterr().out == ""
+
+
+def test_a_fault_after_the_start_is_named_too(capsys):
+    calls = []
+
+    def breaks_later(theta):
+        calls.append(len(theta))
+        return np.full(len(theta), np.nan) if len(calls) > 50 else log_normal_density(theta)
+
+    with pytest.raises(BayesplateError, match="got nan at parameter 1"):
+        sample(breaks_later, MEAN, COVARIANCE, short())
+    assert capsys.readouterr().out == ""
+
+
+def test_a_log_posterior_of_the_wrong_shape_is_refused():
+    with pytest.raises(BayesplateError, match=r"wanted shape \(32,\), got \(32, 4\)"):
+        sample(lambda theta: theta, MEAN, COVARIANCE, short())
+
+
+def test_no_finite_start_is_not_converged():
+    with pytest.raises(NotConvergedError, match="got 0 in 1000 tries"):
+        sample(lambda theta: np.full(len(theta), -np.inf), MEAN, COVARIANCE, short())
+
+
+@pytest.mark.parametrize("covariance", [np.ones((4, 4)), np.diag([1, 1, 1, 0.0]), np.full((4, 4), np.nan)])
+def test_a_singular_covariance_is_not_identifiable(covariance):
+    with pytest.raises(NotIdentifiableError, match="positive definite"):
+        sample(log_normal_density, MEAN, covariance, short())
+
+
+@pytest.mark.parametrize(
+    ("changes", "place"),
+    [
+        ({"n_walkers": 6}, "n_walkers: wanted an even number of at least 8, got 6"),
+        ({"n_walkers": 33}, "n_walkers: wanted an even number"),
+        ({"n_ensembles": 1}, "n_ensembles: wanted at least 2"),
+        ({"seed": -1}, "seed: wanted a number that is not negative"),
+        ({"chunk_steps": 0}, "chunk_steps"),
+    ],
+)
+def test_unusable_settings_are_refused(changes, place):
+    with pytest.raises(InputError, match=place):
+        sample(log_normal_density, MEAN, COVARIANCE, SamplerSettings(**{"seed": 1} | changes))
+
+
+def test_too_few_steps_do_not_pass_and_say_how_many_are_needed():
+    chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, short())
+    assert not convergence.passed
+    assert f"allow {convergence.suggested_steps} steps" in " ".join(convergence.reasons)
+    assert convergence.suggested_steps > convergence.n_kept_steps
+    assert chains.draws.shape == (4, 100, 32, 4)
+    assert chains.kept.shape == (4, 50, 32, 4)
+
+
+def test_separate_peaks_do_not_pass():
+    def two_peaks(theta):
+        apart = np.logaddexp(-0.5 * ((theta[:, 0] - 1) / 0.01) ** 2, -0.5 * ((theta[:, 0] + 1) / 0.01) ** 2)
+        return apart - 0.5 * np.sum(theta[:, 1:] ** 2, axis=1)
+
+    settings = SamplerSettings(seed=2, chunk_steps=500, max_steps=1500)
+    _, convergence = sample(two_peaks, np.zeros(3), np.eye(3), settings, names=("D_x", "D_y", "D_s"))
+    assert not convergence.passed
+    assert "D_x" in " ".join(convergence.reasons)
+
+
+def test_progress_counts_every_chunk():
+    told = []
+    sample(log_normal_density, MEAN, COVARIANCE, short(max_steps=200), progress=told.append)
+    assert [progress.n_steps for progress in told] == [50, 100, 150, 200]
+    assert told[0].convergence is None
+    assert told[-1].convergence is not None
+
+
+def test_a_random_state_that_emcee_swallows_is_noticed(monkeypatch):
+    monkeypatch.setattr(sampling, "_to_emcee", lambda state: ("MT19937", state.random_words[:5], 624, 0, 0.0))
+    with pytest.raises(CheckpointError, match="random state"):
+        sample(log_normal_density, MEAN, COVARIANCE, short())

@@ -1,0 +1,248 @@
+"""Who imports whom: every file is held to the allowed graph, and the check itself to fabricated bad files."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import bayesplate
+
+PACKAGE = Path(bayesplate.__file__).parent
+
+ROAD = (
+    "cards",
+    "plate",
+    "modes",
+    "effects",
+    "frequencies",
+    "estimates",
+    "posterior",
+    "results",
+    "diagnosis",
+    "planning",
+    "report",
+)
+"""Each room sees the rooms before it."""
+OPEN_TO_ALL = {"errors", "quantities", "labels"}
+ROOMS = {
+    **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
+    "recordings": {"recordings", "modes", *OPEN_TO_ALL},
+    "workflow": {*ROAD, "recordings", "workflow", *OPEN_TO_ALL},
+    "cli": {"cli", "workflow", "errors"},
+    "batch": {"batch", "workflow", "errors"},
+    "__init__": {*ROAD, "recordings", "workflow", *OPEN_TO_ALL},
+    "__main__": {"cli"},
+    **dict.fromkeys(OPEN_TO_ALL, OPEN_TO_ALL),
+}
+
+DOORS = {
+    "emcee": "posterior",
+    "skfem": "modes",
+    "arviz": "results",
+    "xarray": "results",
+    "matplotlib": "report",
+    "corner": "report",
+    "jinja2": "report",
+}
+"""Heavy libraries and the one room that may import each."""
+ONLY_WHERE_NEEDED = {*DOORS, "scipy.stats"}
+"""Imported inside functions, so that `--help` answers at once."""
+EXECUTES_DATA = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve"}
+SEEDED_RANDOM = {"Generator", "BitGenerator", "SeedSequence", "default_rng", "MT19937", "PCG64", "Philox", "SFC64"}
+
+
+@dataclass(frozen=True)
+class Import:
+    """One module named by an import, the line, and whether it is imported when the file is."""
+
+    module: str
+    line: int
+    is_at_top: bool
+
+
+def faults(package: Path) -> list[str]:
+    """Everything in a package that the rules forbid: "file:line what"."""
+    found = []
+    for path in sorted(package.rglob("*.py")):
+        inside = path.relative_to(package)
+        tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+        complaints = [*_import_faults(tree, inside), *_call_faults(tree, inside), *_caption_faults(tree)]
+        found += [f"{inside.as_posix()}:{line} {what}" for line, what in complaints]
+    return found
+
+
+def _import_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
+    room = inside.with_suffix("").parts[0]
+    if room not in ROOMS:
+        yield 1, f"stands in no known room: {room}"
+        return
+    for item in _imports(tree):
+        parts = item.module.split(".")
+        if not parts[0]:
+            yield item.line, "imports relatively"
+        elif parts[0] == "bayesplate":
+            target = parts[1] if len(parts) > 1 else "__init__"
+            if target not in ROOMS[room]:
+                yield item.line, f"{room} imports {target}"
+        elif parts[0] in EXECUTES_DATA:
+            yield item.line, f"imports {parts[0]}"
+        elif DOORS.get(parts[0], room) != room:
+            yield item.line, f"{room} imports {parts[0]}, which belongs to {DOORS[parts[0]]}"
+        if item.is_at_top and any(f"{item.module}.".startswith(f"{heavy}.") for heavy in ONLY_WHERE_NEEDED):
+            yield item.line, f"imports {item.module} at the top"
+
+
+def _imports(tree: ast.Module) -> Iterator[Import]:
+    at_top = _run_on_import(tree)
+    for node in ast.walk(tree):
+        is_at_top = node in at_top
+        if isinstance(node, ast.Import):
+            yield from (Import(alias.name, node.lineno, is_at_top) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            module = "." * node.level + (node.module or "")
+            # `from scipy import stats` and `from bayesplate import modes` name a module after the word import
+            names_module = module in {"scipy", "bayesplate"}
+            names = [f"{module}.{alias.name}" if names_module else module for alias in node.names]
+            yield from (Import(name, node.lineno, is_at_top) for name in dict.fromkeys(names))
+        elif isinstance(node, ast.Call) and _called(node) in {"import_module", "__import__"}:
+            named = node.args[0] if node.args else None
+            if isinstance(named, ast.Constant) and isinstance(named.value, str):
+                yield Import(named.value, node.lineno, is_at_top)
+
+
+def _run_on_import(tree: ast.Module) -> set[ast.AST]:
+    """Nodes that run when the file is imported: outside functions, and not for the type checker alone."""
+    nodes: set[ast.AST] = set()
+    waiting: list[ast.AST] = list(tree.body)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            continue
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            waiting += node.orelse
+            continue
+        nodes.add(node)
+        waiting += ast.iter_child_nodes(node)
+    return nodes
+
+
+def _call_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            yield from _one_call_faults(node, inside)
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) in {"np.random", "numpy.random"}:
+            if node.attr not in SEEDED_RANDOM:
+                yield node.lineno, f"uses the global random state: {node.attr}"
+        elif isinstance(node, ast.ImportFrom) and node.module == "numpy.random":
+            for alias in node.names:
+                if alias.name not in SEEDED_RANDOM:
+                    yield node.lineno, f"uses the global random state: {alias.name}"
+
+
+def _one_call_faults(node: ast.Call, inside: Path) -> Iterator[tuple[int, str]]:
+    if isinstance(node.func, ast.Name) and node.func.id in {"eval", "exec"}:
+        yield node.lineno, f"calls {node.func.id}"
+    allows = [k.value for k in node.keywords if k.arg == "allow_pickle"]
+    if any(not (isinstance(value, ast.Constant) and value.value is False) for value in allows):
+        yield node.lineno, "allows pickles"
+    # the public names of the package are fetched from their homes by name; nowhere else
+    is_hidden = _called(node) in {"import_module", "__import__"} and not isinstance(node.args[0], ast.Constant)
+    if is_hidden and inside != Path("__init__.py"):
+        yield node.lineno, "imports a module of a computed name"
+
+
+def _called(node: ast.Call) -> str:
+    return ast.unparse(node.func).rpartition(".")[2]
+
+
+def _caption_faults(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """An empty file needs no caption; every other opens with one line that says what is in it."""
+    if tree.body and not (ast.get_docstring(tree, clean=False) or "").partition("\n")[0].strip():
+        yield 1, "has no caption: the first line of its docstring"
+
+
+def test_package_keeps_the_rules():
+    assert faults(PACKAGE) == []
+
+
+def test_every_file_of_the_package_is_read():
+    """The rules would hold for an empty list of files as well."""
+    read = {path.relative_to(PACKAGE).parts[0] for path in PACKAGE.rglob("*.py")}
+
+    assert {"cards", "plate", "modes", "frequencies", "errors.py", "labels.py", "quantities.py"} <= read
+
+
+BAD_FILES = [
+    ("plate/bad.py", "from bayesplate.modes.plate import Weights", "plate imports modes"),
+    ("plate/bad.py", "from bayesplate import modes", "plate imports modes"),
+    ("plate/bad.py", "import bayesplate.modes.plate", "plate imports modes"),
+    ("cards/bad.py", "def f():\n    from bayesplate.plate.board import Board", "cards imports plate"),
+    ("modes/bad.py", "import importlib\nimportlib.import_module('bayesplate.report.page')", "modes imports report"),
+    ("recordings/bad.py", "from bayesplate.plate.board import Board", "recordings imports plate"),
+    ("posterior/bad.py", "from bayesplate.workflow.fit import fit", "posterior imports workflow"),
+    ("cli.py", "from bayesplate.modes.plate import Weights", "cli imports modes"),
+    ("batch.py", "from bayesplate.cli import main", "batch imports cli"),
+    ("errors.py", "from bayesplate.cards.board import BoardCard", "errors imports cards"),
+    ("gadgets/bad.py", "", "stands in no known room: gadgets"),
+    ("modes/bad.py", "from . import plate", "imports relatively"),
+    ("modes/bad.py", "def f():\n    import emcee", "modes imports emcee, which belongs to posterior"),
+    ("posterior/bad.py", "import emcee", "imports emcee at the top"),
+    ("modes/bad.py", "class A:\n    import skfem.helpers", "imports skfem.helpers at the top"),
+    ("report/bad.py", "if True:\n    from matplotlib import pyplot", "imports matplotlib at the top"),
+    ("report/bad.py", "def f():\n    from xarray import Dataset", "report imports xarray, which belongs to results"),
+    ("planning/bad.py", "from scipy import stats", "imports scipy.stats at the top"),
+    ("planning/bad.py", "from scipy.stats import norm", "imports scipy.stats at the top"),
+    ("results/bad.py", "def f():\n    import pickle", "imports pickle"),
+    ("results/bad.py", "import numpy as np\nnp.load('x', allow_pickle=True)", "allows pickles"),
+    ("cards/bad.py", "x = eval('1')", "calls eval"),
+    ("cards/bad.py", "exec('x = 1')", "calls exec"),
+    ("modes/bad.py", "import numpy as np\nnp.random.seed(1)", "uses the global random state: seed"),
+    ("modes/bad.py", "from numpy.random import normal", "uses the global random state: normal"),
+    ("modes/bad.py", "import importlib\nimportlib.import_module('em' + 'cee')", "imports a module of a computed name"),
+]
+
+
+@pytest.mark.parametrize(("place", "code", "fault"), BAD_FILES, ids=[f"{p}: {f}" for p, _, f in BAD_FILES])
+def test_fabricated_fault_is_reported(tmp_path, place, code, fault):
+    """The negative control: each rule must catch a file that breaks it, and name only that fault."""
+    path = tmp_path / place
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f'"""A caption."""\n\n{code}\n')
+
+    (found,) = faults(tmp_path)
+
+    assert found.startswith(f"{place}:")
+    assert found.endswith(f" {fault}")
+
+
+@pytest.mark.parametrize("text", ["x = 1\n", '"""\n\nToo late."""\nx = 1\n', "# a comment is no caption\nx = 1\n"])
+def test_missing_caption_is_reported(tmp_path, text):
+    (tmp_path / "labels.py").write_text(text)
+
+    assert faults(tmp_path) == ["labels.py:1 has no caption: the first line of its docstring"]
+
+
+def test_good_file_is_let_through(tmp_path):
+    """What the rules allow: earlier rooms, a library behind its door in a function, names for the type checker."""
+    (tmp_path / "posterior").mkdir()
+    (tmp_path / "posterior" / "__init__.py").write_text("")
+    (tmp_path / "posterior" / "good.py").write_text(
+        '"""A caption."""\n'
+        "from typing import TYPE_CHECKING\n"
+        "import numpy as np\n"
+        "from bayesplate.errors import InputError\n"
+        "from bayesplate.frequencies.laws import Law\n"
+        "from scipy import special\n"
+        "if TYPE_CHECKING:\n"
+        "    from emcee import State\n"
+        "def draw(rng: np.random.Generator):\n"
+        "    import emcee\n"
+        "    from scipy.stats import norm\n"
+        "    return np.load('x', allow_pickle=False), np.random.default_rng(1)\n"
+    )
+
+    assert faults(tmp_path) == []
