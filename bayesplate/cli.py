@@ -141,7 +141,7 @@ def _print(shown: Shown) -> None:
     for table in shown.tables:
         laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
         for i, column in enumerate(table.columns):
-            laid_out.add_column(Text(column), justify="left" if i == 0 else "right")
+            laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
         for row in table.rows:
             laid_out.add_row(*(Text(cell) for cell in row))
         console.print(laid_out)

@@ -73,9 +73,7 @@ def swapped(board: Board) -> Board:
             ends_x=setup.ends_y,
             ends_y=setup.ends_x,
             clamped={exchange[e]: length for e, length in setup.clamped.items()},
-            readings=tuple(
-                replace(r, label=Label(r.label.n, r.label.m), beams=r.beams[::-1]) for r in setup.readings
-            ),
+            readings=tuple(replace(r, label=Label(r.label.n, r.label.m), beams=r.beams[::-1]) for r in setup.readings),
         )
         for setup in board.setups
     )

@@ -12,7 +12,7 @@ ELEMENTS_PER_SIDE = 22
 _MOST_ELONGATED = 3.0
 
 
-def mesh(weights: Weights) -> tuple[int, int]:
+def mesh(weights: Weights, elements_per_side: int = ELEMENTS_PER_SIDE) -> tuple[int, int]:
     """Numbers of elements along x and y of the production mesh.
 
     On the unit square a mode's wavelength along a side goes with the fourth root of the bending weight of that side, so
@@ -23,12 +23,14 @@ def mesh(weights: Weights) -> tuple[int, int]:
     ----------
     weights : Weights
         Of one draw.
+    elements_per_side : int
+        Of a plate that bends alike both ways.
 
     Returns
     -------
     tuple of int
     """
     ratio = float(np.clip((weights.stiffness[1] / weights.stiffness[0]) ** 0.25, 1 / _MOST_ELONGATED, _MOST_ELONGATED))
-    along_x = 2 * round(ELEMENTS_PER_SIDE * np.sqrt(ratio) / 2)
-    along_y = 2 * round(ELEMENTS_PER_SIDE / np.sqrt(ratio) / 2)
+    along_x = 2 * round(elements_per_side * np.sqrt(ratio) / 2)
+    along_y = 2 * round(elements_per_side / np.sqrt(ratio) / 2)
     return int(along_x), int(along_y)

@@ -134,7 +134,7 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
     found: dict[Beams, Found] = {}
     while counts:
         solved = solve_classes(plate, weights, counts)
-        found |= _found(plate, solved)
+        found = {name: one for name, one in found.items() if one.place.parity not in solved} | _found(plate, solved)
         unsure = {plate.parity(n) for n in names if n not in found or not found[n].place.is_certain}
         counts = {p: n + 2 * _SPARE for p, n in counts.items() if p in unsure and n < _MOST_MODES // len(plate.blocks)}
     missing = [name for name in names if name not in found]

@@ -154,7 +154,7 @@ def infer(
     Returns
     -------
     Inference
-        Its chains are theta, the columns of `Parameters`.
+        Its chains are theta, the columns of `Parameters`, and the log posterior density of theta.
     """
     coordinates = TailCoordinates.around(problem.centre, problem.covariance, N_RIGIDITIES)
     chains, convergence = sample(
@@ -166,5 +166,6 @@ def infer(
         checkpoint=checkpoint,
         progress=progress,
     )
-    theta = Chains(coordinates.theta(chains.draws), chains.log_prob, chains.burn_in)
+    log_posterior = chains.log_prob - coordinates.log_jacobian(chains.draws)
+    theta = Chains(coordinates.theta(chains.draws), log_posterior, chains.burn_in)
     return Inference(problem, theta, convergence)

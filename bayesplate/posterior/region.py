@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
-_N_HELD_OUT = 4
+_N_HELD_OUT = 6
 
 
 @dataclass(frozen=True, eq=False)

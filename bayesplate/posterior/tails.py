@@ -58,6 +58,10 @@ class TailCoordinates:
         n = self.scale.size
         return np.concatenate([self.centre[:n] + self.scale * np.sinh(y[..., :n]), y[..., n:]], axis=-1)
 
+    def log_jacobian(self, y: Floats) -> Floats:
+        """ln |d theta / d y| of (..., n_dim) y: (...) array."""
+        return np.asarray(np.log(self.scale * np.cosh(y[..., : self.scale.size])).sum(axis=-1))
+
     def density(self, log_density: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
         """Log density of y from that of theta, both vectorised: (n_draws, n_dim) -> (n_draws,)."""
         n = self.scale.size
@@ -67,8 +71,7 @@ class TailCoordinates:
             near = np.all(np.abs(y[:, :n]) < limit, axis=1)
             result = np.full(y.shape[0], -np.inf)
             if near.any():
-                jacobian = np.log(np.cosh(y[near, :n])).sum(axis=1)
-                result[near] = log_density(self.theta(y[near])) + jacobian
+                result[near] = log_density(self.theta(y[near])) + self.log_jacobian(y[near])
             return result
 
         return transformed

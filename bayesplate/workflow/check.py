@@ -11,8 +11,10 @@ import numpy as np
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.inference import Problem, pose
 from bayesplate.workflow.prepare import prepare
+
+_N_DRAWS = 4000
 
 
 def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) -> dict[str, Any]:
@@ -26,8 +28,8 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
     Returns
     -------
     dict
-        name, title, setups, law, estimate (least squares, with the standard error expected from the noise), modes with
-        their residuals and leverages, condition_number, identifiability and notes.
+        name, title, setups, law, estimate (least squares, with the standard deviation to expect from noise, misfit and
+        uncertain inputs), modes with their residuals and leverages, condition_number, identifiability and notes.
 
     Raises
     ------
@@ -40,7 +42,7 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
     estimate, found = problem.estimate, problem.identifiability
     D_x, D_y, D_s = estimate.rigidities
     elastic = moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"])
-    errors = dict(zip(MODULI, found.standard_errors, strict=True))
+    expected = expected_sd(problem)
     constants = {**dict(zip(MODULI, elastic, strict=True)), **dict(zip(RIGIDITIES, estimate.rigidities, strict=True))}
     rows = [(setup.name, reading) for setup in board.setups for reading in setup.readings]
     residuals = cents(estimate.residuals)
@@ -62,7 +64,7 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
         ],
         "uncertain_inputs": list(board.uncertain_inputs),
         "estimate": {name: float(value) for name, value in constants.items()},
-        "expected_sd_percent": {name: 100.0 * float(error) for name, error in errors.items()},
+        "expected_sd_percent": {name: 100.0 * value for name, value in expected.items()},
         "condition_number": found.condition_number,
         "modes": [
             {
@@ -80,3 +82,11 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
         "identifiability": list(remarks(board, found)),
         "notes": list(board.notes),
     }
+
+
+def expected_sd(problem: Problem) -> dict[str, float]:
+    """Relative standard deviation of each modulus in the normal approximation of the posterior."""
+    draws = np.random.default_rng(0).multivariate_normal(problem.centre, problem.covariance, _N_DRAWS)
+    values = problem.parameters.values(draws)
+    constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    return {name: float(np.nanstd(np.log(v))) for name, v in zip(MODULI, constants, strict=True)}

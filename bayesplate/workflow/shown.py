@@ -25,7 +25,7 @@ class Shown:
 
 def show_check(report: Mapping[str, Any]) -> Shown:
     """The report of `bayesplate.workflow.check.check` for a person."""
-    closing = f"{report['law']} law; nothing was sampled. Next: bayesplate fit {report['name']}"
+    closing = f"{report['law']} law; nothing was sampled. Next: bayesplate fit, with the same card"
     return Shown(check_tables(report), tuple(report["identifiability"]), tuple(report["notes"]), closing)
 
 

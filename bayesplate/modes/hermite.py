@@ -1,0 +1,153 @@
+"""Cubic Hermite functions on the free line [0, 1]: their integrals, which of them an end holds, and their symmetry.
+
+Node i carries its value as unknown 2 i and its slope as unknown 2 i + 1.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.setup import End, Ends
+
+_LAYER = (1 / 4, 1 / 16)
+
+
+@lru_cache(maxsize=64)
+def hermite_basis(nodes: tuple[float, ...]) -> Any:
+    """Scikit-fem's basis on given nodes; four points an element integrate any product of two functions exactly."""
+    from skfem import Basis, ElementLineHermite, MeshLine
+
+    return Basis(MeshLine.init_tensor(np.array(nodes)), ElementLineHermite(), intorder=6)
+
+
+@lru_cache(maxsize=64)
+def products(nodes: tuple[float, ...]) -> dict[tuple[int, int], Any]:
+    """Integrals of one function's i-th derivative (rows) times another's j-th (columns), i and j from 0 to 2.
+
+    Parameters
+    ----------
+    nodes : tuple of float
+        Where the elements meet, increasing.
+
+    Returns
+    -------
+    dict of (n_unknowns, n_unknowns) sparse array
+        By (i, j).
+    """
+    from scipy.sparse import coo_array
+
+    lengths = np.diff(nodes)
+    n_unknowns = 2 * len(nodes)
+    units = np.column_stack([np.ones_like(lengths), lengths] * 2)
+    unknowns = 2 * np.arange(lengths.size)[:, None] + np.arange(4)
+    rows, columns = np.repeat(unknowns, 4, axis=1).ravel(), np.tile(unknowns, 4).ravel()
+    result = {}
+    for (i, j), reference in _unit_products().items():
+        elements = lengths[:, None, None] ** (1 - i - j) * units[:, :, None] * reference * units[:, None, :]
+        result[i, j] = coo_array((elements.ravel(), (rows, columns)), shape=(n_unknowns, n_unknowns)).tocsr()
+    return result
+
+
+@lru_cache(maxsize=1)
+def _unit_products() -> dict[tuple[int, int], NDArray[np.float64]]:
+    """The same on one element of unit length.
+
+    Scaled to size they are exact; assembled in place, short elements far from the origin would lose digits to
+    scikit-fem's powers of the coordinate.
+    """
+    from skfem import BilinearForm
+
+    basis = hermite_basis((0.0, 1.0))
+
+    def derivative(u: Any, order: int) -> Any:
+        return (u, u.grad[0], u.hess[0][0])[order]
+
+    def product(i: int, j: int) -> NDArray[np.float64]:
+        form = BilinearForm(lambda u, v, _: derivative(v, i) * derivative(u, j))
+        return np.asarray(form.assemble(basis).toarray())
+
+    return {(i, j): product(i, j) for i in range(3) for j in range(3)}
+
+
+def graded_nodes(ends: Ends, n_elements: int) -> NDArray[np.float64]:
+    """Equal elements, save that the one at each free end is split at a quarter and at a sixteenth of its length.
+
+    Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times
+    sqrt(G_xy / G_xz): a layer too narrow for as many equal elements, whose frequencies lie up to 3 cents too high.
+
+    Parameters
+    ----------
+    ends : tuple of str
+    n_elements : int
+        All elements, the split ones among them; too few to be split stay equal.
+
+    Returns
+    -------
+    (n_elements + 1,) array
+    """
+    n_equal = n_elements - len(_LAYER) * ends.count("free")
+    if n_equal < 3:
+        return np.linspace(0.0, 1.0, n_elements + 1)
+    first, last = (np.array(_LAYER if end == "free" else ()) / n_equal for end in ends)
+    return np.sort(np.concatenate([np.linspace(0.0, 1.0, n_equal + 1), first, 1.0 - last]))
+
+
+def values_held(ends: Ends) -> Ends:
+    """The ends with only the value held where anything is held."""
+    held: dict[End, End] = {"clamped": "supported", "supported": "supported", "free": "free"}
+    return held[ends[0]], held[ends[1]]
+
+
+def kept_unknowns(ends: Ends, n_elements: int) -> NDArray[np.intp]:
+    """Unknowns that the ends leave: (n_dof,) array."""
+    held: list[int] = []
+    for end, node in zip(ends, (0, n_elements), strict=True):
+        held += {"clamped": [2 * node, 2 * node + 1], "supported": [2 * node], "free": []}[end]
+    return np.setdiff1d(np.arange(2 * (n_elements + 1)), held)
+
+
+def even_and_odd(ends: Ends, n_elements: int, kept: NDArray[np.intp]) -> tuple[Any, ...]:
+    """Orthonormal bases of the even and the odd functions of a line whose nodes mirror, or the identity alone.
+
+    Values mirror with the parity's sign, slopes against it.
+
+    Parameters
+    ----------
+    ends : tuple of str
+    n_elements : int
+    kept : (n_dof,) array of int
+        The unknowns that the functions have.
+
+    Returns
+    -------
+    tuple of (n_dof, n_part) sparse array
+    """
+    from scipy.sparse import csr_array, identity
+
+    if ends[0] != ends[1]:
+        return (csr_array(identity(kept.size)),)
+    position = {int(unknown): i for i, unknown in enumerate(kept)}
+    parts = []
+    for parity in (1.0, -1.0):
+        rows: list[int] = []
+        columns: list[int] = []
+        values: list[float] = []
+        n_columns = 0
+        for unknown in kept:
+            node, is_slope = divmod(int(unknown), 2)
+            mirror = 2 * (n_elements - node) + is_slope
+            sign = -parity if is_slope else parity
+            if mirror < unknown or (mirror == unknown and sign < 0):
+                continue
+            members = [(int(unknown), 1.0)] if mirror == unknown else [(int(unknown), 1.0), (mirror, sign)]
+            for member, weight in members:
+                rows.append(position[member])
+                columns.append(n_columns)
+                values.append(weight / np.sqrt(len(members)))
+            n_columns += 1
+        parts.append(csr_array((values, (rows, columns)), shape=(kept.size, n_columns)))
+    return tuple(parts)

@@ -1,0 +1,104 @@
+"""The output folder of a run: never overwritten unasked, every file complete or absent."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bayesplate.errors import CheckpointError, Fault, InputError
+
+SUMMARY = "summary.json"
+ARCHIVE = "posterior.nc"
+CHECKPOINT = "checkpoint"
+
+
+class OutputFolder:
+    """Where the files of a run go.
+
+    Parameters
+    ----------
+    path : Path
+        Made by `open`, not before.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+
+    @property
+    def checkpoint(self) -> Path:
+        """Folder of the unfinished run's chunks."""
+        return self.path / CHECKPOINT
+
+    def require_usable(self, *, force: bool, resume: bool) -> None:
+        """Check, before any work and without writing, that the run may use this folder.
+
+        Raises
+        ------
+        InputError
+            If it is there and neither `force` nor `resume` is given, or if it is no folder.
+        CheckpointError
+            If there is nothing to resume.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(Fault(f"--out {self.path}", "a folder", "a file", "choose another place"))
+        has_content = self.path.is_dir() and any(self.path.iterdir())
+        if resume:
+            if not self.checkpoint.is_dir():
+                state = "a finished run" if (self.path / SUMMARY).exists() else "nothing to resume"
+                raise CheckpointError(
+                    f"{self.path}: wanted the checkpoint of an interrupted run, got {state} (--force runs it anew)"
+                )
+        elif has_content and not force:
+            raise InputError(
+                Fault(
+                    f"--out {self.path}",
+                    "a new folder",
+                    "one that exists",
+                    "--force replaces its results, --resume continues an interrupted run, --out takes another place",
+                )
+            )
+
+    def open(self, *, resume: bool) -> None:
+        """Make the folder and remove the results of an earlier run, its checkpoint too unless resuming.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            for name in (SUMMARY, ARCHIVE):
+                (self.path / name).unlink(missing_ok=True)
+            if not resume and self.checkpoint.is_dir():
+                shutil.rmtree(self.checkpoint)
+        except OSError as error:
+            fault = Fault(f"--out {self.path}", "a folder that can be written", error.strerror or str(error))
+            raise InputError(fault) from error
+
+    def close(self) -> None:
+        """Remove the checkpoint of a run that is done; chunks found damaged stay for whoever wants to look."""
+        if not any(self.checkpoint.rglob("*.damaged")):
+            shutil.rmtree(self.checkpoint, ignore_errors=True)
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """JSON of a result, as it is written and printed; refuses numbers that JSON does not have."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file completely or not at all."""
+    partial = path.with_name(path.name + ".partial")
+    try:
+        with partial.open("w", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)

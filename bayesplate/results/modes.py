@@ -1,0 +1,96 @@
+"""The modes of a summary: measured beside predicted, errors in sample and left out, and the peaks without a label."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.identifiability import identifiability
+from bayesplate.estimates.least_squares import log_measured
+from bayesplate.estimates.leave_one_out import Errors, prediction_errors
+from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.spectrum import spectrum
+from bayesplate.posterior.inference import Inference, Problem
+from bayesplate.posterior.region import predictor
+from bayesplate.results.draws import Draws, finite
+
+_MOST_MODES = 96
+
+
+def mode_errors(inference: Inference, draws: Draws) -> Errors:
+    """Errors of the weighted least-squares fit under the exact law, in sample and left out.
+
+    One estimator for both, at the posterior's median noise; uncertain inputs move within their priors. The posterior
+    itself may lie closer to a reading that is coarsely rounded, because it knows the interval.
+    """
+    problem = inference.problem
+    predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
+    start = problem.centre[problem.parameters.fitted_columns]
+    return prediction_errors(predict, log_measured(problem.board), reading_scales(inference, draws), start)
+
+
+def reading_scales(inference: Inference, draws: Draws) -> NDArray[np.float64]:
+    """Relative uncertainty of each reading at the posterior's median noise: (n_modes,) array."""
+    medians = np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0)
+    setups = inference.problem.board.setups
+    return np.concatenate([np.hypot(m, setup.relative_sd) for m, setup in zip(medians, setups, strict=True)])
+
+
+def mode_entries(inference: Inference, draws: Draws, errors: Errors) -> list[dict[str, Any]]:
+    """One entry a labelled mode, as in summary.json."""
+    problem = inference.problem
+    predicted = np.exp(draws.log_frequency).reshape(-1, draws.log_frequency.shape[-1])
+    low, high = np.quantile(predicted, [0.05, 0.95], axis=0)
+    leverages = identifiability(problem.estimate.sensitivities, reading_scales(inference, draws)).leverages
+    rows = [
+        (setup.name, reading, place)
+        for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True)
+        for reading, place in zip(setup.readings, model.places, strict=True)
+    ]
+    return [
+        {
+            "setup": setup,
+            "label": str(reading.label),
+            "measured_hz": reading.frequency.mean,
+            "predicted_hz": {"mean": float(predicted[:, i].mean()), "q05": float(low[i]), "q95": float(high[i])},
+            "residual_cents": float(cents(errors.in_sample[i])),
+            "left_out_cents": finite(float(cents(errors.left_out[i]))),
+            "leverage": float(leverages[i]),
+            "label_correlation": place.correlation,
+        }
+        for i, (setup, reading, place) in enumerate(rows)
+    ]
+
+
+def unlabelled_entries(problem: Problem, draws: Draws) -> list[dict[str, Any]]:
+    """Each unlabelled peak beside the predicted mode nearest to it; they are shown, not fitted."""
+    entries = []
+    for setup in problem.board.setups:
+        if not setup.unlabelled:
+            continue
+        n_modes = 12
+        values = posterior_mean_values(problem, draws)
+        _, named = spectrum(setup, values, n_modes)
+        while named[-1].frequency < max(setup.unlabelled) and n_modes < _MOST_MODES:
+            n_modes *= 2
+            _, named = spectrum(setup, values, n_modes)
+        for peak in setup.unlabelled:
+            nearest = min(named, key=lambda mode, peak=peak: abs(np.log(mode.frequency / peak)))  # type: ignore[misc]
+            entries.append(
+                {
+                    "setup": setup.name,
+                    "measured_hz": peak,
+                    "nearest": nearest.name,
+                    "predicted_hz": nearest.frequency,
+                    "cents": float(cents(np.log(peak / nearest.frequency))),
+                }
+            )
+    return entries
+
+
+def posterior_mean_values(problem: Problem, draws: Draws) -> dict[str, NDArray[np.float64]]:
+    """Constants and inputs at their posterior means."""
+    means = {name: np.asarray(v.mean()) for name, v in {**draws.rigidities, **draws.inputs}.items()}
+    return {**problem.board.nominal(), **means}

@@ -1,0 +1,63 @@
+"""posterior.nc of a fit: what goes into the archive, and under which names."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from bayesplate.posterior.inference import Inference
+from bayesplate.results.archive import write_archive
+from bayesplate.results.draws import Draws
+from bayesplate.results.summary import Summary
+
+
+def write_posterior(path: Path, inference: Inference, draws: Draws, summary: Summary, card_text: str) -> None:
+    """Write the draws of a fit as an archive that ArviZ opens.
+
+    Parameters
+    ----------
+    path : Path
+    inference : Inference
+    draws : Draws
+    summary : dict
+        Its header and sampler entries become attributes.
+    card_text : str
+        The board card as it was read.
+    """
+    problem, convergence = inference.problem, inference.convergence
+    board = problem.board
+    setups = [setup.name for setup in board.setups]
+    readings = [f"{setup.name} {label}" for setup in board.setups for label in setup.labels]
+    write_archive(
+        path,
+        posterior={**draws.rigidities, **draws.moduli, "noise": draws.noise, **draws.inputs},
+        log_likelihood={"frequency": draws.log_likelihood},
+        posterior_predictive={"frequency": draws.predictive},
+        observed_data={"frequency": np.concatenate([setup.measured for setup in board.setups])},
+        sample_stats={
+            "lp": draws.log_posterior,
+            "tau": convergence.tau,
+            "rhat": convergence.rhat,
+            "ess": convergence.ess,
+        },
+        coords={"setup": setups, "reading": readings, "parameter": list(problem.parameters.names)},
+        dims={
+            "noise": ["setup"],
+            "frequency": ["reading"],
+            "tau": ["parameter"],
+            "rhat": ["parameter"],
+            "ess": ["parameter"],
+        },
+        attributes={
+            "card": card_text,
+            "prior": problem.prior.name,
+            "priors": json.dumps({name: vars(density) for name, density in problem.prior.densities.items()}),
+            "model": json.dumps(summary["model"]),
+            "sampler": json.dumps(summary["sampler"]),
+            "versions": json.dumps(summary["versions"]),
+            "card_sha256": summary["card_sha256"],
+            "seed": str(summary["seed"]),
+        },
+    )
