@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -49,6 +50,12 @@ def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None
         "law": click.option("--linear", "law", flag_value="linear", help="Force the linear frequency law."),
         "exact": click.option("--exact", "law", flag_value="exact", help="Force the exact frequency law."),
         "robust": click.option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say."),
+        "coefficients": click.option(
+            "--coefficients",
+            type=click.Choice(["sensitivity", "training", "published"]),
+            help="Source of the paper's coefficients (default: the table that the card names, else sensitivity).",
+        ),
+        "write_to": click.option("--out", type=click.Path(), help="Folder for compare.json (default: not written)."),
         "force": click.option("--force", is_flag=True, help="Replace the results in the output folder."),
         "resume": click.option("--resume", is_flag=True, help="Continue an interrupted run."),
         "json": click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables."),
@@ -108,7 +115,7 @@ def fit(
     """Posterior of the elastic constants of CARD: summary.json, posterior.nc."""
     if force and resume:
         raise click.UsageError("--force starts anew and --resume continues: give one of them.")
-    with _reporting(as_json=as_json, debug=debug):
+    with _reporting(as_json=as_json, debug=debug, resumable=True):
         with _progress(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.fit import fit as run
 
@@ -132,22 +139,94 @@ def fit(
             click.echo(f"written to {result.folder}")
 
 
+@main.command()
+@click.argument("card")
+@_options("out", "seed", "effects", "force", "json", "quiet", "debug")
+def modes(
+    card: str, out: str | None, seed: int, effects: str | None, force: bool, as_json: bool, quiet: bool, debug: bool
+) -> None:
+    """Table of the lowest modes of CARD, and a sheet of Chladni figures."""
+    with _reporting(as_json=as_json, debug=debug):
+        from bayesplate.workflow.modes import modes as run
+        from bayesplate.workflow.shown import show_modes
+
+        result = run(card, out=out, seed=seed, effects=_names(effects), force=force)
+        if as_json:
+            _print_json(result.report)
+        elif not quiet:
+            _print(show_modes(result.report))
+
+
+@main.command()
+@click.argument("card")
+@_options("coefficients", "write_to", "seed", "effects", "force", "json", "quiet", "debug")
+def compare(
+    card: str,
+    coefficients: Any,
+    out: str | None,
+    seed: int,
+    effects: str | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    debug: bool,
+) -> None:
+    """Every method on CARD side by side, as a thin and as a shear-flexible plate."""
+    with _reporting(as_json=as_json, debug=debug):
+        with _progress(shown=not quiet and not as_json) as tell:
+            from bayesplate.workflow.compare import compare as run
+
+            result = run(
+                card,
+                coefficients=coefficients,
+                seed=seed,
+                effects=_names(effects),
+                out=out,
+                force=force,
+                progress=tell,
+            )
+        if as_json:
+            _print_json(result)
+        elif not quiet:
+            from bayesplate.workflow.shown import show_compare
+
+            _print(show_compare(result))
+
+
+@main.command()
+@click.argument("card")
+@_options("effects", "json", "quiet", "debug")
+def cite(card: str, effects: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
+    """References of exactly what a fit of CARD uses."""
+    with _reporting(as_json=as_json, debug=debug):
+        from bayesplate.workflow.cite import cite as run
+        from bayesplate.workflow.cite import cite_text
+
+        sections = run(card, effects=_names(effects))
+        if as_json:
+            _print_json({section.title.lower(): list(section.entries) for section in sections})
+        elif not quiet:
+            click.echo(cite_text(sections), nl=False)
+
+
 def _print(shown: Shown) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     console = Console(soft_wrap=False, highlight=False)
-    for table in shown.tables:
-        laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
-        for i, column in enumerate(table.columns):
-            laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
-        for row in table.rows:
-            laid_out.add_row(*(Text(cell) for cell in row))
-        console.print(laid_out)
-    for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
-        console.print(Text(sentence))
-    console.print(Text(shown.closing))
+    with console.capture() as printed:
+        for table in shown.tables:
+            laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
+            for i, column in enumerate(table.columns):
+                laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
+            for row in table.rows:
+                laid_out.add_row(*(Text(cell) for cell in row))
+            console.print(laid_out)
+        for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
+            console.print(Text(sentence))
+        console.print(Text(shown.closing))
+    click.echo(printed.get(), nl=False)  # rich itself would exit with 1 where a reader like `head` has closed the pipe
 
 
 def _print_json(content: Mapping[str, Any]) -> None:
@@ -187,7 +266,7 @@ def _progress(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]:
 
 
 @contextmanager
-def _reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
+def _reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterator[None]:
     """Turn errors into one message and an exit code, and a termination signal into an interruption."""
 
     def interrupt(signum: int, frame: object) -> None:
@@ -198,16 +277,17 @@ def _reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
         yield
     except BayesplateError as error:
         if debug:
-            raise
+            traceback.print_exc()
         _fail(str(error), error.exit_code, as_json, [vars(fault) for fault in error.faults])
     except KeyboardInterrupt:
-        _fail("interrupted; --resume continues from the last checkpoint", INTERRUPTED, as_json)
+        remedy = "; --resume continues from the last checkpoint" if resumable else ""
+        _fail(f"interrupted{remedy}", INTERRUPTED, as_json)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except Exception as error:
         if debug:
-            raise
+            traceback.print_exc()
         _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", INTERNAL, as_json)
     finally:
         signal.signal(signal.SIGTERM, before)

@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 import ritz
 
+from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.system import system_of
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board
+from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.setup import Reading, Setup
 from bayesplate.quantities import Quantity
 
@@ -56,6 +59,13 @@ def board_of(plate: ritz.Plate, setups: Sequence[Setup], **inputs: Quantity) -> 
             lengths[f"length_{edge[0]}"] += length.mean
     exact = {**lengths, "thickness": plate.h, "density": plate.rho, "poisson_xy": plate.nu_xy}
     return Board("made", {**{n: Quantity.exact(v) for n, v in exact.items()}, **covered, **inputs}, tuple(setups))
+
+
+def models_at(board: Board, rigidities: Sequence[float], **inputs: float) -> tuple[SetupModel, ...]:
+    """Every setup of a board solved at given rigidities, N m, and nominal inputs unless given."""
+    values = board.nominal() | {name: np.asarray(value) for name, value in inputs.items()}
+    values |= {name: np.asarray(value) for name, value in zip(RIGIDITIES, rigidities, strict=True)}
+    return tuple(setup_model(system_of(board, setup), values) for setup in board.setups)
 
 
 def with_noise(hertz: Mapping[Any, float], sd: float, rng: np.random.Generator, resolution: float = 0.0) -> dict:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import ndtri
 
@@ -30,16 +32,70 @@ def differences_from_normal(draws, ess, mean, sd, n_errors=4.0):
     list of str
         One sentence a difference; empty if the draws agree.
     """
-    ess, mean, sd = (np.asarray(values, dtype=float) for values in (ess, mean, sd))
+    mean, sd = np.asarray(mean, dtype=float), np.asarray(sd, dtype=float)
+    deviates = ndtri(np.array(QUANTILES))[:, None]
+    densities = np.exp(-0.5 * deviates**2) / np.sqrt(2 * np.pi) / sd
+    return differences(draws, ess, Truth(mean, sd, np.full(mean.size, 3.0), mean + deviates * sd, densities), n_errors)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is known of the marginal distributions of n_dim parameters.
+
+    Attributes
+    ----------
+    mean, sd : (n_dim,) array
+    kurtosis : (n_dim,) array
+        Fourth central moment over sd**4: 3 for a normal distribution.
+    quantiles, densities : (3, n_dim) array
+        The quantiles of `QUANTILES`, and the probability densities there.
+    """
+
+    mean: np.ndarray
+    sd: np.ndarray
+    kurtosis: np.ndarray
+    quantiles: np.ndarray
+    densities: np.ndarray
+
+    @classmethod
+    def from_marginals(cls, grids, densities):
+        """Truth from densities, normalised or not, on one fine even grid a parameter."""
+        rows = []
+        for x, density in zip(grids, densities, strict=True):
+            p = density / density.sum()
+            mean = p @ x
+            sd = np.sqrt(p @ (x - mean) ** 2)
+            below = np.cumsum(p) - 0.5 * p
+            quantiles = np.interp(QUANTILES, below, x)
+            rows.append((mean, sd, p @ (x - mean) ** 4 / sd**4, quantiles, np.interp(quantiles, x, p / (x[1] - x[0]))))
+        mean, sd, kurtosis, quantiles, at_quantiles = (np.array(column) for column in zip(*rows, strict=True))
+        return cls(mean, sd, kurtosis, quantiles.T, at_quantiles.T)
+
+
+def differences(draws, ess, truth, n_errors=4.0):
+    """List in what the draws differ from known marginal distributions; see `differences_from_normal`.
+
+    Parameters
+    ----------
+    draws : (n_draws, n_dim) array
+    ess : (n_dim,) array
+    truth : Truth
+    n_errors : float, optional
+
+    Returns
+    -------
+    list of str
+    """
+    ess = np.asarray(ess, dtype=float)
+    mean = truth.mean
     compared = {
-        "mean": (draws.mean(axis=0), mean, sd / np.sqrt(ess)),
-        "standard deviation": (draws.std(axis=0), sd, sd / np.sqrt(2 * ess)),
+        "mean": (draws.mean(axis=0), mean, truth.sd / np.sqrt(ess)),
+        "standard deviation": (draws.std(axis=0), truth.sd, truth.sd * np.sqrt((truth.kurtosis - 1) / (4 * ess))),
     }
-    for probability, found in zip(QUANTILES, np.quantile(draws, QUANTILES, axis=0), strict=True):
-        deviate = ndtri(probability)
-        density = np.exp(-0.5 * deviate**2) / np.sqrt(2 * np.pi)
-        error = np.sqrt(probability * (1 - probability) / ess) / density * sd
-        compared[f"{100 * probability:g} % quantile"] = (found, mean + deviate * sd, error)
+    drawn = np.quantile(draws, QUANTILES, axis=0)
+    for probability, found, true, density in zip(QUANTILES, drawn, truth.quantiles, truth.densities, strict=True):
+        error = np.sqrt(probability * (1 - probability) / ess) / density
+        compared[f"{100 * probability:g} % quantile"] = (found, true, error)
     return [
         f"{what} of parameter {dim + 1}: {found[dim]:.6g} instead of {true[dim]:.6g}, "
         f"{abs(found[dim] - true[dim]) / error[dim]:.1f} standard errors"

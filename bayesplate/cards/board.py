@@ -119,13 +119,15 @@ class BoardCard(Section):
         return next(setup for setup in self.setups if setup.name == name)
 
 
-def load_board(name_or_path: str | os.PathLike[str]) -> BoardCard:
+def load_board(name_or_path: str | os.PathLike[str], *, may_lack_frequencies: bool = False) -> BoardCard:
     """Read a board card.
 
     Parameters
     ----------
     name_or_path : str or path
         Name of a shipped card, or a path: it contains a separator or ends in .toml.
+    may_lack_frequencies : bool
+        Whether a board that was not measured yet will do.
 
     Returns
     -------
@@ -137,7 +139,7 @@ def load_board(name_or_path: str | os.PathLike[str]) -> BoardCard:
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
     path = find("boards", name_or_path)
-    return _read_board(read_file(path), plain(path.name), path.stem, path)
+    return _read_board(read_file(path), plain(path.name), path.stem, path, may_lack_frequencies)
 
 
 def read_board_text(text: str, name: str) -> BoardCard:
@@ -146,10 +148,14 @@ def read_board_text(text: str, name: str) -> BoardCard:
     return _read_board(text.encode("utf-8", "surrogatepass"), f"{plain(stem)}.toml", stem, None)
 
 
-def _read_board(data: bytes, file: str, stem: str, path: Path | None) -> BoardCard:
+def _read_board(data: bytes, file: str, stem: str, path: Path | None, may_lack_frequencies: bool = False) -> BoardCard:
     table = read_table(data, file)
     faults = [*name_faults(table, file, stem), *_mass_faults(table, file), *_setup_name_faults(table, file)]
-    context = {"path": path, "sha256": hashlib.sha256(data).hexdigest()}
+    context = {
+        "path": path,
+        "sha256": hashlib.sha256(data).hexdigest(),
+        "may_lack_frequencies": may_lack_frequencies,
+    }
     return validated(BoardCard, table, file, context, faults)
 
 

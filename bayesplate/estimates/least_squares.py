@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.system import system_of
 from bayesplate.frequencies.terms import rigidity_columns
 from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.plate import thin_plate
@@ -24,6 +25,7 @@ _MOST_STEPS = 40
 _LONGEST_STEP = 0.7
 _CONVERGED = 1e-9
 _COARSE_MESH = 12
+_PULL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +83,13 @@ def weighted_least_squares(board: Board) -> Estimate:
         direction that the readings do not determine keeps its starting value.
     """
     inputs = board.nominal()
+    systems = [system_of(board, setup) for setup in board.setups]
     log_rigidities = np.log(starting_rigidities(board))
     target, scales = log_measured(board), reading_scales(board)
     settled = False
     for _ in range(_MOST_STEPS):
         values = inputs | dict(zip(RIGIDITIES, np.exp(log_rigidities), strict=True))
-        models = tuple(setup_model(setup, values) for setup in board.setups)
+        models = tuple(setup_model(system, values) for system in systems)
         predicted = np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         sensitivities = np.concatenate([m.sensitivities(values) for m in models])
         residuals = target - predicted
@@ -100,14 +103,20 @@ def weighted_least_squares(board: Board) -> Estimate:
 
 
 def starting_rigidities(board: Board) -> NDArray[np.float64]:
-    """Rough rigidities from Rayleigh quotients of beam-function products, which need no constants: (3,) array, N m."""
+    """Rough rigidities from Rayleigh quotients of beam-function products, which need no constants: (3,) array, N m.
+
+    A weak pull towards a plate that bends alike both ways keeps within reach what the modes do not tell.
+    """
     from scipy.optimize import nnls
 
     inputs = board.nominal()
     rows = np.concatenate([_rayleigh_rows(setup, inputs) for setup in board.setups])
     squared = np.exp(2.0 * (log_measured(board) + np.log(2.0 * np.pi)))
-    constants, _ = nnls(rows / squared[:, None], np.ones(squared.size))
-    return np.maximum(constants, 1e-2 * constants.max())
+    alike = 1.0 / np.mean(rows.sum(axis=1) / squared)
+    weighted = np.concatenate([alike * rows / squared[:, None], _PULL * np.eye(len(RIGIDITIES))])
+    wanted = np.concatenate([np.ones(squared.size), np.full(len(RIGIDITIES), _PULL)])
+    constants, _ = nnls(weighted, wanted)
+    return np.asarray(alike * np.maximum(constants, 1e-2 * constants.max()))
 
 
 def _rayleigh_rows(setup: Setup, inputs: Values) -> NDArray[np.float64]:

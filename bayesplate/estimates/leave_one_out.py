@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import Predict, refit
+from bayesplate.estimates.refit import Bounds, Predict, refit
 
 _FEWEST = 4
 
@@ -30,13 +30,17 @@ class Errors:
 
 
 def prediction_errors(
-    predict: Predict, target: NDArray[np.float64], scales: NDArray[np.float64], start: NDArray[np.float64]
+    predict: Predict,
+    target: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    start: NDArray[np.float64],
+    bounds: Bounds | None = None,
 ) -> Errors:
     """Errors of the weighted least-squares fit, in sample and with each mode left out in turn.
 
     Parameters
     ----------
-    predict, target, scales, start
+    predict, target, scales, start, bounds
         As for `bayesplate.estimates.refit.refit`.
 
     Returns
@@ -45,7 +49,7 @@ def prediction_errors(
     """
 
     def error(used: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(target - predict(refit(predict, used, scales, start)[None, :])[0])
+        return np.asarray(target - predict(refit(predict, used, scales, start, bounds)[None, :])[0])
 
     left_out = np.full(target.size, np.nan)
     if target.size >= _FEWEST:

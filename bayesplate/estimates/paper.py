@@ -1,20 +1,17 @@
-"""The paper's least squares: psi = X d, unweighted, with a table's coefficients or the modes' own."""
+"""The paper's least squares: psi = X d, unweighted, with coefficients from any of their three sources."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import load_coefficients
-from bayesplate.errors import Fault, InputError
+from bayesplate.estimates.coefficients import CoefficientRows, CoefficientSource, coefficient_rows
 from bayesplate.estimates.least_squares import Estimate
-from bayesplate.frequencies.terms import paper_coefficients
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.frequencies.columns import inverse_lambda
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import Moduli, moduli
-from bayesplate.plate.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,16 +21,19 @@ class PaperSystem:
     Attributes
     ----------
     psi : (n_modes,) array, N m
-        omega^2 / lambda of the measured frequencies, lambda = 1 / (rho h A^2).
+        omega^2 / lambda of the measured frequencies, lambda = 1 / (rho h A^2), less what effects give of it.
     coefficients : (n_modes, 3) array
         X: columns a, b, c.
     values : dict of float
         Nominal inputs, for the moduli.
+    origins : tuple of CoefficientRows
+        Where the coefficients come from, one a setup.
     """
 
     psi: NDArray[np.float64]
     coefficients: NDArray[np.float64]
     values: Values
+    origins: tuple[CoefficientRows, ...] = ()
 
     def solve(self, rows: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.float64]:
         """Unweighted least squares of some of the modes (all by default): d_x, d_y, d_s in N m, a (3,) array.
@@ -67,14 +67,16 @@ class PaperSystem:
         return float(np.linalg.cond(self.coefficients))
 
 
-def paper_system(board: Board, estimate: Estimate) -> PaperSystem:
-    """The paper's linear system of a board: published coefficients where a setup names a table, else the modes' own.
+def paper_system(board: Board, estimate: Estimate, source: CoefficientSource | None = None) -> PaperSystem:
+    """The paper's linear system of a board.
 
     Parameters
     ----------
     board : Board
     estimate : Estimate
         Where the modes' own coefficients are taken.
+    source : "sensitivity", "training" or "published", optional
+        By default the published table where a setup names one, else the modes' own coefficients.
 
     Returns
     -------
@@ -86,45 +88,10 @@ def paper_system(board: Board, estimate: Estimate) -> PaperSystem:
         If a named table does not hold a label of the setup, or is of other edges or another aspect ratio.
     """
     values = board.nominal()
-    rows = []
-    psi = []
-    for setup, model in zip(board.setups, estimate.models, strict=True):
-        length_x, length_y = (float(side) for side in vibrating_lengths(values, setup))
-        inverse_lambda = float(density(values) * values["thickness"]) * (length_x * length_y) ** 2
-        psi.append((2.0 * np.pi * setup.measured) ** 2 * inverse_lambda)
-        if setup.published_coefficients is None:
-            nu_xy = float(values["poisson_xy"])
-            rows.append(paper_coefficients(model.linear.stiffness, length_x / length_y, nu_xy))
-        else:
-            rows.append(published_coefficients(board.name, setup, length_x / length_y))
-    return PaperSystem(np.concatenate(psi), np.concatenate(rows), values)
-
-
-def published_coefficients(board_name: str, setup: Setup, aspect_ratio: float) -> NDArray[np.float64]:
-    """Rows a, b, c of a setup's labels from the table it names: (n_modes, 3) array.
-
-    Raises
-    ------
-    InputError
-        If the table does not fit the setup.
-    """
-    card = load_coefficients(str(setup.published_coefficients))
-    place = f"{board_name} [setup] published_coefficients"
-    faults = []
-    if card.edges.words != setup.edges:
-        faults.append(
-            Fault(place, f"a table for the edges {_words(setup.edges)}", f"{card.name} for {_words(card.edges.words)}")
-        )
-    if abs(card.aspect_ratio / aspect_ratio - 1.0) > 0.01:
-        faults.append(Fault(place, f"a table of aspect ratio {aspect_ratio:.4g}", f"{card.aspect_ratio:.4g}"))
-    missing = [str(label) for label in setup.labels if label not in card.table]
-    if missing:
-        known = ", ".join(str(label) for label in card.table)
-        faults.append(Fault(place, f"a table with the labels {', '.join(missing)}", f"{card.name} with {known}"))
-    if faults:
-        raise InputError(faults)
-    return np.array([card.table[label] for label in setup.labels])
-
-
-def _words(edges: Mapping[str, str]) -> str:
-    return ", ".join(f"{edge} {word}" for edge, word in edges.items())
+    origins = tuple(coefficient_rows(board.name, model, estimate.values, source) for model in estimate.models)
+    psi = [
+        (2.0 * np.pi * setup.measured) ** 2 * inverse_lambda(values, setup) - origin.rest
+        for setup, origin in zip(board.setups, origins, strict=True)
+    ]
+    rows = [origin.coefficients for origin in origins]
+    return PaperSystem(np.concatenate(psi), np.concatenate(rows), values, origins)

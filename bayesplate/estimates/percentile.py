@@ -1,9 +1,9 @@
 """The paper's percentile method: many least-squares estimates from subsets of the modes, trimmed, averaged.
 
-Read so that it reproduces the printed table: all subsets of three modes or more, least squares in psi, the Poisson
-factor fixed at the tabulated ratio, and for each constant on its own: negative estimates dropped, then the values
-between the 20th and the 80th percentile kept (midpoint definition), their mean and sample standard deviation
-reported. The trimming makes the spread.
+Read so that it reproduces the printed table within 1 %: all subsets of three modes or more, least squares in psi, one
+Poisson factor for all of them, and for each constant on its own: negative estimates dropped, then the values between
+the 20th and the 80th percentile kept (midpoint definition), their mean and sample standard deviation reported. The
+trimming makes the spread. The paper takes the Poisson factor from a table; here it is that of the fit of all modes.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,20 @@ N_CONSTANTS = 3
 _STEP = 1e-5
 
 
-def refit(predict: Predict, target: Floats, scales: Floats, start: Floats) -> Floats:
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Limits of the fitted parameters: (n_free,) arrays, infinite where there are none."""
+
+    lower: Floats
+    upper: Floats
+
+    @property
+    def are_open(self) -> bool:
+        """Whether there are no limits at all."""
+        return not (np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
+
+
+def refit(predict: Predict, target: Floats, scales: Floats, start: Floats, bounds: Bounds | None = None) -> Floats:
     """Parameters that minimise the weighted squares.
 
     Parameters
@@ -31,6 +45,8 @@ def refit(predict: Predict, target: Floats, scales: Floats, start: Floats) -> Fl
     scales : (n_modes,) array
         Relative uncertainties.
     start : (n_free,) array
+        Within the bounds.
+    bounds : Bounds, optional
 
     Returns
     -------
@@ -47,7 +63,10 @@ def refit(predict: Predict, target: Floats, scales: Floats, start: Floats) -> Fl
     def jacobian(x: Floats) -> Floats:
         return design(predict, scales, x)[np.r_[used, np.ones(x.size - N_CONSTANTS, dtype=bool)]]
 
-    return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x)
+    if bounds is None or bounds.are_open:
+        return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x)
+    limits = (bounds.lower, bounds.upper)
+    return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac").x)
 
 
 def design(predict: Predict, scales: Floats, at: Floats) -> Floats:

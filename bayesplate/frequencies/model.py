@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency
-from bayesplate.frequencies.terms import rigidity_columns, term_weights
-from bayesplate.modes.mesh import mesh
+from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import Place, find
-from bayesplate.modes.plate import PlateMatrices, thin_plate
+from bayesplate.modes.plate import PlateMatrices
 from bayesplate.modes.reduced import modal_matrices
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
@@ -24,7 +23,8 @@ class SetupModel:
 
     Attributes
     ----------
-    setup : Setup
+    system : System
+        The setup and its effects.
     plate : PlateMatrices
     places : tuple of Place
         Where each labelled mode stands at the estimate; from there on a label means this rank of this class.
@@ -33,11 +33,16 @@ class SetupModel:
         None until `with_exact` has built it.
     """
 
-    setup: Setup
+    system: System
     plate: PlateMatrices
     places: tuple[Place, ...]
     linear: LinearLaw
     exact: ExactLaw | None = None
+
+    @property
+    def setup(self) -> Setup:
+        """The setup."""
+        return self.system.setup
 
     def law(self, name: LawName) -> Law:
         """The law of that name."""
@@ -49,26 +54,29 @@ class SetupModel:
 
     def log_frequencies(self, values: Values, law: LawName) -> NDArray[np.float64]:
         """ln f of each labelled mode: (n_draws, n_modes) array; not a number where the law gives no frequency."""
-        return log_frequency(self.law(law).squared(term_weights(values, self.setup)))
+        return log_frequency(self.law(law).squared(self.system.weights(values)))
 
     def sensitivities(self, values: Values) -> NDArray[np.float64]:
         """d ln f / d ln D at the point where the model was made: (n_modes, 3) array, columns D_x, D_y, D_s.
 
-        Half the share of each constant in the mode's energy: rows sum to one half.
+        Half the share of each constant in the mode's energy: for the bare thin plate rows sum to one half.
         """
-        constants = np.array([float(values[name]) for name in ("D_x", "D_y", "D_s")])
-        energies = self.linear.stiffness @ rigidity_columns(values, self.setup) * constants
-        return np.asarray(0.5 * energies / energies.sum(axis=1, keepdims=True))
+        total = self.linear.stiffness @ self.system.weights(values).stiffness[0]
+        columns = []
+        for name in ("D_x", "D_y", "D_s"):
+            without = self.system.weights({**values, name: 0.0 * values[name]}).stiffness[0]
+            columns.append(0.5 * (1.0 - self.linear.stiffness @ without / total))
+        return np.column_stack(columns)
 
 
-def setup_model(setup: Setup, values: Values, plate: PlateMatrices | None = None) -> SetupModel:
+def setup_model(system: System, values: Values, plate: PlateMatrices | None = None) -> SetupModel:
     """Solve a setup at given constants and sizes, and find its labelled modes.
 
     Parameters
     ----------
-    setup : Setup
+    system : System
     values : dict of float
-        D_x, D_y, D_s (N m) and the board's inputs.
+        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
     plate : PlateMatrices, optional
         Matrices to use again; by default those of the production mesh for these values.
 
@@ -82,13 +90,11 @@ def setup_model(setup: Setup, values: Values, plate: PlateMatrices | None = None
     KeyError
         If a label is no mode of the plate.
     """
-    weights = term_weights(values, setup).at(0)
-    if plate is None:
-        plate = thin_plate(setup.ends_x, setup.ends_y, *mesh(weights))
-    beams = [reading.beams for reading in setup.readings]
-    found = find(plate, weights, beams)
+    plate = system.plate(values) if plate is None else plate
+    beams = [reading.beams for reading in system.setup.readings]
+    found = find(plate, system.weights(values).at(0), beams)
     return SetupModel(
-        setup=setup,
+        system=system,
         plate=plate,
         places=tuple(found[b].place for b in beams),
         linear=LinearLaw(np.stack([found[b].stiffness for b in beams]), np.stack([found[b].mass for b in beams])),
@@ -100,8 +106,8 @@ def with_exact(model: SetupModel, centre: Values, around: Sequence[Values], held
     matrices = modal_matrices(
         model.plate,
         model.places,
-        term_weights(centre, model.setup).at(0),
-        [term_weights(values, model.setup).at(0) for values in around],
-        [term_weights(values, model.setup).at(0) for values in held_out],
+        model.system.weights(centre).at(0),
+        [model.system.weights(values).at(0) for values in around],
+        [model.system.weights(values).at(0) for values in held_out],
     )
     return replace(model, exact=ExactLaw(matrices))

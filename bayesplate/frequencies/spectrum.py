@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesplate.frequencies.terms import term_weights
+from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import CERTAIN, name_modes
-from bayesplate.modes.plate import thin_plate
 from bayesplate.modes.solve import Modes, solve
 from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.plate.setup import Setup
@@ -41,14 +39,14 @@ class NamedMode:
         return "cannot tell" if self.label is None else str(self.label)
 
 
-def spectrum(setup: Setup, values: Values, n_modes: int) -> tuple[Modes, tuple[NamedMode, ...]]:
+def spectrum(system: System, values: Values, n_modes: int) -> tuple[Modes, tuple[NamedMode, ...]]:
     """Lowest modes of a setup at given constants and sizes.
 
     Parameters
     ----------
-    setup : Setup
+    system : System
     values : dict of float
-        D_x, D_y, D_s (N m) and the board's inputs.
+        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
     n_modes : int
 
     Returns
@@ -57,12 +55,11 @@ def spectrum(setup: Setup, values: Values, n_modes: int) -> tuple[Modes, tuple[N
     named : tuple of NamedMode
         In the order of frequency.
     """
-    weights = term_weights(values, setup).at(0)
-    plate = thin_plate(setup.ends_x, setup.ends_y, *mesh(weights))
-    modes = solve(plate, weights, n_modes)
+    modes = solve(system.plate(values), system.weights(values).at(0), n_modes)
+    first = system.setup.first_label
     named = []
     for eigenvalue, ((i, j), correlation) in zip(modes.eigenvalues, name_modes(modes), strict=True):
-        label = Label(i + setup.first_label.m, j + setup.first_label.n) if correlation >= CERTAIN else None
+        label = Label(i + first.m, j + first.n) if correlation >= CERTAIN else None
         named.append(NamedMode(label, float(np.sqrt(eigenvalue) / (2.0 * np.pi)), correlation))
     return modes, tuple(named)
 

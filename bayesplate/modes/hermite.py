@@ -6,12 +6,17 @@ Node i carries its value as unknown 2 i and its slope as unknown 2 i + 1.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.setup import End, Ends
+from bayesplate.plate.setup import Ends
+
+Hold = Literal["clamped", "supported", "guided", "free"]
+"""What an end holds: value and slope, the value, the slope, nothing. No card can ask for a guided end: it is a clamped
+one that an effect has released."""
+Holds = tuple[Hold, Hold]
 
 _LAYER = (1 / 4, 1 / 16)
 
@@ -73,7 +78,7 @@ def _unit_products() -> dict[tuple[int, int], NDArray[np.float64]]:
     return {(i, j): product(i, j) for i in range(3) for j in range(3)}
 
 
-def graded_nodes(ends: Ends, n_elements: int) -> NDArray[np.float64]:
+def graded_nodes(ends: Holds, n_elements: int) -> NDArray[np.float64]:
     """Equal elements, save that the one at each free end is split at a quarter and at a sixteenth of its length.
 
     Along a free edge the twist of a shear-flexible plate dies out over about a third of the thickness times
@@ -96,17 +101,24 @@ def graded_nodes(ends: Ends, n_elements: int) -> NDArray[np.float64]:
     return np.sort(np.concatenate([np.linspace(0.0, 1.0, n_equal + 1), first, 1.0 - last]))
 
 
-def values_held(ends: Ends) -> Ends:
-    """The ends with only the value held where anything is held."""
-    held: dict[End, End] = {"clamped": "supported", "supported": "supported", "free": "free"}
+def values_held(ends: Holds) -> Holds:
+    """The ends with only the value held where it is held at all."""
+    held: dict[Hold, Hold] = {"clamped": "supported", "supported": "supported", "guided": "free", "free": "free"}
     return held[ends[0]], held[ends[1]]
 
 
-def kept_unknowns(ends: Ends, n_elements: int) -> NDArray[np.intp]:
+def slopes_as_values(ends: Holds) -> Holds:
+    """The ends with the value held where the slope was."""
+    held: dict[Hold, Hold] = {"clamped": "supported", "supported": "free", "guided": "supported", "free": "free"}
+    return held[ends[0]], held[ends[1]]
+
+
+def kept_unknowns(ends: Holds, n_elements: int) -> NDArray[np.intp]:
     """Unknowns that the ends leave: (n_dof,) array."""
     held: list[int] = []
     for end, node in zip(ends, (0, n_elements), strict=True):
-        held += {"clamped": [2 * node, 2 * node + 1], "supported": [2 * node], "free": []}[end]
+        value, slope = 2 * node, 2 * node + 1
+        held += {"clamped": [value, slope], "supported": [value], "guided": [slope], "free": []}[end]
     return np.setdiff1d(np.arange(2 * (n_elements + 1)), held)
 
 
@@ -151,3 +163,28 @@ def even_and_odd(ends: Ends, n_elements: int, kept: NDArray[np.intp]) -> tuple[A
             n_columns += 1
         parts.append(csr_array((values, (rows, columns)), shape=(kept.size, n_columns)))
     return tuple(parts)
+
+
+def end_products(n_elements: int, at: tuple[bool, bool]) -> dict[tuple[int, int], Any]:
+    """Like `products`, but a sum over the ends that are asked for, of derivatives up to the first.
+
+    Parameters
+    ----------
+    n_elements : int
+    at : tuple of bool
+        Whether the ends at 0 and at 1 count.
+
+    Returns
+    -------
+    dict of (n_unknowns, n_unknowns) sparse array
+        By (i, j).
+    """
+    from scipy.sparse import csr_array
+
+    nodes = np.array([0, n_elements])[list(at)]
+    shape = (2 * (n_elements + 1),) * 2
+    return {
+        (i, j): csr_array((np.ones(nodes.size), (2 * nodes + i, 2 * nodes + j)), shape=shape)
+        for i in range(2)
+        for j in range(2)
+    }

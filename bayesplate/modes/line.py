@@ -7,6 +7,7 @@ terms.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -14,7 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.hermite import even_and_odd, graded_nodes, hermite_basis, kept_unknowns, products, values_held
+from bayesplate.modes.hermite import (
+    Holds,
+    end_products,
+    even_and_odd,
+    graded_nodes,
+    hermite_basis,
+    kept_unknowns,
+    products,
+    values_held,
+)
 from bayesplate.plate.setup import Ends
 
 N_BEAMS = 16
@@ -27,7 +37,9 @@ class Line:
     Attributes
     ----------
     ends : tuple of str
-        Condition at 0 and at 1: "clamped", "supported" or "free".
+        Condition at 0 and at 1: "clamped", "supported" or "free". They name the modes and tell the rigid motions.
+    held : tuple of str
+        What the functions themselves hold there: the same, or less where an effect has put springs in place of a clamp.
     nodes : (n_elements + 1,) array
         Where the elements meet, from 0 to 1, mirrored about the middle where both ends are alike.
     kept : (n_dof,) array of int
@@ -43,6 +55,7 @@ class Line:
     """
 
     ends: Ends
+    held: Holds
     nodes: NDArray[np.float64]
     kept: NDArray[np.intp]
     mass: Any
@@ -104,6 +117,34 @@ class Line:
         basis = hermite_basis(tuple(self.nodes))
         return basis.probes(np.asarray(points, dtype=float)[None, :]).tocsr()[:, self.kept]
 
+    def at_ends(self, at: tuple[bool, bool], order: int) -> Any:
+        """Products of values (order 0) or slopes (1), summed over the ends asked for: (n_dof, n_dof) sparse array."""
+        return end_products(self.n_elements, at)[order, order][self.kept][:, self.kept]
+
+
+def weighted(along: Line, factor: Callable[[NDArray[np.float64]], NDArray[np.float64]], i: int, j: int) -> Any:
+    """Integral of factor(x) times the i-th derivative of one function (rows) and the j-th of another (columns).
+
+    Parameters
+    ----------
+    along : Line
+    factor : callable
+        Of points in [0, 1]; integrated with four points an element, exact if it is linear there.
+    i, j : int
+        0, 1 or 2.
+
+    Returns
+    -------
+    (n_dof, n_dof) sparse array
+    """
+    from skfem import BilinearForm
+
+    def derivative(u: Any, order: int) -> Any:
+        return (u, u.grad[0], u.hess[0][0])[order]
+
+    form = BilinearForm(lambda u, v, w: factor(w.x[0]) * derivative(v, i) * derivative(u, j))
+    return form.assemble(hermite_basis(tuple(along.nodes))).tocsr()[along.kept][:, along.kept]
+
 
 def rigid_degrees(ends: Ends) -> tuple[int, ...]:
     """Degrees of the rigid motions of a line, in the order of its beam functions.
@@ -118,7 +159,9 @@ def rigid_degrees(ends: Ends) -> tuple[int, ...]:
 
 
 @lru_cache(maxsize=64)
-def line(ends: Ends, n_elements: int, is_sheared: bool = False) -> Line:
+def line(
+    ends: Ends, n_elements: int, is_sheared: bool = False, is_split: bool = True, held: Holds | None = None
+) -> Line:
     """Assemble a line; the result is shared, so it must not be changed.
 
     Parameters
@@ -131,24 +174,33 @@ def line(ends: Ends, n_elements: int, is_sheared: bool = False) -> Line:
         A line of a shear-flexible plate. Its elements are graded towards free ends, and it keeps the slope at clamped
         ends, where the deflection meets the clamp at the angle of the shear strain. The beam functions stay those of a
         line that only bends.
+    is_split : bool
+        Whether functions split into even and odd ones where both ends are alike; not so if something else on the plate
+        tells the two halves apart.
+    held : tuple of str, optional
+        What the ends hold where that is less than `ends` says.
 
     Returns
     -------
     Line
     """
+    from scipy.sparse import identity
+
+    held = ends if held is None else held
     nodes = graded_nodes(ends, n_elements) if is_sheared else np.linspace(0.0, 1.0, n_elements + 1)
-    kept = kept_unknowns(values_held(ends) if is_sheared else ends, n_elements)
+    kept = kept_unknowns(values_held(held) if is_sheared else held, n_elements)
 
     def integrals(i: int, j: int) -> Any:
         return products(tuple(nodes))[i, j][kept][:, kept]
 
     return Line(
         ends=ends,
+        held=held,
         nodes=nodes,
         kept=kept,
         mass=integrals(0, 0),
         slope=integrals(1, 1),
         bending=integrals(2, 2),
         mixed=integrals(2, 0),
-        parts=even_and_odd(ends, n_elements, kept),
+        parts=even_and_odd(ends, n_elements, kept) if is_split else (identity(kept.size, format="csr"),),
     )

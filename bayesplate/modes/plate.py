@@ -10,17 +10,56 @@ even and odd functions: no two modes of one class cross, and none of different c
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.fields import Fabric, Group, Measure, layout
 from bayesplate.modes.line import Line, line, rigid_degrees
+from bayesplate.modes.sparse import on_one_pattern
 from bayesplate.plate.setup import Ends
 
 THIN_TERMS = ("xx", "yy", "mix", "xy")
+UNIFORM = Fabric()
+
+
+KronSum = tuple[tuple[Any, Any], ...]
+"""A term of the plate as a sum of products of one matrix along x and one along y, on the unknowns of the two lines."""
+
+
+class EdgeTurn(NamedTuple):
+    """A stiffness term: the squared turning of the cross-sections, integrated along edges.
+
+    The thin plate's cross-sections turn with its slope, those of the shear-flexible plate by the shear strain less.
+
+    Attributes
+    ----------
+    axis : int
+        0: the edges x0 and x1, 1: the edges y0 and y1.
+    at : tuple of bool
+        Which of the two.
+    """
+
+    axis: int
+    at: tuple[bool, bool]
+
+    def on_slopes(self, x: Line, y: Line) -> KronSum:
+        """The term of a thin plate."""
+        if self.axis == 0:
+            return ((x.at_ends(self.at, 1), y.mass),)
+        return ((x.mass, y.at_ends(self.at, 1)),)
+
+
+Term = KronSum | EdgeTurn
+"""A stiffness term: on the deflection, or on the turning of cross-sections along edges."""
+
+Projection = Callable[[Line, Line, NDArray[np.float64]], NDArray[np.float64]]
+"""A mass term without a sparse matrix: from the lines and (n_vectors, n_dof_x, n_dof_y) deflections to its
+(n_vectors, n_vectors) matrix."""
 
 Beams = tuple[int, int]
 """Order of the beam functions along x and y whose product a mode resembles; (0, 0) is the lowest."""
@@ -64,6 +103,8 @@ class Block:
         From the class's functions along x and y to all functions of the line; the deflection's unknowns come first.
     n_rigid : int
         Number of rigid motions of the whole plate in this class.
+    projected : tuple of Projection
+        Mass terms beyond `masses` that exist on given deflections only.
     """
 
     parity: Parity
@@ -74,11 +115,17 @@ class Block:
     spread_x: Any
     spread_y: Any
     n_rigid: int
+    projected: tuple[Callable[[NDArray[np.float64]], NDArray[np.float64]], ...] = ()
 
     @property
     def n_dof(self) -> int:
         """Number of unknowns of the class."""
         return self.indptr.size - 1
+
+    @property
+    def n_masses(self) -> int:
+        """Number of mass terms, the projected ones included."""
+        return len(self.masses) + len(self.projected)
 
     def matrix(self, stored: NDArray[np.float64]) -> Any:
         """Sparse (n_dof, n_dof) array with the given stored values."""
@@ -91,8 +138,21 @@ class Block:
         return self.matrix(weights.stiffness @ self.terms)
 
     def mass(self, weights: Weights) -> Any:
-        """Weighted sum of the mass terms as a sparse (n_dof, n_dof) array."""
-        return self.matrix(weights.mass @ self.masses)
+        """Weighted sum of the mass terms, save the projected ones, as a sparse (n_dof, n_dof) array."""
+        return self.matrix(weights.mass[: len(self.masses)] @ self.masses)
+
+    def project(self, terms: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Terms on the span of (n_dof, n_vectors) vectors: (n_terms, n_vectors, n_vectors) array."""
+        small = np.stack([vectors.T @ (self.matrix(term) @ vectors) for term in terms])
+        return (small + np.swapaxes(small, -1, -2)) / 2.0
+
+    def project_masses(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """All mass terms on the span of vectors, the projected ones last."""
+        small = self.project(self.masses, vectors)
+        if not self.projected:
+            return small
+        deflections = self.spread(vectors)
+        return np.concatenate([small, [term(deflections) for term in self.projected]])
 
     def spread(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Deflection of (n_dof, n_vectors) of the class as (n_vectors, n_dof_x, n_dof_y) of the two lines."""
@@ -157,43 +217,99 @@ def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> PlateMatrices:
     Ducceschi et al., eq. (1) and (2), as energies.
     """
     x, y = line(ends_x, n_x), line(ends_y, n_y)
-    blocks = tuple(
-        _block(Parity(i, j), x, y, x.parts[i], y.parts[j]) for i in range(len(x.parts)) for j in range(len(y.parts))
+    return assemble(x, y, thin_terms(x, y), thin_masses(x, y))
+
+
+def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
+    """Group of each stiffness and of each mass term that is the thin plate's own."""
+    stiffness: tuple[Group, ...] = ("bending", "bending", "bending", "bending")
+    coupling: tuple[Group, ...] = ("bending", "bending") if is_turned else ()
+    return stiffness + coupling, ("mass",)
+
+
+def thin_terms(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
+    """The bending terms of the thin plate.
+
+    Parameters
+    ----------
+    x, y : Line
+    fabric : Fabric
+        Varying properties repeat the terms in the order of `bayesplate.modes.fields.layout`.
+
+    Returns
+    -------
+    tuple of KronSum
+        The four of `THIN_TERMS`; 4 int w_xx w_xy and 4 int w_yy w_xy follow where the grain runs at an angle.
+    """
+    measures = fabric.measures("bending", x, y)
+    stiffness, _ = thin_groups(fabric.is_turned)
+
+    def both(measure: Measure, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:
+        """Integral of the product of two derivatives of the deflection, symmetric."""
+        return (*_integral(measure, x, y, a, b, factor), *_integral(measure, x, y, b, a, factor))
+
+    def own(measure: Measure) -> tuple[KronSum, ...]:
+        return (
+            _integral(measure, x, y, (2, 0), (2, 0)),
+            _integral(measure, x, y, (0, 2), (0, 2)),
+            both(measure, (2, 0), (0, 2)),
+            _integral(measure, x, y, (1, 1), (1, 1)),
+            both(measure, (2, 0), (1, 1), 2.0),
+            both(measure, (0, 2), (1, 1), 2.0),
+        )
+
+    made = [own(measure) for measure in measures]
+    return tuple(made[k][term] for term, k in layout(stiffness, {"bending": len(measures)}))
+
+
+def thin_masses(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
+    """The board's own mass, once for each field that it takes."""
+    return tuple(_integral(measure, x, y, (0, 0), (0, 0)) for measure in fabric.measures("mass", x, y))
+
+
+def _integral(measure: Measure, x: Line, y: Line, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:
+    """Integral of one derivative of the deflection (orders along x and y; rows) times another (columns)."""
+    return tuple(
+        (factor * along_x[a[0], b[0]][x.kept][:, x.kept], along_y[a[1], b[1]][y.kept][:, y.kept])
+        for along_x, along_y in measure
     )
-    return PlateMatrices(x, y, blocks)
 
 
-def _block(parity: Parity, x: Line, y: Line, part_x: Any, part_y: Any) -> Block:
+def assemble(
+    x: Line, y: Line, stiffness: Sequence[Term], masses: Sequence[KronSum], projected: Sequence[Projection] = ()
+) -> PlateMatrices:
+    """A thin plate from any terms, class by class.
+
+    Parameters
+    ----------
+    x, y : Line
+        Unsplit along a side on which a term is not symmetric.
+    stiffness : sequence of Term
+    masses : sequence of KronSum
+        The first is the board's own.
+    projected : sequence of Projection
+        Further mass terms.
+
+    Returns
+    -------
+    PlateMatrices
+    """
+    blocks = []
+    terms = [*(term.on_slopes(x, y) if isinstance(term, EdgeTurn) else term for term in stiffness), *masses]
+    for i, part_x in enumerate(x.parts):
+        for j, part_y in enumerate(y.parts):
+            matrices = [kron_sum(term, part_x, part_y) for term in terms]
+            stored, indices, indptr = on_one_pattern(matrices)
+            n = len(stiffness)
+            parity = Parity(i, j)
+            on_deflections = tuple(partial(term, x, y) for term in projected)
+            rigid = count_rigid(parity, x, y)
+            blocks.append(Block(parity, stored[:n], stored[n:], indices, indptr, part_x, part_y, rigid, on_deflections))
+    return PlateMatrices(x, y, tuple(blocks))
+
+
+def kron_sum(term: KronSum, part_x: Any, part_y: Any) -> Any:
+    """A term on the functions of one class, as a sparse matrix."""
     from scipy.sparse import kron
 
-    def along(part: Any, matrix: Any) -> Any:
-        return part.T @ matrix @ part
-
-    mass_x, slope_x, bending_x, mixed_x = (along(part_x, m) for m in (x.mass, x.slope, x.bending, x.mixed))
-    mass_y, slope_y, bending_y, mixed_y = (along(part_y, m) for m in (y.mass, y.slope, y.bending, y.mixed))
-    terms = [
-        kron(bending_x, mass_y),
-        kron(mass_x, bending_y),
-        kron(mixed_x, mixed_y.T) + kron(mixed_x.T, mixed_y),
-        kron(slope_x, slope_y),
-    ]
-    n_rigid = count_rigid(parity, x, y)
-    stored, indices, indptr = on_one_pattern([*terms, kron(mass_x, mass_y)])
-    return Block(parity, stored[:-1], stored[-1:], indices, indptr, part_x, part_y, n_rigid)
-
-
-def on_one_pattern(
-    matrices: list[Any],
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
-    """Stored values of several sparse matrices on the union of their patterns, so that sums are sums of values."""
-    from scipy.sparse import coo_array, csc_array
-
-    n = matrices[0].shape[0]
-    entries = [coo_array(matrix) for matrix in matrices]
-    keys = [entry.coords[1].astype(np.int64) * n + entry.coords[0] for entry in entries]
-    pattern = np.unique(np.concatenate(keys))
-    stored = np.zeros((len(matrices), pattern.size))
-    for row, entry, key in zip(stored, entries, keys, strict=True):
-        np.add.at(row, np.searchsorted(pattern, key), entry.data)
-    shape = csc_array((np.ones(pattern.size), (pattern % n, pattern // n)), shape=(n, n))
-    return stored, shape.indices, shape.indptr
+    return sum(kron(part_x.T @ along_x @ part_x, part_y.T @ along_y @ part_y) for along_x, along_y in term)

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from bayesplate.modes.naming import Place
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
-from bayesplate.modes.solve import solve_class
+from bayesplate.modes.solve import ClassModes, solve_class
 
 _SPARE = 2
-_LOWEST_WEIGHT = 1e-8
+_LOWEST_SHARE = 1e-6
 _ACCEPTED_CENTS = 0.1
+_STEADY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,20 +33,45 @@ class ReducedBlock:
     stiffness : (n_terms, r, r) array
         Projected stiffness terms.
     masses : (n_masses, r, r) array
-        Projected mass terms; the first, the board's own, is the identity.
+        Projected mass terms; none where the mass hardly varies over the region and the basis is orthonormal in it.
+    n_rigid : int
+        Rigid motions in the basis: the lowest eigenvalues, which are left out.
+    shift : float, s^-2
+        Keeps the stiffness of rigid motions above zero where several masses ask for a pencil.
     """
 
     parity: Parity
     stiffness: NDArray[np.float64]
     masses: NDArray[np.float64]
+    n_rigid: int = 0
+    shift: float = 1.0
 
     def eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
-        """Elastic eigenvalues of many draws, increasing: (n_draws, r) array, s^-2."""
+        """Elastic eigenvalues of many draws, increasing: (n_draws, r - n_rigid) array, s^-2."""
         stiffness = _weighted(weights.stiffness, self.stiffness)
-        if len(self.masses) == 1:
-            return np.asarray(np.linalg.eigvalsh(stiffness)) / weights.mass
-        inverse = np.linalg.inv(np.linalg.cholesky(_weighted(weights.mass, self.masses)))
-        return np.asarray(np.linalg.eigvalsh(inverse @ stiffness @ np.swapaxes(inverse, -1, -2)))
+        if not len(self.masses):
+            return np.asarray(np.linalg.eigvalsh(stiffness) / weights.mass[:, :1])[:, self.n_rigid :]
+        mass = _weighted(weights.mass, self.masses)
+        try:
+            values = _pencil(stiffness, mass, self.shift)
+        except np.linalg.LinAlgError:
+            values = np.concatenate([_pencil_or_nan(k, m, self.shift) for k, m in zip(stiffness, mass, strict=True)])
+        return np.asarray(values[:, self.n_rigid :])
+
+
+def _pencil(stiffness: NDArray[np.float64], mass: NDArray[np.float64], shift: float) -> NDArray[np.float64]:
+    """Eigenvalues of (n, r, r) pencils, increasing; the stiffness is factorised, for shear strains have no mass."""
+    inverse = np.linalg.inv(np.linalg.cholesky(stiffness + shift * mass))
+    values = 1.0 / np.linalg.eigvalsh(inverse @ mass @ np.swapaxes(inverse, -1, -2)) - shift
+    return np.asarray(values[:, ::-1])
+
+
+def _pencil_or_nan(stiffness: NDArray[np.float64], mass: NDArray[np.float64], shift: float) -> NDArray[np.float64]:
+    """The same of one pencil; not a number where the weights are those of no material."""
+    try:
+        return _pencil(stiffness[None], mass[None], shift)
+    except np.linalg.LinAlgError:
+        return np.full((1, len(stiffness)), np.nan)
 
 
 def _weighted(weights: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -123,13 +149,19 @@ def modal_matrices(
 def _reduce(
     block: Block, n_modes: int, training: list[Weights], held_out: Sequence[Weights]
 ) -> tuple[ReducedBlock, float]:
-    vectors = [solve_class(block, weights, n_modes + _SPARE).vectors for weights in training]
+    trained = [solve_class(block, weights, n_modes + _SPARE) for weights in training]
+    vectors = [solution.vectors for solution in trained]
+    # A second mass lets elastic modes carry some rigid motion; with the board's own alone they are orthogonal to it.
+    rigid = trained[0].rigid[:, : block.n_rigid if block.n_masses > 1 else 0]
     solutions = [solve_class(block, weights, n_modes + _SPARE) for weights in held_out]
     exact = np.stack([solution.eigenvalues[:n_modes] for solution in solutions])
+    is_steady = _is_steady([*training, *held_out])
     together = Weights(*(np.stack(w) for w in zip(*held_out, strict=True)))
     for n_joined in range(0, len(held_out) // 2 + 1, max(1, len(held_out) // 4)):
         joined = [solution.vectors for solution in solutions[:n_joined]]
-        reduced = _project(block, np.concatenate([*vectors, *joined], axis=1))
+        reduced = _project(
+            block, rigid, np.concatenate([*vectors, *joined], axis=1), trained[0], training[0], is_steady
+        )
         ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
         worst = 600.0 * float(np.abs(np.log2(ratios)).max())
         if worst <= _ACCEPTED_CENTS:
@@ -137,16 +169,33 @@ def _reduce(
     return reduced, worst
 
 
-def _project(block: Block, vectors: NDArray[np.float64]) -> ReducedBlock:
-    """Orthonormalise by the Gram matrix, dropping directions that the vectors hardly span, and project the terms."""
-    gram = vectors.T @ (block.matrix(block.masses[0]) @ vectors)
+def _project(
+    block: Block,
+    rigid: NDArray[np.float64],
+    elastic: NDArray[np.float64],
+    centre: ClassModes,
+    weights: Weights,
+    is_steady: bool,
+) -> ReducedBlock:
+    """Orthonormalise in energy, dropping directions that the vectors hardly span, and project the terms."""
+    vectors = np.concatenate([rigid, elastic], axis=1)
+    highest = float(centre.eigenvalues[-1])
+    norm = block.stiffness(weights) + highest * block.mass(weights)
+    gram = vectors.T @ (norm @ vectors)
     scale = 1.0 / np.sqrt(np.diagonal(gram))
-    weights, directions = np.linalg.eigh(scale[:, None] * gram * scale)
-    kept = weights > _LOWEST_WEIGHT * weights[-1]
-    basis = (vectors * scale) @ (directions[:, kept] / np.sqrt(weights[kept]))
+    shares, directions = np.linalg.eigh(scale[:, None] * gram * scale)
+    kept = shares > _LOWEST_SHARE * shares[-1]
+    basis = (vectors * scale) @ (directions[:, kept] / np.sqrt(shares[kept]))
+    masses = block.project_masses(basis)
+    if is_steady:
+        steady = np.tensordot(weights.mass, masses, axes=1)
+        basis = basis @ np.linalg.inv(np.linalg.cholesky(steady)).T
+        masses = masses[:0]
+    stiffness = block.project(block.terms, basis)
+    return ReducedBlock(block.parity, stiffness, masses, rigid.shape[1], float(centre.eigenvalues[0]))
 
-    def projected(terms: NDArray[np.float64]) -> NDArray[np.float64]:
-        small = np.stack([basis.T @ (block.matrix(term) @ basis) for term in terms])
-        return (small + np.swapaxes(small, -1, -2)) / 2.0
 
-    return ReducedBlock(block.parity, projected(block.terms), projected(block.masses))
+def _is_steady(points: Sequence[Weights]) -> bool:
+    """Whether all mass weights stay within a few per cent of those of the first point."""
+    first = points[0].mass
+    return all(np.all(np.abs(point.mass - first) <= _STEADY * np.abs(first)) for point in points)

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 
+_SPARE_FOR_PROJECTED = 8
+
 
 @dataclass(frozen=True, eq=False)
 class ClassModes:
@@ -22,22 +24,23 @@ class ClassModes:
         omega^2, s^-2, increasing; rigid motions are left out.
     vectors : (n_dof, n_modes) array
         Mass-normalised.
+    rigid : (n_dof, n_rigid) array
+        The class's rigid motions, mass-normalised.
     """
 
     block: Block
     eigenvalues: NDArray[np.float64]
     vectors: NDArray[np.float64]
+    rigid: NDArray[np.float64]
 
     def coefficients(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi' K_i phi and phi' M_j phi of each mode: (n_modes, n_terms) and (n_modes, n_masses) arrays.
 
         Weighted with the weights of the solve they sum to the eigenvalue and to 1 (the sum rule).
         """
-        return self._energies(self.block.terms), self._energies(self.block.masses)
-
-    def _energies(self, terms: NDArray[np.float64]) -> NDArray[np.float64]:
-        rows = [np.einsum("im,im->m", self.vectors, self.block.matrix(term) @ self.vectors) for term in terms]
-        return np.stack(rows, axis=1)
+        stiffness = self.block.project(self.block.terms, self.vectors)
+        masses = self.block.project_masses(self.vectors)
+        return np.diagonal(stiffness, axis1=1, axis2=2).T, np.diagonal(masses, axis1=1, axis2=2).T
 
 
 def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
@@ -64,7 +67,8 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
     factors = splu(
         stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
-    n_wanted = min(n_modes + block.n_rigid, block.n_dof - 1)
+    n_bare = n_modes + _SPARE_FOR_PROJECTED if block.projected else n_modes
+    n_wanted = min(n_bare + block.n_rigid, block.n_dof - 1)
     start = np.random.default_rng(0).standard_normal(block.n_dof)
     values, vectors = eigsh(
         stiffness,
@@ -75,8 +79,25 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
         v0=start,
         ncv=min(block.n_dof, max(2 * n_wanted + 1, 20)),
     )
-    order = np.argsort(values)[block.n_rigid :]
-    return ClassModes(block, values[order], vectors[:, order])
+    order = np.argsort(values)
+    values, vectors = values[order], vectors[:, order]
+    if block.projected:
+        values, vectors = _with_projected_masses(block, weights, values, vectors)
+    n_last = block.n_rigid + n_modes
+    return ClassModes(
+        block, values[block.n_rigid : n_last], vectors[:, block.n_rigid : n_last], vectors[:, : block.n_rigid]
+    )
+
+
+def _with_projected_masses(
+    block: Block, weights: Weights, values: NDArray[np.float64], vectors: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Modes with the projected masses joined, as combinations of the modes without them, rigid ones included."""
+    from scipy.linalg import eigh
+
+    masses = np.tensordot(weights.mass, block.project_masses(vectors), axes=1)
+    joined, combinations = eigh(np.diag(np.maximum(values, 0.0)), masses)
+    return joined, vectors @ combinations
 
 
 def solve_classes(plate: PlateMatrices, weights: Weights, n_modes: Mapping[Parity, int]) -> dict[Parity, ClassModes]:

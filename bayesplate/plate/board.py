@@ -74,9 +74,9 @@ def board_from_card(card: BoardCard, prior: PriorCard | None = None) -> Board:
     """
     setups = tuple(_setup(section, prior) for section in card.setups)
     inputs = {
-        "length_x": card.plate.length_x_mm.scaled(_MILLI),
-        "length_y": card.plate.length_y_mm.scaled(_MILLI),
-        "thickness": card.plate.thickness_mm.scaled(_MILLI),
+        "length_x": card.plate.length_x_mm.scaled(_MILLI).with_places_scaled(_MILLI),
+        "length_y": card.plate.length_y_mm.scaled(_MILLI).with_places_scaled(_MILLI),
+        "thickness": card.plate.thickness_mm.scaled(_MILLI).with_places_scaled(_MILLI),
     }
     if card.plate.mass_g is not None:
         inputs["mass"] = card.plate.mass_g.scaled(_MILLI)
@@ -165,7 +165,4 @@ def _notes(card: BoardCard, poisson: Quantity) -> tuple[str, ...]:
     notes = []
     if card.material.poisson_is_default:
         notes.append(f"the card gives no Poisson ratio: nu_xy = {poisson.mean:g} +- {poisson.sd:g} was assumed")
-    for name in ("length_x_mm", "length_y_mm", "thickness_mm"):
-        if getattr(card.plate, name).has_profile:
-            notes.append(f"{name} was read at several places: its mean is used, its profile is not part of this model")
     return tuple(notes)

@@ -26,7 +26,7 @@ from bayesplate.errors import CheckpointError
 
 FloatArray = NDArray[np.float64]
 
-FORMAT = 1  # to be raised whenever the same seed would give other draws, so that two programs never share one run
+FORMAT = 2  # to be raised whenever the same seed would give other draws, so that two programs never share one run
 RANDOM_WORDS = 626  # 624 words of the Mersenne twister, its position, and whether a normal deviate is kept back
 
 

@@ -21,7 +21,7 @@ from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
-from bayesplate.posterior.region import find_region, linearisation_errors
+from bayesplate.posterior.region import Region, find_region, linearisation_errors
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior
@@ -107,12 +107,23 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     found = identifiability(estimate.sensitivities, estimate.scales)
     require_identifiable(board, found)
     region = find_region(board, estimate)
+    require_identifiable(board, _identifiable_at(board, region, estimate))
     if law is None:
         draws = np.random.default_rng(0).multivariate_normal(region.centre, region.covariance, _N_CHECKS)
+        parameters, columns = Parameters(board), Parameters(board).fitted_columns
+        limits = parameters.fitted_bounds
+        draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
         errors = linearisation_errors(board, region.models, draws)
         law = "linear" if linear_suffices(board, errors, [s.noise.median for s in board.setups]) else "exact"
     posterior = Posterior(board, prior, region.models, law, robust)
     return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance)
+
+
+def _identifiable_at(board: Board, region: Region, estimate: Estimate) -> Identifiability:
+    """What the readings tell where the posterior lies; modes may stand there in another order than at the estimate."""
+    values = Parameters(board).values(region.centre[None, :])
+    there = {name: np.ravel(value)[0] for name, value in values.items()}
+    return identifiability(np.concatenate([m.sensitivities(there) for m in region.models]), estimate.scales)
 
 
 def linear_suffices(board: Board, errors: NDArray[np.float64], noise: Sequence[float]) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.estimates.refit import Bounds
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 
@@ -52,6 +53,15 @@ class Parameters:
     def fitted_columns(self) -> NDArray[np.intp]:
         """Columns that frequencies depend on: all but the noise."""
         return np.r_[:N_RIGIDITIES, N_RIGIDITIES + self.n_setups : self.n_dim]
+
+    @property
+    def fitted_bounds(self) -> Bounds:
+        """Limits of the fitted columns: those of the inputs' priors."""
+        lower, upper = np.full(self.n_dim, -np.inf), np.full(self.n_dim, np.inf)
+        for i, quantity in enumerate(self.board.uncertain_inputs.values(), start=N_RIGIDITIES + self.n_setups):
+            lower[i] = float(quantity.standard(quantity.lower)) if np.isfinite(quantity.lower) else -np.inf
+            upper[i] = float(quantity.standard(quantity.upper)) if np.isfinite(quantity.upper) else np.inf
+        return Bounds(lower[self.fitted_columns], upper[self.fitted_columns])
 
     def values(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Rigidities and inputs by name, SI; (n_draws,) arrays, or numbers for exact inputs.

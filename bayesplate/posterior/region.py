@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.effects import is_effect_parameter
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.laws import LawName, cents
@@ -21,6 +22,7 @@ Floats = NDArray[np.float64]
 _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
 _N_HELD_OUT = 6
+_INSIDE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +46,9 @@ class Region:
 def find_region(board: Board, estimate: Estimate) -> Region:
     """Locate the posterior of a board.
 
-    The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise;
-    noise has its prior's. Where inputs are uncertain the fit may move them, and the models are made anew at the point
-    it finds.
+    The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
+    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, and the models
+    are made anew at the point it finds.
 
     Parameters
     ----------
@@ -59,25 +61,48 @@ def find_region(board: Board, estimate: Estimate) -> Region:
     Region
     """
     parameters = Parameters(board)
-    n_modes = estimate.residuals.size
-    misfit = float(np.sum((estimate.residuals / estimate.scales) ** 2)) / max(n_modes - N_RIGIDITIES, 1)
-    widening = np.sqrt(max(1.0, misfit))
-    noise = np.array([setup.noise.median for setup in board.setups]) * widening
+    widenings = noise_widenings(board, estimate)
+    noise = np.array([setup.noise.median for setup in board.setups]) * widenings
     centre = parameters.theta(estimate.values, noise)
     models = estimate.models
-    scales = estimate.scales * widening
+    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
     covariance = _covariance(board, models, "linear", scales, centre)
     models = exact_models(board, models, centre, covariance)
     if parameters.inputs:
         columns = parameters.fitted_columns
         centre = centre.copy()
         predict = predictor(board, models, "exact", centre)
-        centre[columns] = refit(predict, log_measured(board), scales, centre[columns])
+        bounds = parameters.fitted_bounds
+        start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
+        centre[columns] = refit(predict, log_measured(board), scales, start, bounds)
         values = {name: np.ravel(value)[0] for name, value in parameters.values(centre[None, :]).items()}
-        models = tuple(setup_model(model.setup, values, model.plate) for model in models)
+        models = tuple(setup_model(model.system, values, model.plate) for model in models)
         covariance = _covariance(board, models, "linear", scales, centre)
         models = exact_models(board, models, centre, covariance)
     return Region(centre, covariance, models)
+
+
+def noise_widenings(board: Board, estimate: Estimate) -> Floats:
+    """Likely noise of each setup over its prior median, at least 1: (n_setups,) array.
+
+    With n readings to spare and a mean squared misfit q of all of them, the density of the logarithm of w = noise /
+    median is highest where n (q / w^2 - 1) = ln(w) / log_sd^2. A narrow prior keeps the noise at its median whatever
+    the residuals; a wide one lets it follow them.
+    """
+    from scipy.optimize import brentq
+
+    spare = max(estimate.residuals.size - N_RIGIDITIES, 1)
+    misfit = float(np.sum((estimate.residuals / estimate.scales) ** 2)) / spare
+    if misfit <= 1.0:
+        return np.ones(len(board.setups))
+
+    def likely(log_sd: float) -> float:
+        def slope(log_w: float) -> float:
+            return float(spare * (misfit * np.exp(-2.0 * log_w) - 1.0) - log_w / log_sd**2)
+
+        return float(np.exp(brentq(slope, 0.0, 0.5 * np.log(misfit))))
+
+    return np.array([likely(setup.noise.log_sd) for setup in board.setups])
 
 
 def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predict:
@@ -110,8 +135,9 @@ def exact_models(
 ) -> tuple[SetupModel, ...]:
     """Models with the exact law, trained at the centre and at the corners of a box around it.
 
-    The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies are homogeneous in the
-    rigidities, so a common factor needs no training, and side lengths only rescale the same terms.
+    The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies of a bare plate are homogeneous in
+    the rigidities, so a common factor needs no training, and side lengths only rescale the same terms. Parameters of
+    effects add the two ends of their own range, each beside an opposite corner of the box.
 
     Parameters
     ----------
@@ -121,19 +147,37 @@ def exact_models(
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
     """
     parameters = Parameters(board)
+    first_input = N_RIGIDITIES + len(board.setups)
     ratios = np.eye(N_RIGIDITIES)[:2] - np.eye(N_RIGIDITIES)[2]
     spread = ratios @ covariance[:N_RIGIDITIES, :N_RIGIDITIES] @ ratios.T
     half_widths = np.zeros(parameters.n_dim)
     half_widths[:2] = np.clip(_BOX_SDS * np.sqrt(np.diagonal(spread)), _NARROWEST, _WIDEST)
-    if "poisson_xy" in parameters.inputs:
-        half_widths[N_RIGIDITIES + len(board.setups) + parameters.inputs.index("poisson_xy")] = _BOX_SDS
-    axes = np.flatnonzero(half_widths)
-    corners = np.zeros((2**axes.size, parameters.n_dim))
-    corners[:, axes] = list(product((-1.0, 1.0), repeat=axes.size))
+    sds = np.sqrt(np.diagonal(covariance))
+    boxed = [0, 1]
+    alone = []
+    for i, name in enumerate(parameters.inputs, start=first_input):
+        if name == "poisson_xy":
+            boxed.append(i)
+            half_widths[i] = _BOX_SDS
+        elif is_effect_parameter(name):
+            alone.append(i)
+            half_widths[i] = _BOX_SDS * sds[i]
+    corners = np.zeros((2 ** len(boxed), parameters.n_dim))
+    corners[:, boxed] = list(product((-1.0, 1.0), repeat=len(boxed)))
+    ends = np.zeros((2 * len(alone), parameters.n_dim))
+    for row, i in enumerate(alone):
+        ends[2 * row, [*boxed, i]] = [*corners[row % len(corners), boxed], 1.0]
+        ends[2 * row + 1, [*boxed, i]] = [*-corners[row % len(corners), boxed], -1.0]
+    corners = np.concatenate([corners, ends])
     held_out = np.random.default_rng(0).uniform(-1.0, 1.0, (_N_HELD_OUT, parameters.n_dim))
 
+    bounds = parameters.fitted_bounds
+    columns_fitted = parameters.fitted_columns
+
     def points(signs: Floats) -> list[Values]:
-        values = parameters.values(centre + half_widths * signs)
+        theta = centre + half_widths * signs
+        theta[:, columns_fitted] = np.clip(theta[:, columns_fitted], bounds.lower, bounds.upper)
+        values = parameters.values(theta)
         columns = {name: np.broadcast_to(value, len(signs)) for name, value in values.items()}
         return [{name: column[i] for name, column in columns.items()} for i in range(len(signs))]
 

@@ -151,13 +151,29 @@ def means_under(inference: Inference, draws: Draws, law: LawName) -> tuple[dict[
         How many independent draws the weights leave; all of them under the law of the fit.
     """
     constants = {**draws.moduli, **draws.rigidities}
+    weights = law_weights(inference, draws, law)
+    means = {name: weighted_mean(values.ravel(), weights) for name, values in constants.items()}
+    return means, effective_draws(weights)
+
+
+def law_weights(inference: Inference, draws: Draws, law: LawName) -> Floats:
+    """Weights that make the draws of one law draws of another: (n_chains * n_draws,) array that sums to 1."""
     if law == inference.problem.posterior.law:
-        return {name: float(values.mean()) for name, values in constants.items()}, float(draws.log_posterior.size)
+        return np.full(draws.log_posterior.size, 1.0 / draws.log_posterior.size)
     other = inference.problem.under(law).posterior
     log_weights = other.log_likelihood(draws.flat).sum(axis=1) - draws.log_likelihood.sum(axis=-1).ravel()
     weights = np.exp(log_weights - log_weights.max())
-    weights /= weights.sum()
-    return {name: float(weights @ values.ravel()) for name, values in constants.items()}, float(1 / np.sum(weights**2))
+    return np.asarray(weights / weights.sum())
+
+
+def weighted_mean(values: Floats, weights: Floats) -> float:
+    """Mean of draws with weights that sum to 1; a sum, because a long dot product depends on the number of threads."""
+    return float(np.sum(weights * values))
+
+
+def effective_draws(weights: Floats) -> float:
+    """How many draws of equal weight are worth as much."""
+    return float(1.0 / np.sum(weights**2))
 
 
 def linearisation(inference: Inference, draws: Draws) -> Floats:

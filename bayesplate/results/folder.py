@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from bayesplate.errors import CheckpointError, Fault, InputError
 SUMMARY = "summary.json"
 ARCHIVE = "posterior.nc"
 CHECKPOINT = "checkpoint"
+BESIDE = ("compare.json", "modes.png", "modes.svg")
+"""Files of commands that share the folder with a fit: they do not make it a used one."""
 
 
 class OutputFolder:
@@ -45,7 +47,7 @@ class OutputFolder:
         """
         if self.path.exists() and not self.path.is_dir():
             raise InputError(Fault(f"--out {self.path}", "a folder", "a file", "choose another place"))
-        has_content = self.path.is_dir() and any(self.path.iterdir())
+        has_content = self.path.is_dir() and any(_is_of_a_run(file.name) for file in self.path.iterdir())
         if resume:
             if not self.checkpoint.is_dir():
                 state = "a finished run" if (self.path / SUMMARY).exists() else "nothing to resume"
@@ -63,7 +65,9 @@ class OutputFolder:
             )
 
     def open(self, *, resume: bool) -> None:
-        """Make the folder and remove the results of an earlier run, its checkpoint too unless resuming.
+        """Make the folder; unless resuming, remove the results and the checkpoint of an earlier run.
+
+        A run that is resumed may yet turn out to be another one: what it left stays until there is something better.
 
         Raises
         ------
@@ -72,10 +76,11 @@ class OutputFolder:
         """
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            for name in (SUMMARY, ARCHIVE):
-                (self.path / name).unlink(missing_ok=True)
-            if not resume and self.checkpoint.is_dir():
-                shutil.rmtree(self.checkpoint)
+            if not resume:
+                for name in (SUMMARY, ARCHIVE):
+                    (self.path / name).unlink(missing_ok=True)
+                if self.checkpoint.is_dir():
+                    shutil.rmtree(self.checkpoint)
         except OSError as error:
             fault = Fault(f"--out {self.path}", "a folder that can be written", error.strerror or str(error))
             raise InputError(fault) from error
@@ -84,6 +89,43 @@ class OutputFolder:
         """Remove the checkpoint of a run that is done; chunks found damaged stay for whoever wants to look."""
         if not any(self.checkpoint.rglob("*.damaged")):
             shutil.rmtree(self.checkpoint, ignore_errors=True)
+
+
+def _is_of_a_run(name: str) -> bool:
+    return name not in BESIDE and not (name.startswith("modes-") and name.endswith((".png", ".svg")))
+
+
+def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:
+    """The files that a command will write beside others, checked before any work and without writing.
+
+    Raises
+    ------
+    InputError
+        If one is there and `force` is not given, or if the folder is no folder.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(Fault(f"--out {folder}", "a folder", "a file", "choose another place"))
+    paths = tuple(folder / name for name in names)
+    there = [path.name for path in paths if path.exists()]
+    if there and not force:
+        wanted, remedy = "new files", "--force replaces them, --out takes another place"
+        raise InputError(Fault(f"--out {folder}", wanted, f"{', '.join(there)} already there", remedy))
+    return paths
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of an output.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fault = Fault(f"--out {folder}", "a folder that can be written", error.strerror or str(error))
+        raise InputError(fault) from error
 
 
 def json_text(content: Mapping[str, Any]) -> str:

@@ -28,7 +28,9 @@ def mode_errors(inference: Inference, draws: Draws) -> Errors:
     problem = inference.problem
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
     start = problem.centre[problem.parameters.fitted_columns]
-    return prediction_errors(predict, log_measured(problem.board), reading_scales(inference, draws), start)
+    scales = reading_scales(inference, draws)
+    bounds = problem.parameters.fitted_bounds
+    return prediction_errors(predict, log_measured(problem.board), scales, start, bounds)
 
 
 def reading_scales(inference: Inference, draws: Draws) -> NDArray[np.float64]:
@@ -67,15 +69,15 @@ def mode_entries(inference: Inference, draws: Draws, errors: Errors) -> list[dic
 def unlabelled_entries(problem: Problem, draws: Draws) -> list[dict[str, Any]]:
     """Each unlabelled peak beside the predicted mode nearest to it; they are shown, not fitted."""
     entries = []
-    for setup in problem.board.setups:
+    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
         if not setup.unlabelled:
             continue
         n_modes = 12
         values = posterior_mean_values(problem, draws)
-        _, named = spectrum(setup, values, n_modes)
+        _, named = spectrum(model.system, values, n_modes)
         while named[-1].frequency < max(setup.unlabelled) and n_modes < _MOST_MODES:
             n_modes *= 2
-            _, named = spectrum(setup, values, n_modes)
+            _, named = spectrum(model.system, values, n_modes)
         for peak in setup.unlabelled:
             nearest = min(named, key=lambda mode, peak=peak: abs(np.log(mode.frequency / peak)))  # type: ignore[misc]
             entries.append(

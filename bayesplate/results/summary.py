@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.effects import is_effect_parameter
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
@@ -40,7 +41,7 @@ def header(problem: Problem, seed: int, versions: Mapping[str, str], card_sha256
         "versions": dict(versions),
         "card_sha256": card_sha256,
         "model": {
-            "theory": "thin",
+            "theory": problem.posterior.models[0].system.theory,
             "law": problem.posterior.law,
             "effects": list(problem.board.effects),
             "robust": problem.posterior.robust,
@@ -88,9 +89,13 @@ def summarise(inference: Inference, draws: Draws, seed: int, versions: Mapping[s
         "converged": True,
         "elastic": {name: spread(values, "Pa") for name, values in draws.moduli.items()},
         "rigidity": {name: spread(values, "N m") for name, values in draws.rigidities.items()},
-        "effects": {},
+        "effects": _effects(problem, draws),
         "noise": {setup.name: spread(draws.noise[..., i], "1") for i, setup in enumerate(board.setups)},
-        "inputs": {name: spread(values, _UNITS.get(name, "m")) for name, values in draws.inputs.items()},
+        "inputs": {
+            name: spread(values, _UNITS.get(name, "m"))
+            for name, values in draws.inputs.items()
+            if not is_effect_parameter(name)
+        },
         "derived": {name: spread(item.values, item.unit) for name, item in draws.derived.items()},
         "least_squares": _paper_least_squares(system),
         "weighted_least_squares": _weighted(problem),
@@ -109,6 +114,24 @@ def summarise(inference: Inference, draws: Draws, seed: int, versions: Mapping[s
         "identifiability": [*remarks(board, problem.identifiability), *input_remarks(draws)],
         "warnings": _warnings(inference, draws),
     }
+
+
+def _effects(problem: Problem, draws: Draws) -> Summary:
+    """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
+    result: Summary = {}
+    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
+        for effect in model.system.effects:
+            owner = result.setdefault(setup.name if effect.scope == "setup" else "board", {})
+            owner[effect.name] = {
+                parameter.name: spread(_values_of(effect.key(parameter.name), problem, draws), parameter.unit)
+                for parameter in effect.parameters()
+            }
+    return result
+
+
+def _values_of(key: str, problem: Problem, draws: Draws) -> NDArray[np.float64]:
+    exact = np.broadcast_to(problem.board.inputs[key].mean, draws.log_posterior.shape)
+    return draws.inputs.get(key, exact)
 
 
 def sampler_health(chains: Chains, convergence: Convergence) -> Summary:
@@ -183,10 +206,10 @@ def _warnings(inference: Inference, draws: Draws) -> list[str]:
                     f"setup {setup.name}: the shape of mode {label} fits its label only to {place.correlation:.2f}; "
                     "it may be its neighbour at a veering"
                 )
-    for setup in problem.board.setups:
+    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
         values = posterior_mean_values(problem, draws)
         if setup.hammer is not None:
-            modes, named = spectrum(setup, values, max(12, 2 * len(setup.readings)))
+            modes, named = spectrum(model.system, values, max(12, 2 * len(setup.readings)))
             sentences += sign_conflicts(setup, modes, named, values)
     if problem.posterior.law == "linear" and not linear_is_enough(inference, draws):
         sentences.append(

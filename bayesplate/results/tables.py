@@ -88,8 +88,8 @@ def unlabelled_table(summary: Mapping[str, Any]) -> Table | None:
     )
 
 
-def check_tables(report: Mapping[str, Any]) -> tuple[Table, Table]:
-    """What `check` found: the constants with the precision to expect, and the modes."""
+def check_tables(report: Mapping[str, Any]) -> tuple[Table, ...]:
+    """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
     constants = tuple(
         (
             f"{name}, {words}",
@@ -113,6 +113,26 @@ def check_tables(report: Mapping[str, Any]) -> tuple[Table, Table]:
             f"What {report['name']} can tell, GPa", ("constant", "least squares", "uncertainty to expect"), constants
         ),
         Table("Modes", ("mode", "measured Hz", "error, cents", "energy in D_x/D_y/D_s, %", "leverage"), modes),
+        *([signatures_table(report)] if report["signatures"] else []),
+    )
+
+
+def signatures_table(report: Mapping[str, Any]) -> Table:
+    """What effects that are not declared would do: in all, to be seen, and to the constants if ignored."""
+    rows = tuple(
+        (
+            one["effect"],
+            f"{one['raw_rms_cents']:.1f}",
+            f"{one['visible_rms_cents']:.1f}" + (" (lost in noise)" if one["below_sight"] else ""),
+            " / ".join(f"{one['bias_percent'][name]:+.1f}" for name in _WORDS),
+            ", ".join(one["look_alikes"]) or "-",
+        )
+        for one in report["signatures"]
+    )
+    return Table(
+        "Effects not declared, at a usual size: rms over the modes, cents",
+        ("effect", "shift", "visible in a fit", "E_x/E_y/G_xy off by, %", "looks like"),
+        rows,
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
@@ -29,7 +30,8 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
     -------
     dict
         name, title, setups, law, estimate (least squares, with the standard deviation to expect from noise, misfit and
-        uncertain inputs), modes with their residuals and leverages, condition_number, identifiability and notes.
+        uncertain inputs), modes with their residuals and leverages, condition_number, what each further effect would do
+        (signatures), identifiability and notes.
 
     Raises
     ------
@@ -79,8 +81,26 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
             for i, (setup, reading) in enumerate(rows)
         ],
         "in_sample_rms_cents": float(np.sqrt(np.mean(residuals**2))),
+        "signatures": [_signature(one, alike) for one, alike in _alike(signatures(problem))],
+        "invisible": INVISIBLE,
         "identifiability": list(remarks(board, found)),
         "notes": list(board.notes),
+    }
+
+
+def _alike(found: Sequence[Signature]) -> list[tuple[Signature, tuple[str, ...]]]:
+    return [(one, look_alikes(found)[one.effect]) for one in found]
+
+
+def _signature(one: Signature, alike: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "effect": one.effect,
+        "size": dict(one.size),
+        "raw_rms_cents": one.raw_rms,
+        "visible_rms_cents": one.visible_rms,
+        "below_sight": one.is_below_sight,
+        "bias_percent": dict(one.bias_percent),
+        "look_alikes": list(alike),
     }
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bayesplate.errors import NotConvergedError
+from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.inference import Inference, Problem, infer, pose
@@ -100,14 +100,21 @@ def fit(
     problem = pose(prepared.board, prepared.prior, law=law, robust=robust)
     settings = SamplerSettings(seed=seed)
     settings.walkers(problem.parameters.n_dim)
+
+    def checkpoint_of(under: Problem) -> Checkpoint | None:
+        if folder is None:
+            return None
+        return Checkpoint(folder.checkpoint / under.posterior.law, fingerprint(prepared, under))
+
     if folder is not None:
+        saved = checkpoint_of(problem)
+        if resume and saved is not None and not saved.exists():
+            wanted = f"a saved run under the {problem.posterior.law} law"
+            raise CheckpointError(f"{folder.path}: wanted {wanted}, got none to resume (--force runs it anew)")
         folder.open(resume=resume)
 
     def sampled(under: Problem) -> tuple[Inference, Draws]:
-        checkpoint = None
-        if folder is not None:
-            checkpoint = Checkpoint(folder.checkpoint / under.posterior.law, fingerprint(prepared, under))
-        inference = infer(under, settings, checkpoint=checkpoint, progress=progress)
+        inference = infer(under, settings, checkpoint=checkpoint_of(under), progress=progress)
         if not inference.convergence.passed:
             _refuse(inference, seed, prepared, folder)
         return inference, named_draws(inference, seed)

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from bayesplate.cards import BoardCard, PriorCard, load_board, load_prior, physical_faults
-from bayesplate.errors import Fault, InputError
+from bayesplate.effects import declare, effect_faults, implied_effects
+from bayesplate.errors import InputError
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board, board_from_card
 
@@ -26,7 +27,9 @@ class Prepared:
         return "" if self.card.path is None else self.card.path.read_text(encoding="utf-8-sig")
 
 
-def prepare(card: str | os.PathLike[str], effects: Sequence[str] | None = None) -> Prepared:
+def prepare(
+    card: str | os.PathLike[str], effects: Sequence[str] | None = None, *, may_lack_frequencies: bool = False
+) -> Prepared:
     """Read a board card and everything it names.
 
     Parameters
@@ -35,6 +38,8 @@ def prepare(card: str | os.PathLike[str], effects: Sequence[str] | None = None) 
         Name of a shipped card, or a path.
     effects : sequence of str, optional
         Declared effects in place of the card's.
+    may_lack_frequencies : bool
+        Whether a board that was not measured yet will do.
 
     Returns
     -------
@@ -45,27 +50,28 @@ def prepare(card: str | os.PathLike[str], effects: Sequence[str] | None = None) 
     InputError
         Every schema fault at once; if there is none, every physical fault at once.
     """
-    read = load_board(card)
+    read = load_board(card, may_lack_frequencies=may_lack_frequencies)
     faults = physical_faults(read)
     if faults and _prior_is_at_fault(read):
         raise InputError(faults)
     prior = load_prior(read.material.prior, read.path.parent if read.path else None)
     board = board_from_card(read, prior)
-    if effects is not None:
-        board = replace(board, effects=tuple(effects))
-    faults += label_faults(board)
-    if board.effects:
-        faults.append(
-            Fault(
-                f"{board.name}.toml effects",
-                "no declared effects: this version fits the bare plate",
-                ", ".join(board.effects),
-                "--effects none",
-            )
-        )
+    listed = (*board.effects, *implied_effects(board)) if effects is None else effects
+    board = replace(board, effects=tuple(dict.fromkeys(listed)))
+    faults += [*label_faults(board), *effect_faults(board)]
     if faults:
         raise InputError(faults)
-    return Prepared(read, prior, board)
+    return Prepared(read, prior, declare(replace(board, notes=(*board.notes, *_unused_profiles(board)))))
+
+
+def _unused_profiles(board: Board) -> list[str]:
+    """Readings at several places of which only the mean is used."""
+    profiled = {"thickness": "thickness_profile", "length_y": "outline_profile"}
+    return [
+        f"the {name} was read at several places: its mean is used, the {effect} is not part of this model"
+        for name, effect in profiled.items()
+        if board.inputs[name].has_profile and effect not in board.effects
+    ]
 
 
 def _prior_is_at_fault(card: BoardCard) -> bool:

@@ -7,10 +7,21 @@ from dataclasses import dataclass
 from typing import Any
 
 from bayesplate.posterior.sampling import Progress
+from bayesplate.results.comparison_tables import METHODS_REMARK, forward_table, methods_table, sheet_table
 from bayesplate.results.folder import json_text
 from bayesplate.results.tables import Table, check_tables, constants_table, modes_table, unlabelled_table
 
-__all__ = ["Progress", "Shown", "Table", "json_text", "progress_text", "show_check", "show_fit"]
+__all__ = [
+    "Progress",
+    "Shown",
+    "Table",
+    "json_text",
+    "progress_text",
+    "show_check",
+    "show_compare",
+    "show_fit",
+    "show_modes",
+]
 
 
 @dataclass(frozen=True)
@@ -26,7 +37,9 @@ class Shown:
 def show_check(report: Mapping[str, Any]) -> Shown:
     """The report of `bayesplate.workflow.check.check` for a person."""
     closing = f"{report['law']} law; nothing was sampled. Next: bayesplate fit, with the same card"
-    return Shown(check_tables(report), tuple(report["identifiability"]), tuple(report["notes"]), closing)
+    return Shown(
+        check_tables(report), (*report["identifiability"], report["invisible"]), tuple(report["notes"]), closing
+    )
 
 
 def show_fit(summary: Mapping[str, Any]) -> Shown:
@@ -42,6 +55,26 @@ def show_fit(summary: Mapping[str, Any]) -> Shown:
         + f"; noise {noise}; the linear law is off by {error['linearisation_rms_cents']:.1f} cents."
     )
     return Shown(tables, tuple(summary["identifiability"]), tuple(summary["warnings"]), closing)
+
+
+def show_compare(comparison: Mapping[str, Any]) -> Shown:
+    """The result of `bayesplate.workflow.compare.compare` for a person."""
+    theories = comparison["theories"]
+    tables = [table for one in theories for table in (methods_table(comparison["name"], one), forward_table(one))]
+    told: dict[str, list[str]] = {}
+    for one in theories:
+        for origin in one["coefficients"]:
+            setup = f", setup {origin['setup']}" if len(one["coefficients"]) > 1 else ""
+            told.setdefault(origin["sentence"], []).append(one["theory"] + setup)
+    remarks = [f"coefficients of paper and percentile ({', '.join(where)}): {text}" for text, where in told.items()]
+    return Shown(tuple(tables), (*remarks, METHODS_REMARK), (), comparison["verdict"]["sentence"])
+
+
+def show_modes(report: Mapping[str, Any]) -> Shown:
+    """The report of `bayesplate.workflow.modes.modes` for a person."""
+    tables = tuple(sheet_table(report["name"], setup) for setup in report["setups"])
+    files = f"; sheet to print: {', '.join(report['files'])}" if report["files"] else ""
+    return Shown(tables, (), tuple(report["notes"]), f"Frequencies {report['basis']}{files}")
 
 
 def progress_text(progress: Progress) -> str:

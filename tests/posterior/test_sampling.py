@@ -102,12 +102,6 @@ def test_the_global_random_state_is_neither_used_nor_changed():
         np.random.set_state(kept)  # noqa: NPY002
 
 
-def test_the_chunk_length_does_not_change_the_draws():
-    whole, _ = sample(log_normal_density, MEAN, COVARIANCE, SamplerSettings(seed=1, chunk_steps=100, max_steps=100))
-    parts, _ = sample(log_normal_density, MEAN, COVARIANCE, SamplerSettings(seed=1, chunk_steps=20, max_steps=100))
-    assert whole.draws.tobytes() == parts.draws.tobytes()
-
-
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_value_that_is_no_log_density_is_named_with_its_point(value, capsys):
     def broken(theta):

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import ritz
-from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, setup_of, swapped, with_noise
+from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, swapped, with_noise
 from scipy import stats
 
 from bayesplate.cards import load_prior
 from bayesplate.cards.prior import Density
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.least_squares import weighted_least_squares
-from bayesplate.frequencies.model import setup_model
 from bayesplate.plate.material import moduli
 from bayesplate.posterior.inference import pose
 from bayesplate.posterior.target import Posterior
@@ -236,18 +235,13 @@ def test_exchanging_x_and_y_takes_the_other_poisson_ratio_along(prior):
     nu_yx = float(board.inputs["poisson_xy"].mean * D_y / D_x)
     exchanged = swapped(board)
     right = replace(exchanged, inputs={**exchanged.inputs, "poisson_xy": Quantity.exact(nu_yx)})
-    models = [setup_models(b, D) for b, D in ((board, (D_x, D_y, D_s)), (right, (D_y, D_x, D_s)))]
-    wrong = setup_models(exchanged, (D_y, D_x, D_s))
+    models = [models_at(b, D) for b, D in ((board, (D_x, D_y, D_s)), (right, (D_y, D_x, D_s)))]
+    wrong = models_at(exchanged, (D_y, D_x, D_s))
     first = Posterior(board, prior, models[0], "linear")(point[None, :])
     other = point[[1, 0, 2, 3, 4]][None, :]
     allowed = EXACT * slope(Posterior(board, prior, models[0], "linear"), point[None, :])
     assert_same(Posterior(right, prior, models[1], "linear")(other), first, allowed)
     assert np.all(np.abs(Posterior(exchanged, prior, wrong, "linear")(other) - first) > 1e3 * allowed)
-
-
-def setup_models(board, rigidities):
-    values = board.nominal() | {n: np.asarray(v) for n, v in zip(("D_x", "D_y", "D_s"), rigidities, strict=True)}
-    return tuple(setup_model(setup, values) for setup in board.setups)
 
 
 @pytest.mark.parametrize("factor", [2.0, 0.1])

@@ -1,0 +1,180 @@
+"""What each effect would do to the frequencies, how much of it the constants hide, and which effects look alike.
+
+A fit of three constants absorbs most of any effect: only its visible part, what is left after the constants have been
+fitted again, can ever be traced, and the rest has gone into the constants as a bias. All of it by exact solves at the
+effect's nominal size; first-order columns of the bare plate are wrong by factors here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.effects import EFFECTS, declare, effects_of
+from bayesplate.estimates.refit import Predict, refit
+from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import MODULI, Moduli, moduli
+from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.parameters import N_RIGIDITIES
+from bayesplate.posterior.region import predictor
+
+Floats = NDArray[np.float64]
+
+LOOK_ALIKE = 0.95
+"""|cos| of two visible parts above which no data of this kind can tell two effects apart."""
+
+INVISIBLE = (
+    "A uniform change of thickness, density or side lengths cannot be seen in the frequencies: it goes into the "
+    "constants. Measure these; their uncertainty is carried along."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """One effect at its nominal size.
+
+    Attributes
+    ----------
+    effect : str
+    size : dict of float
+        Value of each parameter, SI.
+    raw : (n_modes,) array, cents
+        Shift of every frequency, constants unchanged.
+    visible : (n_modes,) array, cents
+        What remains after the constants have been fitted again without the effect.
+    bias_percent : dict of float
+        What ignoring the effect does to E_x, E_y, G_xy.
+    sight_cents : float
+        Rms below which a visible part drowns in the noise: 2 noise / sqrt(n).
+    """
+
+    effect: str
+    size: Mapping[str, float]
+    raw: Floats
+    visible: Floats
+    bias_percent: Mapping[str, float]
+    sight_cents: float
+
+    @property
+    def raw_rms(self) -> float:
+        """Rms shift over the modes, cents."""
+        return float(np.sqrt(np.mean(self.raw**2)))
+
+    @property
+    def visible_rms(self) -> float:
+        """Rms over the modes of the visible part, cents."""
+        return float(np.sqrt(np.mean(self.visible**2)))
+
+    @property
+    def is_below_sight(self) -> bool:
+        """Whether this experiment could not see the effect even if it were there."""
+        return bool(self.visible_rms < self.sight_cents)
+
+
+def candidates(board: Board) -> tuple[str, ...]:
+    """Effects that are not declared and can act in at least one setup of the board."""
+    return tuple(
+        name
+        for name, effect in EFFECTS.items()
+        if name not in board.effects and any(not effect.refusal(board, setup) for setup in board.setups)
+    )
+
+
+def signatures(problem: Problem, names: Sequence[str] | None = None) -> tuple[Signature, ...]:
+    """Signatures of effects around the estimate of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    names : sequence of str, optional
+        By default all candidates.
+
+    Returns
+    -------
+    tuple of Signature
+    """
+    predict = constants_predictor(problem)
+    start = problem.centre[:N_RIGIDITIES]
+    base = predict(start[None, :])[0]
+    scales = problem.estimate.scales
+    noise = float(np.sqrt(np.mean(cents(scales) ** 2)))
+    result = []
+    for name in candidates(problem.board) if names is None else names:
+        shifted, size = frequencies_with(problem, name)
+        fitted = refit(predict, shifted, scales, start)
+        result.append(
+            Signature(
+                effect=name,
+                size=size,
+                raw=cents(shifted - base),
+                visible=cents(shifted - predict(fitted[None, :])[0]),
+                bias_percent=_bias(problem, start, fitted),
+                sight_cents=2.0 * noise / np.sqrt(base.size),
+            )
+        )
+    return tuple(result)
+
+
+def constants_predictor(problem: Problem) -> Predict:
+    """ln f of all modes as a function of ln D_x, ln D_y, ln D_s alone, inputs as at the estimate."""
+    predict_all = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
+    inputs = problem.centre[problem.parameters.fitted_columns][N_RIGIDITIES:]
+
+    def predict(x: Floats) -> Floats:
+        return predict_all(np.concatenate([x, np.tile(inputs, (len(x), 1))], axis=1))
+
+    return predict
+
+
+def frequencies_with(problem: Problem, name: str) -> tuple[Floats, dict[str, float]]:
+    """ln f of all modes with one more effect at its nominal size, by full solves; and that size."""
+    board = declare(replace(problem.board, effects=(*problem.board.effects, name)))
+    at_estimate = problem.parameters.values(problem.centre[None, :])
+    values = {key: np.asarray(np.ravel(value)[0]) for key, value in at_estimate.items()}
+    size: dict[str, float] = {}
+    for setup in board.setups:
+        for effect in effects_of(board, setup):
+            if effect.name == name:
+                nominal = {effect.key(p.name): p.nominal for p in effect.parameters()}
+                size |= nominal
+    for key, quantity in board.inputs.items():
+        values.setdefault(key, np.asarray(quantity.mean))
+    values |= {key: np.asarray(value) for key, value in size.items()}
+    parts = [
+        setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0] for setup in board.setups
+    ]
+    return np.concatenate(parts), size
+
+
+def look_alikes(found: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
+    """For each effect, the others whose visible part has a |cos| above `LOOK_ALIKE` with its own."""
+    result = {}
+    for one in found:
+        result[one.effect] = tuple(
+            other.effect for other in found if other is not one and abs(cosine(one, other)) > LOOK_ALIKE
+        )
+    return result
+
+
+def cosine(one: Signature, other: Signature) -> float:
+    """Cosine of the visible parts of two effects; 0 if one has none."""
+    norms = float(np.linalg.norm(one.visible) * np.linalg.norm(other.visible))
+    return float(one.visible @ other.visible) / norms if norms > 0 else 0.0
+
+
+def _bias(problem: Problem, true: Floats, fitted: Floats) -> dict[str, float]:
+    values = problem.parameters.values(problem.centre[None, :])
+    thickness, nu_xy = values["thickness"], values["poisson_xy"]
+
+    def constants(x: Floats) -> Moduli:
+        D_x, D_y, D_s = np.exp(x)
+        return moduli(D_x, D_y, D_s, thickness, nu_xy)
+
+    before, after = constants(true), constants(fitted)
+    return {name: 100.0 * float(np.ravel(b / a)[0] - 1.0) for name, a, b in zip(MODULI, before, after, strict=True)}

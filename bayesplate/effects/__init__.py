@@ -1,0 +1,96 @@
+"""What an ideal plate lacks: one protocol (`base.py`), one file an effect, and the list of them here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bayesplate.effects.air_loading import AirLoading
+from bayesplate.effects.attached_mass import AttachedMass
+from bayesplate.effects.base import Effect, EffectParameter
+from bayesplate.effects.clamp_rotation import ClampRotation
+from bayesplate.effects.clamp_translation import ClampTranslation
+from bayesplate.effects.density_gradient import DensityGradient
+from bayesplate.effects.grain_angle import GrainAngle
+from bayesplate.effects.membrane_tension import MembraneTension
+from bayesplate.effects.outline_profile import OutlineProfile
+from bayesplate.effects.poisson_ratio import PoissonRatio
+from bayesplate.effects.support_mass import SupportMass
+from bayesplate.effects.support_stiffness import SupportStiffness
+from bayesplate.effects.thickness_profile import ThicknessProfile
+from bayesplate.effects.transverse_shear import TransverseShear
+from bayesplate.errors import Fault
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Setup
+
+EFFECTS: dict[str, type[Effect]] = {
+    effect.name: effect
+    for effect in (
+        TransverseShear,
+        AttachedMass,
+        ClampRotation,
+        ClampTranslation,
+        MembraneTension,
+        SupportMass,
+        SupportStiffness,
+        AirLoading,
+        ThicknessProfile,
+        OutlineProfile,
+        DensityGradient,
+        GrainAngle,
+        PoissonRatio,
+    )
+}
+"""Every effect of the library by name."""
+
+__all__ = [
+    "EFFECTS",
+    "Effect",
+    "EffectParameter",
+    "declare",
+    "effect_faults",
+    "effects_of",
+    "implied_effects",
+    "is_effect_parameter",
+]
+
+
+def is_effect_parameter(name: str) -> bool:
+    """Whether a board's input of that name is a parameter of an effect."""
+    return name.split(".")[0] in EFFECTS
+
+
+def effects_of(board: Board, setup: Setup) -> tuple[Effect, ...]:
+    """The declared effects as they act in a setup, in the order of their declaration."""
+    return tuple(EFFECTS[name].of(board, setup) for name in board.effects if not EFFECTS[name].refusal(board, setup))
+
+
+def implied_effects(board: Board) -> tuple[str, ...]:
+    """Effects that the card declares by what it states, in the setups where they can act."""
+    return tuple(
+        name
+        for name, effect in EFFECTS.items()
+        if effect.is_implied(board) and any(not effect.refusal(board, setup) for setup in board.setups)
+    )
+
+
+def declare(board: Board) -> Board:
+    """A board whose inputs hold the parameters of its declared effects, so that they are known or marginalised."""
+    inputs = dict(board.inputs)
+    for setup in board.setups:
+        for effect in effects_of(board, setup):
+            inputs |= {effect.key(parameter.name): parameter.prior for parameter in effect.parameters()}
+    return replace(board, inputs=inputs)
+
+
+def effect_faults(board: Board) -> list[Fault]:
+    """Declared effects that act in no setup of the board, with the reasons."""
+    faults = []
+    for name in board.effects:
+        place = f"{board.name}.toml effects"
+        if name not in EFFECTS:
+            faults.append(Fault(place, f"one of {', '.join(EFFECTS)}", name))
+            continue
+        reasons = [reason for setup in board.setups if (reason := EFFECTS[name].refusal(board, setup))]
+        if len(reasons) == len(board.setups):
+            faults.append(Fault(place, f"a board on which {name} can act", reasons[0]))
+    return faults

@@ -1,0 +1,96 @@
+"""Things that may be fixed to a board: what they weigh, how they resist turning, and where they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesplate.effects.base import Floats
+from bayesplate.plate.board import Board, density, vibrating_lengths
+from bayesplate.plate.setup import AttachedItem, Setup
+from bayesplate.quantities import Quantity
+
+Fractions = tuple[tuple[float, float], ...]
+
+_PRIORS = {
+    "accelerometer": (Quantity.from_median(1.2e-3, 2.5), "log-normal: accelerometers for light boards weigh 0.2-5 g"),
+    "exciter": (Quantity.from_median(50e-3, 1.6), "log-normal: voice-coil exciters weigh 20-120 g"),
+    "shaker": (Quantity.from_median(10e-3, 2.0), "log-normal: force sensor, stinger and armature move 3-40 g"),
+    "weight": (Quantity.from_median(5e-3, 3.0), "log-normal: a weight of 0.5-50 g"),
+}
+_UNKNOWN_SHARE = 0.02
+_UNKNOWN_SOURCE = "half-normal: something small that was forgotten, two percent of the board"
+
+_SOLID_DENSITY = 5000.0
+_GYRATION = 1.0 / 16.0 + 1.0 / 3.0
+"""Of a cylinder as high as wide, about a diameter of its base, over the square of that diameter."""
+
+_GRID = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+@dataclass(frozen=True)
+class Item:
+    """One attached thing.
+
+    Attributes
+    ----------
+    mass : Quantity, kg
+    source : str
+        Where the mass comes from.
+    places : tuple of (float, float)
+        As fractions of the vibrating sides; several are those over which it roved.
+    radius : (float, float)
+        Of its base, over the two sides; 0 if it does not turn with the board, as on a stinger.
+    """
+
+    mass: Quantity
+    source: str
+    places: Fractions
+    radius: tuple[float, float] = (0.0, 0.0)
+
+
+def base_diameter(mass: Floats | float) -> Floats:
+    """Diameter, m, of a compact solid of that mass."""
+    return np.asarray(np.cbrt(4.0 * mass / (np.pi * _SOLID_DENSITY)))
+
+
+def rotary_inertia(mass: Floats) -> Floats:
+    """Rotary inertia, kg m^2, of a compact solid of that mass about a line in its base."""
+    return np.asarray(mass * _GYRATION * base_diameter(mass) ** 2)
+
+
+def item_on_board(board: Board, setup: Setup, item: AttachedItem) -> Item:
+    """A thing of the card: its mass, or the prior of its kind, and its places on the vibrating part."""
+    mass, source = (item.mass, "the card") if item.mass is not None else _PRIORS[item.kind]
+    nominal = board.nominal()
+    sides = vibrating_lengths(nominal, setup)
+    covered = [nominal[setup.input_name(e)] if e in setup.clamped else 0.0 for e in ("x0", "y0")]
+    places = [
+        tuple(float(np.clip((p - c) / side, 0.0, 1.0)) for p, c, side in zip(place, covered, sides, strict=True))
+        for place in item.places
+    ]
+    radius = 0.0 if item.kind == "shaker" else 0.5 * float(base_diameter(mass.median))
+    fractions = tuple((along_x, along_y) for along_x, along_y in places)
+    return Item(mass, source, fractions, (radius / float(sides[0]), radius / float(sides[1])))
+
+
+def forgotten_items(board: Board, setup: Setup) -> list[Item]:
+    """One small thing at each of the places where something forgotten might be."""
+    mass = Quantity.from_mean(0.0, _UNKNOWN_SHARE * board_mass(board), "normal", lower=0.0)
+    return [Item(mass, _UNKNOWN_SOURCE, (place,)) for place in _likely_places(setup)]
+
+
+def board_mass(board: Board) -> float:
+    """Mass of the whole board at its nominal sizes, kg."""
+    values = board.nominal()
+    return float(density(values) * values["length_x"] * values["length_y"] * values["thickness"])
+
+
+def _likely_places(setup: Setup) -> Fractions:
+    """Places on a coarse grid, without those beside held edges and the mirror images of others."""
+    along = []
+    for low, high in (setup.ends_x, setup.ends_y):
+        inside = [p for p in _GRID if (p > 0.1 or low == "free") and (p < 0.9 or high == "free")]
+        along.append([p for p in inside if p <= 0.5] if low == high else inside)
+    return tuple((x, y) for x in along[0] for y in along[1])

@@ -1,0 +1,65 @@
+"""Clamp rotation: a clamp that lets the board turn a little where it should hold it level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from bayesplate.effects.base import Effect, EffectParameter, Floats, Release, Scope
+from bayesplate.effects.clamps import ClampedEnds, clamped_ends, compliance_refusal, spring_weights
+from bayesplate.modes.line import Line
+from bayesplate.modes.plate import EdgeTurn, Term
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.setup import Setup
+from bayesplate.quantities import Quantity
+
+STIFFEST = 1e-5
+"""Compliance that is left where the parameter is 0: such a clamp is ideal to a twentieth of a cent."""
+
+_PRIOR = Quantity.from_mean(0.0, 0.04, "normal", lower=0.0)
+_SOURCE = (
+    "half-normal: the board behaves as if it were longer by this fraction at each clamp, and a clamp on wood adds one "
+    "to three thicknesses; k_R L / D = 30 is a usual clamp"
+)
+
+
+@dataclass(frozen=True)
+class ClampRotation(Effect):
+    """Springs against turning in place of the slope that clamped edges hold; all of one stiffness k_R.
+
+    The parameter is the compliance D / (k_R L), 0 for an ideal clamp, with D and L along x where an edge across x is
+    clamped, otherwise along y. The other edges' compliance follows from the same k_R.
+
+    Attributes
+    ----------
+    clamped : ClampedEnds
+    """
+
+    clamped: ClampedEnds = ((False, False), (False, False))
+
+    name: ClassVar[str] = "clamp_rotation"
+    scope: ClassVar[Scope] = "setup"
+    sentence: ClassVar[str] = "The clamp lets the board turn a little, as if the board were longer than it is."
+    releases: ClassVar[Release] = "slope"
+
+    @classmethod
+    def of(cls, board: Board, setup: Setup) -> ClampRotation:
+        """The effect on all clamped edges of the setup."""
+        return cls(setup.name, clamped_ends(setup))
+
+    @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """Refused where no edge is clamped."""
+        return compliance_refusal(setup)
+
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """The compliance D / (k_R L)."""
+        return (EffectParameter("compliance", "1", _PRIOR, _SOURCE),)
+
+    def stiffness(self, x: Line, y: Line) -> tuple[Term, ...]:
+        """The squared turning along the clamped edges of each side."""
+        return tuple(EdgeTurn(axis, at) for axis, at in enumerate(self.clamped) if any(at))
+
+    def stiffness_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
+        """k_R over rho h and the third power of the side."""
+        return spring_weights(self.clamped, self.value(values, "compliance"), STIFFEST, 3, values, setup)

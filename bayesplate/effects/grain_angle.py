@@ -1,0 +1,76 @@
+"""Grain angle: the grain runs at an angle to the long side of the board."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesplate.effects.base import Effect, EffectParameter, Scope
+from bayesplate.modes.plate import THIN_TERMS, Weights
+from bayesplate.plate.board import Board, Values, vibrating_lengths
+from bayesplate.plate.setup import Setup
+from bayesplate.quantities import Quantity
+
+DEGREE = np.pi / 180.0
+DEFAULT_ANGLE = Quantity.from_mean(0.0, 2.0 * DEGREE, "normal", lower=0.0, upper=6.0 * DEGREE)
+_SOURCE = (
+    "half-normal of 2 degrees up to 6: boards are sawn along the grain by eye; a rectangle rings alike for either sign"
+)
+
+
+@dataclass(frozen=True)
+class GrainAngle(Effect):
+    """Stiffness turned by an angle; D_x, D_y, D_s and nu_xy stay those along and across the grain.
+
+    All terms keep their form, with weights that are functions of the angle; the coupling of bending with twist (D_16,
+    D_26), and of the two shear strains, joins them.
+
+    References
+    ----------
+    Mascia and Lahr (2006): Q' = T^-1 Q R T R^-1.
+    """
+
+    name: ClassVar[str] = "grain_angle"
+    scope: ClassVar[Scope] = "board"
+    sentence: ClassVar[str] = "The grain runs at an angle to the sides, so bending and twist are no longer separate."
+    turns_grain: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, board: Board, setup: Setup) -> GrainAngle:
+        """The effect; it is the same in every setup."""
+        return cls()
+
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """Angle from the side x to the grain."""
+        return (EffectParameter("angle", "rad", DEFAULT_ANGLE, _SOURCE),)
+
+    def keeps_symmetry(self) -> tuple[bool, bool]:
+        """Neither half mirrors the other; only half a turn leaves the plate as it was."""
+        return False, False
+
+    def reweigh(self, base: Weights, values: Values, setup: Setup) -> Weights:
+        """Weights of the plate's own terms turned by the angle, then those of the coupling terms."""
+        length_x, length_y = vibrating_lengths(values, setup)
+        ratio = length_x / length_y
+        cosine, sine = np.cos(self.value(values, "angle")), np.sin(self.value(values, "angle"))
+        cc, ss, cs = cosine**2, sine**2, cosine * sine
+        xx, yy, mix, xy = base.stiffness[:, : len(THIN_TERMS)].T
+        # Rigidities over m L_x L_y, with D_66 = D_s / 4.
+        d_11, d_22, d_12, d_66 = xx * ratio**2, yy / ratio**2, mix, xy / 4.0
+        both = d_12 + 2.0 * d_66
+        left, right = d_11 - both, both - d_22
+        turned = [
+            (d_11 * cc**2 + 2.0 * both * cs**2 + d_22 * ss**2) / ratio**2,
+            (d_11 * ss**2 + 2.0 * both * cs**2 + d_22 * cc**2) * ratio**2,
+            d_12 + (left - right) * cs**2,
+            4.0 * (d_66 + (left - right) * cs**2),
+        ]
+        coupling = [cs * (left * cc + right * ss) / ratio, cs * (left * ss + right * cc) * ratio]
+        if base.stiffness.shape[1] > len(THIN_TERMS):
+            shear_x, shear_y = base.stiffness[:, len(THIN_TERMS) :].T
+            s_x, s_y = shear_x * ratio, shear_y / ratio
+            turned += [(s_x * cc + s_y * ss) / ratio, (s_x * ss + s_y * cc) * ratio]
+            coupling.append((s_x - s_y) * cs)
+        return Weights(np.stack(np.broadcast_arrays(*turned, *coupling), axis=-1), base.mass)

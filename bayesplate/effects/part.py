@@ -1,0 +1,47 @@
+"""Which part of the whole board vibrates: the strip that each side's clamps leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Setup
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Part:
+    """The vibrating part of one side, by nominal sizes.
+
+    Attributes
+    ----------
+    start, share : float
+        Where it begins and how long it is, as fractions of the whole side.
+    """
+
+    start: float = 0.0
+    share: float = 1.0
+
+    @property
+    def middle(self) -> float:
+        """Its middle, as a fraction of the whole side, counted from the middle of that."""
+        return self.start + 0.5 * self.share - 0.5
+
+    def on_whole(self, fraction: Floats) -> Floats:
+        """Fractions of the whole side from fractions of the vibrating one."""
+        return self.start + self.share * fraction
+
+
+WHOLE = Part()
+
+
+def vibrating_part(board: Board, setup: Setup, axis: str) -> Part:
+    """The part of a side ("x" or "y") that the clamps of a setup leave."""
+    covered = {edge: quantity.mean for edge, quantity in setup.clamped.items()}
+    low, high = covered.get(f"{axis}0", 0.0), covered.get(f"{axis}1", 0.0)
+    side = board.inputs[f"length_{axis}"].mean
+    return Part(low / side, (side - low - high) / side)

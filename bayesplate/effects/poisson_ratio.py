@@ -1,0 +1,51 @@
+"""Poisson ratio: nu_xy was taken from a table, and this board's own differs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from bayesplate.effects.base import Effect, EffectParameter, Scope
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Setup
+from bayesplate.quantities import Quantity
+
+FREE_POISSON = Quantity.from_mean(0.4, 0.15, "normal", lower=0.0, upper=0.9)
+_SOURCE = (
+    "normal between 0 and 0.9: published nu_LR and nu_LT of woods lie between 0.3 and 0.6; positive energy, "
+    "nu_xy^2 < E_x / E_y, holds besides"
+)
+
+
+@dataclass(frozen=True)
+class PoissonRatio(Effect):
+    """The board's own nu_xy in place of the card's number.
+
+    Its parameter is the board's input `poisson_xy` itself: once declared, every use of that input, from the weight of
+    the mixed term to E from D, takes the free value.
+    """
+
+    name: ClassVar[str] = "poisson_ratio"
+    scope: ClassVar[Scope] = "board"
+    sentence: ClassVar[str] = "This wood narrows under a pull by another share than the table says."
+
+    @classmethod
+    def of(cls, board: Board, setup: Setup) -> PoissonRatio:
+        """The effect; it is the same in every setup."""
+        return cls()
+
+    @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """Only a ratio that the card gives as exact can be set free."""
+        stated = board.inputs["poisson_xy"]
+        if not stated.is_exact and stated != FREE_POISSON:
+            return f"poisson_xy is already uncertain ({stated.mean:g} +- {stated.sd:g}) and so part of every fit"
+        return ""
+
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """The Poisson ratio nu_xy."""
+        return (EffectParameter("nu_xy", "1", FREE_POISSON, _SOURCE),)
+
+    def key(self, parameter: str) -> str:
+        """The board's own input, so that declaring the effect replaces the card's number."""
+        return "poisson_xy"

@@ -1,0 +1,223 @@
+"""Where the paper's coefficients a, b, c come from: one solve, a training of 25 plates, or a printed table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import CoefficientCard, load_coefficients
+from bayesplate.errors import Fault, InputError
+from bayesplate.frequencies.columns import columns
+from bayesplate.frequencies.model import SetupModel
+from bayesplate.labels import Label
+from bayesplate.modes.naming import find
+from bayesplate.modes.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
+from bayesplate.plate.board import Values, vibrating_lengths
+from bayesplate.plate.material import moduli
+from bayesplate.plate.setup import Setup
+
+CoefficientSource = Literal["sensitivity", "training", "published"]
+SOURCES: tuple[CoefficientSource, ...] = get_args(CoefficientSource)
+_GPA = 1e9
+
+
+@dataclass(frozen=True, eq=False)
+class CoefficientRows:
+    """Coefficients of a setup's labelled modes, in the order of its readings.
+
+    Attributes
+    ----------
+    source : "sensitivity", "training" or "published"
+    coefficients : (n_modes, 3) array
+        Columns a, b, c.
+    rest : (n_modes,) array, N m
+        What of omega^2 / lambda the rigidities do not make, to be taken off before the fit; zero except by sensitivity
+        on a plate with effects. A training and a printed table have their plates' shear inside a, b and c.
+    aspect_ratio : float
+        L_x / L_y that they are made for.
+    theory : str
+        Of the plates behind them.
+    sentence : str
+        Where they come from.
+    r_squared : dict of float
+        By label, where a plane was fitted.
+    """
+
+    source: CoefficientSource
+    coefficients: NDArray[np.float64]
+    rest: NDArray[np.float64]
+    aspect_ratio: float
+    theory: str
+    sentence: str
+    r_squared: Mapping[Label, float]
+
+
+def coefficient_rows(
+    board_name: str, model: SetupModel, values: Values, source: CoefficientSource | None = None
+) -> CoefficientRows:
+    """Coefficients of a setup's readings.
+
+    Parameters
+    ----------
+    board_name : str
+        For messages.
+    model : SetupModel
+        Solved at `values`.
+    values : dict of float
+        Where the modes' own coefficients are taken, and the middle of a training without a printed one.
+    source : "sensitivity", "training" or "published", optional
+        By default the published table where the setup names one, else the sensitivity of one solve.
+
+    Returns
+    -------
+    CoefficientRows
+
+    Raises
+    ------
+    InputError
+        If a table is asked for and none is named, or the named one does not fit the setup.
+    NotIdentifiableError
+        If a mode is recognised in fewer than three training plates.
+    """
+    if source is None:
+        source = "sensitivity" if model.setup.published_coefficients is None else "published"
+    if source == "sensitivity":
+        return _by_sensitivity(model, values)
+    if source == "training":
+        return _by_training(model, values)
+    return _published(board_name, model, values)
+
+
+def _by_sensitivity(model: SetupModel, values: Values) -> CoefficientRows:
+    found = columns(model.system, values, model.linear.stiffness)
+    ratio = aspect_ratio_of(values, model.setup)
+    theory = model.system.theory
+    sentence = f"energy shares of one solve at the weighted least-squares estimate, {theory} plate, ratio {ratio:.4g}"
+    if found.rest.any():
+        sentence += "; what the effects give is taken off first"
+    return CoefficientRows("sensitivity", found.coefficients, found.rest, ratio, theory, sentence, {})
+
+
+def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
+    setup, theory = model.setup, model.system.theory
+    ratio = aspect_ratio_of(values, setup)
+    centre, origin = _centre_of_training(model, values)
+    beams = [reading.beams for reading in setup.readings]
+    trained = train(setup.ends_x, setup.ends_y, ratio, _thickness_ratio(values, setup), centre, theory, beams).modes
+    rows = np.array([[trained[b].a, trained[b].b, trained[b].c] for b in beams])
+    counts = [trained[b].n_plates for b in beams]
+    sentence = (
+        f"non-negative planes through {min(counts)} to {max(counts)} of {len(FACTORS) ** 2} computed plates, {theory}, "
+        f"ratio {ratio:.4g}, around E_x {centre.E_x / _GPA:.3g}, E_y {centre.E_y / _GPA:.3g}, "
+        f"G_xy {centre.G_xy / _GPA:.3g} GPa ({origin})"
+    )
+    r_squared = {reading.label: trained[reading.beams].r_squared for reading in setup.readings}
+    return CoefficientRows("training", rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
+
+
+def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingConstants, str]:
+    """Plate in the middle of the training: that of the named table, else the estimate itself."""
+    setup = model.setup
+    if setup.published_coefficients is not None:
+        printed = _constants_of(load_coefficients(setup.published_coefficients))
+        if printed is not None and (not _has_shear(model) or (printed.G_xz and printed.G_yz)):
+            return printed, f"those of {setup.published_coefficients}"
+    E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    shear = {name: float(values[f"transverse_shear.{name}"]) for name in ("G_xz", "G_yz") if _has_shear(model)}
+    own = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
+    return own, "the weighted least-squares estimate"
+
+
+def _has_shear(model: SetupModel) -> bool:
+    return model.system.theory == "shear-flexible"
+
+
+def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
+    """Material of a table's training plates, Pa; None if the table does not state it."""
+    t = card.training
+    if t.E_x_gpa is None or t.E_y_gpa is None or t.G_xy_gpa is None or t.nu_xy is None:
+        return None
+    G_xz, G_yz = (None if G is None else G * _GPA for G in (t.G_xz_gpa, t.G_yz_gpa))
+    return TrainingConstants(t.E_x_gpa * _GPA, t.E_y_gpa * _GPA, t.G_xy_gpa * _GPA, t.nu_xy, G_xz, G_yz)
+
+
+def _published(board_name: str, model: SetupModel, values: Values) -> CoefficientRows:
+    setup = model.setup
+    card = fitting_table(board_name, setup, aspect_ratio_of(values, setup))
+    rows = np.array([card.table[label] for label in setup.labels])
+    distances = _distances(card, setup, rows, _thickness_ratio(values, setup))
+    theory = min(distances.items(), key=lambda item: item[1])[0] if distances else "not stated"
+    sentence = f"printed table {card.name}: {card.title}"
+    if distances:
+        told = " and ".join(f"{rms:.1f} cents from {name} plates" for name, rms in distances.items())
+        sentence += f"; at its own material it lies {told} solved here, so it holds for the {theory} plate"
+    r_squared = {label: r for label, r in card.r_squared.items() if label in setup.labels}
+    return CoefficientRows("published", rows, np.zeros(len(rows)), card.aspect_ratio, theory, sentence, r_squared)
+
+
+def fitting_table(board_name: str, setup: Setup, aspect_ratio: float) -> CoefficientCard:
+    """The table that a setup names.
+
+    Raises
+    ------
+    InputError
+        If it names none, or one that is not of the setup's edges, aspect ratio and labels.
+    """
+    place = f"{board_name} [setup] published_coefficients"
+    if setup.published_coefficients is None:
+        raise InputError(Fault(place, "the name of a table", "nothing", "take --coefficients sensitivity or training"))
+    card = load_coefficients(setup.published_coefficients)
+    faults = []
+    if card.edges.words != setup.edges:
+        faults.append(
+            Fault(place, f"a table for the edges {_words(setup.edges)}", f"{card.name} for {_words(card.edges.words)}")
+        )
+    if abs(card.aspect_ratio / aspect_ratio - 1.0) > 0.01:
+        faults.append(Fault(place, f"a table of aspect ratio {aspect_ratio:.4g}", f"{card.aspect_ratio:.4g}"))
+    missing = [str(label) for label in setup.labels if label not in card.table]
+    if missing:
+        known = ", ".join(str(label) for label in card.table)
+        faults.append(Fault(place, f"a table with the labels {', '.join(missing)}", f"{card.name} with {known}"))
+    if faults:
+        raise InputError(faults)
+    return card
+
+
+def _distances(
+    card: CoefficientCard, setup: Setup, rows: NDArray[np.float64], thickness_ratio: float
+) -> dict[Theory, float]:
+    """How far a table's frequencies lie from plates of each theory in the middle of its training: rms, cents."""
+    constants = _constants_of(card)
+    if constants is None:
+        return {}
+    own = card.training
+    if own.thickness_mm is not None and own.length_x_mm is not None:
+        thickness_ratio = own.thickness_mm / own.length_x_mm
+    theories: tuple[Theory, ...] = ("thin",) if constants.G_xz is None or constants.G_yz is None else get_args(Theory)
+    beams = [reading.beams for reading in setup.readings]
+    distances: dict[Theory, float] = {}
+    for theory in theories:
+        weights = training_weights(card.aspect_ratio, thickness_ratio, constants, theory)
+        p, q = weights.stiffness[0] * card.aspect_ratio**2, weights.stiffness[1] / card.aspect_ratio**2
+        solved = find(training_matrices(setup.ends_x, setup.ends_y, theory), weights, beams)
+        ratios = rows @ np.array([p, q, 1.0]) / np.array([solved[b].eigenvalue for b in beams])
+        distances[theory] = float(np.sqrt(np.mean((600.0 * np.log2(ratios)) ** 2)))
+    return distances
+
+
+def aspect_ratio_of(values: Values, setup: Setup) -> float:
+    """L_x / L_y of the part of a board that vibrates."""
+    length_x, length_y = vibrating_lengths(values, setup)
+    return float(length_x / length_y)
+
+
+def _thickness_ratio(values: Values, setup: Setup) -> float:
+    return float(values["thickness"] / vibrating_lengths(values, setup)[0])
+
+
+def _words(edges: Mapping[str, str]) -> str:
+    return ", ".join(f"{edge} {word}" for edge, word in edges.items())

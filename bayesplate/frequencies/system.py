@@ -1,0 +1,113 @@
+"""A setup with its effects: which plate it is, and what every term of it weighs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from bayesplate.effects import effects_of
+from bayesplate.effects.base import Effect, Theory
+from bayesplate.frequencies.fabric import fabric_of, over_fields
+from bayesplate.frequencies.shear_terms import shear_term_weights
+from bayesplate.frequencies.terms import term_weights
+from bayesplate.modes.hermite import Hold, Holds
+from bayesplate.modes.line import line
+from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
+from bayesplate.modes.plate import PlateMatrices, Weights, assemble, thin_masses, thin_terms
+from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, assemble_shear_flexible
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.setup import Ends, Setup
+
+
+@dataclass(frozen=True)
+class System:
+    """A setup and the effects that act in it.
+
+    Attributes
+    ----------
+    setup : Setup
+    effects : tuple of Effect
+    """
+
+    setup: Setup
+    effects: tuple[Effect, ...] = ()
+
+    @property
+    def theory(self) -> Theory:
+        """ "thin", or "shear-flexible" if an effect asks for it."""
+        return "shear-flexible" if any(e.theory == "shear-flexible" for e in self.effects) else "thin"
+
+    def plate(self, values: Values) -> PlateMatrices:
+        """Matrices on the production mesh for these values.
+
+        Parameters
+        ----------
+        values : dict of float
+            D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
+        """
+        per_side = SHEAR_ELEMENTS_PER_SIDE if self.theory == "shear-flexible" else ELEMENTS_PER_SIDE
+        elements = mesh(term_weights(values, self.setup).at(0), per_side)
+        return _plate(self.setup.ends_x, self.setup.ends_y, self.theory, self.effects, *elements)
+
+    def weights(self, values: Values) -> Weights:
+        """What every term weighs: (n_draws, n_terms) and (n_draws, n_masses) arrays."""
+        for effect in self.effects:
+            values = effect.adjusted(values)
+        base = self._own_weights(values)
+        for effect in self.effects:
+            base = effect.reweigh(base, values, self.setup)
+        base = over_fields(base, self.effects, self.theory, values)
+        stiffness = [w for e in self.effects for w in e.stiffness_weights(values, self.setup)]
+        masses = [w for e in self.effects for w in e.mass_weights(values, self.setup)]
+        if not stiffness and not masses:
+            return base
+        shape = np.broadcast_shapes(base.stiffness.shape[:1], *(np.shape(w) for w in (*stiffness, *masses)))
+        joined = [
+            np.column_stack(
+                [np.broadcast_to(own, shape + own.shape[1:]), *(np.broadcast_to(w, shape) for w in further)]
+            )
+            for own, further in zip(base, (stiffness, masses), strict=True)
+        ]
+        return Weights(*joined)
+
+    def _own_weights(self, values: Values) -> Weights:
+        for effect in self.effects:
+            if effect.theory == "shear-flexible":
+                shear = {name: effect.value(values, name) for name in ("G_xz", "G_yz")}
+                return shear_term_weights({**values, **shear}, self.setup)
+        return term_weights(values, self.setup)
+
+
+def system_of(board: Board, setup: Setup) -> System:
+    """A setup of a board with the board's declared effects."""
+    return System(setup, effects_of(board, setup))
+
+
+@lru_cache(maxsize=16)
+def _plate(
+    ends_x: Ends, ends_y: Ends, theory: Theory, effects: tuple[Effect, ...], n_x: int, n_y: int
+) -> PlateMatrices:
+    is_sheared = theory == "shear-flexible"
+    symmetry = [effect.keeps_symmetry() for effect in effects]
+    x = line(ends_x, n_x, is_sheared, all(along_x for along_x, _ in symmetry), _held(ends_x, effects))
+    y = line(ends_y, n_y, is_sheared, all(along_y for _, along_y in symmetry), _held(ends_y, effects))
+    stiffness = tuple(term for effect in effects for term in effect.stiffness(x, y))
+    masses = tuple(term for effect in effects for term in effect.masses(x, y))
+    projected = tuple(term for effect in effects for term in effect.projected_masses())
+    fabric = fabric_of(effects)
+    if is_sheared:
+        return assemble_shear_flexible(x, y, stiffness, masses, projected, fabric)
+    own_stiffness, own_mass = thin_terms(x, y, fabric), thin_masses(x, y, fabric)
+    return assemble(x, y, (*own_stiffness, *stiffness), (*own_mass, *masses), projected)
+
+
+def _held(ends: Ends, effects: tuple[Effect, ...]) -> Holds:
+    """What the ends still hold where effects have released clamped ones."""
+    released = {effect.releases for effect in effects} - {""}
+    left: Hold = "clamped"
+    if released:
+        left = "free" if len(released) == 2 else "supported" if released == {"slope"} else "guided"
+    low, high = (left if end == "clamped" else end for end in ends)
+    return low, high

@@ -1,0 +1,207 @@
+"""The sheet of Chladni figures: where sand gathers on a board at each of its modes, on one page to print."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.results.sheet import CombinedMode, Sheet, SheetMode, points
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+A4 = (8.27, 11.69)
+"""Width and height of the page, inches."""
+
+_MARGIN = 0.55
+_HEAD, _FOOT = 0.95, 0.85
+_BETWEEN = 0.62
+_CAPTION = 0.42
+_GAP = 0.30
+_BAND = 0.055
+_LONGEST_HEADING = 62
+_MOST_COLUMNS = 4
+_N_COMBINED = 3
+_SAND, _LOW = "black", "0.86"
+_STIFFNESS = {
+    "E_x": "stiffness along the grain, E_x",
+    "E_y": "stiffness across it, E_y",
+    "G_xy": "shear stiffness, G_xy",
+}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the page is divided: columns and rows of modes, and the size of a panel and of its cell, inches."""
+
+    n_columns: int
+    n_rows: int
+    panel: tuple[float, float]
+    cell: tuple[float, float]
+
+
+def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
+    """The division of the page that makes the panels largest.
+
+    Parameters
+    ----------
+    n_modes : int
+    aspect_ratio : float
+        Length of a board over its width.
+    has_combined : bool
+        Whether a row of combined modes comes last.
+
+    Returns
+    -------
+    Layout
+    """
+    width = A4[0] - 2 * _MARGIN
+    height = A4[1] - _HEAD - _FOOT - (_BETWEEN if has_combined else 0.0)
+    found = []
+    for n_columns in range(3, _MOST_COLUMNS + 1):
+        n_rows = -(-n_modes // n_columns)
+        cell = width / n_columns, height / (n_rows + has_combined)
+        side = min(cell[0] - _GAP, (cell[1] - _CAPTION - _GAP) * aspect_ratio)
+        found.append(Layout(n_columns, n_rows, (side, side / aspect_ratio), cell))
+    return max(found, key=lambda one: one.panel[0])
+
+
+def chladni_sheet(sheet: Sheet) -> Figure:
+    """Draw a sheet.
+
+    Parameters
+    ----------
+    sheet : Sheet
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A4 upright, one panel a mode in the order of frequency, then the combined modes; no state of pyplot is touched.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=A4)
+    plan = layout(len(sheet.modes), sheet.aspect_ratio, has_combined=bool(sheet.combined))
+    heading = f"Chladni figures: {sheet.title}"
+    size = min(14.0, 14.0 * _LONGEST_HEADING / len(heading))
+    _text(figure, A4[0] / 2, A4[1] - 0.45, heading, fontsize=size, weight="bold")
+    held = f"setup: {sheet.setup}; {sheet.theory} plate; Hz {sheet.basis}"
+    _text(figure, A4[0] / 2, A4[1] - 0.72, held, fontsize=9)
+    top = A4[1] - _HEAD
+    for i, mode in enumerate(sheet.modes):
+        row, column = divmod(i, plan.n_columns)
+        in_row = min(plan.n_columns, len(sheet.modes) - row * plan.n_columns)
+        panel = _panel(figure, plan, _left(plan, column, in_row), top - row * plan.cell[1], sheet)
+        _draw_sand(panel, mode.shape)
+        _caption(panel, *_mode_caption(mode))
+    if sheet.combined:
+        _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
+    _legend(figure, sheet)
+    return figure
+
+
+def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> None:
+    """The last row: the combined modes under their heading."""
+    which = "measured" if any(mode.measured_hz is not None for mode in sheet.modes) else "lowest named"
+    told = f"Mixtures of the {which} modes that would each answer to one stiffness alone"
+    _text(figure, A4[0] / 2, top - 0.10, told, fontsize=9, weight="bold")
+    told = "No board rings like this: the mixtures show where each stiffness is at work (darker: moves more)."
+    _text(figure, A4[0] / 2, top - 0.28, told, fontsize=8)
+    wide = replace(plan, cell=((A4[0] - 2 * _MARGIN) / _N_COMBINED, plan.cell[1]))
+    for column, one in enumerate(sheet.combined):
+        panel = _panel(figure, wide, _left(wide, column, len(sheet.combined)), top - _BETWEEN + _GAP / 2, sheet)
+        _draw_mixture(panel, one)
+        _caption(panel, one.name, _STIFFNESS[one.modulus])
+
+
+def _left(plan: Layout, column: int, in_row: int) -> float:
+    """Left side of a panel in a centred row, inches."""
+    return A4[0] / 2 + (column - in_row / 2) * plan.cell[0] + (plan.cell[0] - plan.panel[0]) / 2
+
+
+def _panel(figure: Figure, plan: Layout, left: float, top: float, sheet: Sheet) -> Axes:
+    """Axes of a board to scale, its edges drawn around it."""
+    width, height = plan.panel
+    box = (left / A4[0], (top - _GAP / 2 - height) / A4[1], width / A4[0], height / A4[1])
+    panel = figure.add_axes(box)
+    panel.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
+    panel.spines[:].set_visible(False)
+    for name, word in sheet.edges.items():
+        _draw_edge(panel, name, word, _BAND / width if name[0] == "x" else _BAND / height)
+    return panel
+
+
+def _draw_edge(panel: Axes, name: str, word: str, depth: float) -> None:
+    """One edge: clamped hatched, supported dashed, free thin; `depth` of the hatching as a fraction of the side."""
+    from matplotlib.patches import Rectangle
+
+    along_y, at_end = name[0] == "x", name[1] == "1"
+    line: Any = ([at_end, at_end], [0, 1]) if along_y else ([0, 1], [at_end, at_end])
+    style = {"clamped": ("-", 1.0), "supported": ((0, (3, 2)), 1.4), "free": ("-", 0.6)}[word]
+    panel.plot(*line, ls=style[0], lw=style[1], color="0.25", clip_on=False, zorder=4, label=f"edge {name} {word}")
+    if word == "clamped":
+        low = 1.0 if at_end else -depth
+        box = ((low, 0.0), depth, 1.0) if along_y else ((0.0, low), 1.0, depth)
+        hatched = Rectangle(*box, hatch="//////", facecolor="none", edgecolor="0.45", lw=0.0, clip_on=False)
+        panel.add_patch(hatched)
+
+
+def _draw_sand(panel: Axes, shape: NDArray[np.float64]) -> None:
+    """Nodal lines in black; the parts that move down while the others move up are grey."""
+    grid = points()
+    panel.contourf(grid, grid, shape.T, levels=[-np.inf, 0.0, np.inf], colors=[_LOW, "white"])
+    panel.contour(grid, grid, shape.T, levels=[0.0], colors=_SAND, linewidths=1.8)
+
+
+def _draw_mixture(panel: Axes, one: CombinedMode) -> None:
+    """Nodal lines on a grey ground that is darker the more the board moves."""
+    grid = points()
+    largest = np.abs(one.shape).max()
+    levels = [0.0, 0.1, 0.3, 0.5, 0.7, 1.0]
+    greys = ["1.0", "0.92", "0.82", "0.72", "0.60"]
+    panel.contourf(grid, grid, np.abs(one.shape.T) / largest, levels=levels, colors=greys, extend="max")
+    panel.contour(grid, grid, one.shape.T, levels=[0.0], colors=_SAND, linewidths=1.4)
+
+
+def _mode_caption(mode: SheetMode) -> tuple[str, str]:
+    name = mode.name if mode.name.startswith("(") else "no clear name"
+    first = f"{name}   {_hertz(mode.hertz)} Hz"
+    if mode.measured_hz is not None:
+        return first, f"measured {mode.measured_hz:.5g} Hz"
+    if mode.band_hz is not None:
+        return first, f"likely {_hertz(mode.band_hz[0])} to {_hertz(mode.band_hz[1])} Hz"
+    return first, "not measured"
+
+
+def _hertz(value: float) -> str:
+    return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+def _caption(panel: Axes, first: str, second: str) -> None:
+    """Two lines below a panel, clear of a clamped edge."""
+    common: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
+    panel.annotate(first, (0.5, 0.0), (0, -6), fontsize=9, weight="bold", **common)
+    panel.annotate(second, (0.5, 0.0), (0, -18), fontsize=8, color="0.25", **common)
+
+
+def _legend(figure: Figure, sheet: Sheet) -> None:
+    """What the drawing means, at the foot of the page."""
+    drawn = {"clamped": "hatched", "supported": "dashed", "free": "thin"}
+    edges = ", ".join(f"{drawn[word]} = {word}" for word in dict.fromkeys(sheet.edges.values()))
+    lines = (
+        f"Edges: {edges}. The grain runs from left to right.",
+        "Black lines stay at rest, sand gathers there; white and grey parts move against each other.",
+        "A name counts the lines crossed on the way along the grain, then on the way across it; "
+        f"here the counts begin at {sheet.first_label}.",
+    )
+    for i, line in enumerate(lines):
+        _text(figure, A4[0] / 2, 0.64 - 0.17 * i, line, fontsize=8)
+
+
+def _text(figure: Figure, x: float, y: float, text: str, **style: Any) -> None:
+    """A centred line at a place in inches; a user's dollar signs stay as they are."""
+    figure.text(x / A4[0], y / A4[1], text, ha="center", va="center", parse_math=False, **style)

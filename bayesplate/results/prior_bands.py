@@ -1,0 +1,76 @@
+"""How far the prior alone lets each frequency range, before anything is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import PriorCard
+from bayesplate.frequencies.terms import term_weights
+from bayesplate.labels import Label
+from bayesplate.modes.line import N_BEAMS
+from bayesplate.modes.naming import product_coefficients
+from bayesplate.modes.plate import thin_plate
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
+from bayesplate.plate.setup import Setup
+
+WITHIN = (1 / 6, 5 / 6)
+"""Two times in three."""
+
+_N_DRAWS = 4000
+_COARSE_MESH = 12
+
+
+def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float64]]:
+    """Constants at the median of the prior, and the nominal inputs: dict of float."""
+    medians = {name: np.asarray(np.exp(density.log_mean)) for name, density in prior.densities.items()}
+    return _with_rigidities({**board.nominal(), **medians})
+
+
+def prior_bands(
+    board: Board, prior: PriorCard, setup: Setup, labels: Sequence[Label], rng: np.random.Generator
+) -> dict[str, tuple[float, float]]:
+    """Factors between which the prior expects each frequency, relative to the one at its median.
+
+    From Rayleigh quotients of beam-function products, draw by draw: a few per cent off each frequency, which cancel in
+    the factors.
+
+    Parameters
+    ----------
+    board : Board
+    prior : PriorCard
+    setup : Setup
+    labels : sequence of Label
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    dict of (float, float)
+        By label; labels beyond the beam functions are left out.
+    """
+    drawn = {name: density.sample(rng, _N_DRAWS) for name, density in prior.densities.items()}
+    inputs = {name: quantity.value(rng.standard_normal(_N_DRAWS)) for name, quantity in board.inputs.items()}
+    values = _with_rigidities({**inputs, **drawn})
+    products = product_coefficients(thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH))
+    middle = term_weights(prior_medians(board, prior), setup).stiffness[0]
+    weights = term_weights(values, setup).stiffness
+    bands = {}
+    for label in labels:
+        i, j = label.m - setup.first_label.m, label.n - setup.first_label.n
+        if max(i, j) < N_BEAMS:
+            squared = weights @ products[:, i, j] / (middle @ products[:, i, j])
+            factors = np.sqrt(squared[np.isfinite(squared) & (squared > 0)])
+            low, high = np.quantile(factors, WITHIN)
+            bands[str(label)] = (float(low), float(high))
+    return bands
+
+
+def _with_rigidities(values: Values) -> dict[str, NDArray[np.float64]]:
+    """The same values with D_x, D_y, D_s, from the moduli where these are given."""
+    if set(RIGIDITIES) <= set(values):
+        return dict(values)
+    E_x, E_y, G_xy = (values[name] for name in MODULI)
+    return {**values, **rigidities(E_x, E_y, G_xy, values["thickness"], values["poisson_xy"])._asdict()}

@@ -1,0 +1,137 @@
+"""The references of what a fit uses: its model, its computation, its data and its priors; kept here alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bayesplate.cards import BoardCard, PriorCard, load_coefficients
+from bayesplate.effects import effects_of
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.board import Board
+from bayesplate.quantities import Quantity
+
+PAPER = (
+    "M. Ducceschi, S. Duran, H. Tahvanainen, L. Ausiello: A method to estimate the rectangular "
+    "orthotropic plate elastic "
+    "constants using least-squares and Chladni patterns. [the frequency model, least squares, the percentile method]"
+)
+ELEMENT = (
+    "F. K. Bogner, R. L. Fox, L. A. Schmit: The generation of inter-element-compatible stiffness and "
+    "mass matrices by the "
+    "use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB (1965). "
+    "[the plate's finite elements]"
+)
+THEORIES = {
+    "thin": (
+        "Kirchhoff's thin orthotropic plate, as in eq. (1) to (4) of Ducceschi et al. [the plate theory]",
+    ),
+    "shear-flexible": (
+        "E. Reissner: The effect of transverse shear deformation on the bending of elastic plates. J. Appl. Mech. 12, "
+        "A69-A77 (1945). [the plate theory]",
+        "R. D. Mindlin: Influence of rotatory inertia and shear on flexural motions of isotropic, elastic "
+        "plates. J. Appl. "
+        "Mech. 18, 31-38 (1951). [the plate theory]",
+        "M. Endo, N. Kimura: An alternative formulation of the boundary value problem for the Timoshenko "
+        "beam and Mindlin "
+        "plate. J. Sound Vib. 301, 355-373 (2007). [shear strains as unknowns]",
+    ),
+}  # fmt: skip
+EFFECTS_FROM = {
+    "grain_angle": (
+        "N. T. Mascia, F. A. R. Lahr: Remarks on orthotropic elastic models applied to wood. Materials "
+        "Research 9 (2006). "
+        "[the turned grain]",
+    ),
+}
+"""Of effects whose formulas are taken from print; the others are derived in their own files."""
+COMPUTATION = (
+    "D. Foreman-Mackey, D. W. Hogg, D. Lang, J. Goodman: emcee: The MCMC hammer. PASP 125, 306-312 (2013), "
+    "doi:10.1086/670067. [sampling]",
+    "J. Goodman, J. Weare: Ensemble samplers with affine invariance. Comm. Appl. Math. Comp. Sci. 5, 65-80 (2010), "
+    "doi:10.2140/camcos.2010.5.65. [sampling]",
+    "A. Vehtari, A. Gelman, D. Simpson, B. Carpenter, P.-C. Bürkner: Rank-normalization, folding, and localization: an "
+    "improved R-hat for assessing convergence of MCMC. Bayesian Analysis 16, 667-718 (2021), doi:10.1214/20-BA1221. "
+    "[convergence]",
+    "T. Gustafsson, G. D. McBain: scikit-fem: A Python package for finite element assembly. JOSS 5, 2369 (2020), "
+    "doi:10.21105/joss.02369. [finite elements]",
+    "R. Kumar, C. Carroll, A. Hartikainen, O. Martin: ArviZ, a unified library for exploratory analysis "
+    "of Bayesian models "
+    "in Python. JOSS 4, 1143 (2019), doi:10.21105/joss.01143. [the format of posterior.nc]",
+)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands under it."""
+
+    title: str
+    entries: tuple[str, ...]
+
+
+def references(card: BoardCard, prior: PriorCard, board: Board) -> tuple[Section, ...]:
+    """What to cite for a fit of a card.
+
+    Parameters
+    ----------
+    card : BoardCard
+    prior : PriorCard
+    board : Board
+        With the effects that the fit declares.
+
+    Returns
+    -------
+    tuple of Section
+        Model, computation, data, prior; nothing that the fit does not use.
+    """
+    theories = dict.fromkeys(system_of(board, setup).theory for setup in board.setups)
+    theory = tuple(entry for name in theories for entry in THEORIES[name])
+    effects = tuple(entry for name in board.effects for entry in EFFECTS_FROM.get(name, ()))
+    return (
+        Section("Model", (PAPER, *theory, ELEMENT, *effects)),
+        Section("Computation", COMPUTATION),
+        Section("Data", _data(card, board)),
+        Section("Prior", _priors(prior, board)),
+    )
+
+
+def _data(card: BoardCard, board: Board) -> tuple[str, ...]:
+    entries = [f"board {card.name}: {_one_line(card.source) or 'the card states no source'}"]
+    tables = dict.fromkeys(s.published_coefficients for s in board.setups if s.published_coefficients is not None)
+    for name in tables:
+        table = load_coefficients(name, card.path.parent if card.path else None)
+        entries.append(f"coefficients {table.name}: {_one_line(table.source)}")
+    return tuple(entries)
+
+
+def _priors(prior: PriorCard, board: Board) -> tuple[str, ...]:
+    """Sources of the prior card that the fit uses, and of the priors of effects that the board card does not state."""
+    used = {name: source for name, source in prior.sources.items() if _is_used(name, prior, board)}
+    entries = [f"{name} ({prior.name}): {_one_line(source)}" for name, source in used.items()]
+    stated = _stated(board)
+    for setup in board.setups:
+        for effect in effects_of(board, setup):
+            for parameter in effect.parameters():
+                if parameter.prior not in stated:
+                    entries.append(f"{parameter.name} ({effect.name}): {_one_line(parameter.source)}")
+    return tuple(dict.fromkeys(entries))
+
+
+def _is_used(name: str, prior: PriorCard, board: Board) -> bool:
+    """A prior's Poisson ratio and noise serve only where the board card does not state its own."""
+    if name == "poisson_xy":
+        return board.inputs["poisson_xy"] == prior.poisson_xy
+    if name == "noise_percent":
+        assert prior.noise_percent is not None
+        return any(setup.noise == prior.noise_percent.scaled(1e-2) for setup in board.setups)
+    return True
+
+
+def _stated(board: Board) -> list[Quantity | None]:
+    """Quantities of effects that the board card gives itself."""
+    attached = [item.mass for setup in board.setups for item in setup.attached]
+    air = [setup.air.density for setup in board.setups if setup.air is not None]
+    return [board.shear_xz, board.shear_yz, *attached, *air]
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

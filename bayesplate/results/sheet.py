@@ -1,0 +1,179 @@
+"""The lowest modes of a setup as a sheet shows them: names, frequencies, energies, shapes, and their combinations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.combined import COMBINED, combination, combined_shapes, corner_signs
+from bayesplate.frequencies.columns import columns
+from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.spectrum import NamedMode, spectrum
+from bayesplate.frequencies.system import System
+from bayesplate.plate.board import Board, Values, vibrating_lengths
+from bayesplate.plate.material import MODULI, RIGIDITIES
+
+NUMBERS_OF_MODES = (12, 16, 20)
+"""The first that holds every measured label; beyond the last the highest are not shown."""
+
+LOWEST_COMBINED = 12
+"""Modes that are combined where too few were measured: the lowest six of a long board hardly bend one way."""
+
+_GRID = 121
+
+
+@dataclass(frozen=True, eq=False)
+class SheetMode:
+    """One mode.
+
+    Attributes
+    ----------
+    name : str
+        Its label, or "cannot tell".
+    hertz : float
+    measured_hz : float or None
+    band_hz : tuple of float or None
+        Where the prior alone expects it, two times in three.
+    shares : (4,) array
+        Share of D_x, D_y, D_s and of effects in its energy.
+    coefficients : (3,) array
+        The paper's a, b, c.
+    shape : (n_x, n_y) array
+        Deflection at `points` of both sides, positive next to the corner of x1 and y1.
+    """
+
+    name: str
+    hertz: float
+    measured_hz: float | None
+    band_hz: tuple[float, float] | None
+    shares: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+    shape: NDArray[np.float64]
+
+    @property
+    def miss_cents(self) -> float | None:
+        """Computed less measured, cents; None if it was not measured."""
+        return None if self.measured_hz is None else float(cents(np.log(self.hertz / self.measured_hz)))
+
+
+@dataclass(frozen=True, eq=False)
+class CombinedMode:
+    """A mixture of modes that answers to one constant alone: name, modulus, weight of each mode, shape."""
+
+    name: str
+    modulus: str
+    weights: Mapping[str, float]
+    shape: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Everything that a sheet of one setup shows.
+
+    Attributes
+    ----------
+    title : str
+    setup : str
+    edges : dict of str
+    first_label : str
+        At which this laboratory's names begin.
+    aspect_ratio : float
+        L_x / L_y of the part that vibrates.
+    theory : str
+    basis : str
+        At which constants the modes are computed.
+    modes : tuple of SheetMode
+        In the order of frequency.
+    combined : tuple of CombinedMode
+        Empty where the modes do not tell the constants apart.
+    """
+
+    title: str
+    setup: str
+    edges: Mapping[str, str]
+    first_label: str
+    aspect_ratio: float
+    theory: str
+    basis: str
+    modes: tuple[SheetMode, ...]
+    combined: tuple[CombinedMode, ...]
+
+
+def points() -> NDArray[np.float64]:
+    """Where shapes are sampled along each side, as fractions of it, a hair within the edges: (n,) array."""
+    return np.linspace(1e-3, 1.0 - 1e-3, _GRID)
+
+
+def sheet(
+    board: Board, system: System, values: Values, basis: str, bands: Mapping[str, tuple[float, float]] | None = None
+) -> Sheet:
+    """Solve a setup and gather what its sheet shows.
+
+    Parameters
+    ----------
+    board : Board
+    system : System
+    values : dict of float
+        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
+    basis : str
+        One clause: at which constants.
+    bands : dict, optional
+        Factors on a frequency between which the prior expects it, by label.
+
+    Returns
+    -------
+    Sheet
+    """
+    setup = system.setup
+    measured = {str(reading.label): reading.frequency.mean for reading in setup.readings}
+    for n_modes in NUMBERS_OF_MODES:
+        modes, named = spectrum(system, values, n_modes)
+        if set(measured) <= {mode.name for mode in named}:
+            break
+    found = columns(system, values, modes.coefficients)
+    shares = found.shares(np.array([float(values[name]) for name in RIGIDITIES]))
+    shapes = modes.displacement(points(), points())
+    shapes = shapes * corner_signs(shapes)[:, None, None]
+    length_x, length_y = vibrating_lengths(values, setup)
+    rows = tuple(
+        SheetMode(
+            name=mode.name,
+            hertz=mode.frequency,
+            measured_hz=measured.get(mode.name),
+            band_hz=_band(mode, bands),
+            shares=shares[i],
+            coefficients=found.coefficients[i],
+            shape=shapes[i],
+        )
+        for i, mode in enumerate(named)
+    )
+    title = board.title or board.name
+    ratio = float(length_x / length_y)
+    first = str(setup.first_label)
+    return Sheet(title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, _combined(rows))
+
+
+def _band(mode: NamedMode, bands: Mapping[str, tuple[float, float]] | None) -> tuple[float, float] | None:
+    if bands is None or mode.name not in bands:
+        return None
+    low, high = bands[mode.name]
+    return low * mode.frequency, high * mode.frequency
+
+
+def _combined(modes: tuple[SheetMode, ...]) -> tuple[CombinedMode, ...]:
+    """Combinations of the measured modes, or of the lowest where fewer than three were measured."""
+    named = [mode for mode in modes if mode.name.startswith("(")]
+    measured = [mode for mode in named if mode.measured_hz is not None]
+    used = measured if len(measured) >= len(RIGIDITIES) else named[:LOWEST_COMBINED]
+    if len(used) < len(RIGIDITIES):
+        return ()
+    coefficients = np.stack([mode.coefficients for mode in used])
+    shapes = combined_shapes(coefficients, np.stack([mode.shape for mode in used]))
+    mixtures = combination(coefficients)
+    return tuple(
+        CombinedMode(name, modulus, {m.name: float(w) for m, w in zip(used, row, strict=True)}, shape)
+        for name, modulus, row, shape in zip(COMBINED, MODULI, mixtures, shapes, strict=True)
+    )

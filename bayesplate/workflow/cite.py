@@ -1,0 +1,44 @@
+"""`cite`: the references of exactly what a fit of a card uses."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from textwrap import fill
+
+from bayesplate.results.references import Section, references
+from bayesplate.workflow.prepare import prepare
+
+_WIDTH = 100
+
+
+def cite(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) -> tuple[Section, ...]:
+    """References of a fit, by section.
+
+    Parameters
+    ----------
+    card : str or path
+        Name of a shipped board card, or a path.
+    effects : sequence of str, optional
+        Declared effects in place of the card's.
+
+    Returns
+    -------
+    tuple of Section
+
+    Raises
+    ------
+    InputError
+        As `fit` would.
+    """
+    prepared = prepare(card, effects)
+    return references(prepared.card, prepared.prior, prepared.board)
+
+
+def cite_text(sections: Sequence[Section]) -> str:
+    """The references as plain text: a heading a section, an indented paragraph a reference."""
+    parts = []
+    for section in sections:
+        entries = [fill(e, _WIDTH, initial_indent="- ", subsequent_indent="  ") for e in section.entries]
+        parts.append("\n".join([section.title, *entries]))
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,129 @@
+"""`compare`: every method side by side, on the thin and on the shear-flexible plate; nothing is written unasked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import get_args
+
+from bayesplate.effects.transverse_shear import TransverseShear
+from bayesplate.errors import NotConvergedError
+from bayesplate.estimates.coefficients import CoefficientSource, aspect_ratio_of, fitting_table
+from bayesplate.estimates.paper import paper_system
+from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.results.comparison import Entries, Method, point_methods, posterior_method, theory_entry, verdict
+from bayesplate.results.draws import Draws, effective_draws, law_weights, named_draws
+from bayesplate.results.folder import json_text, make_folder, require_new, write_text
+from bayesplate.results.versions import versions
+from bayesplate.workflow.check import expected_sd
+from bayesplate.workflow.prepare import prepare
+
+COMPARISON = "compare.json"
+FEWEST_DRAWS = 1000
+"""With fewer effective draws left by the weights, the other law is sampled itself."""
+
+_FORMAT = 1
+_SHEAR = TransverseShear.name
+Tell = Callable[[Progress], None] | None
+
+
+def compare(
+    card: str | os.PathLike[str],
+    *,
+    coefficients: CoefficientSource | None = None,
+    seed: int = 1,
+    effects: Sequence[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    progress: Tell = None,
+) -> Entries:
+    """Compare all methods on a board, as a thin and as a shear-flexible plate.
+
+    Parameters
+    ----------
+    card : str or path
+        Name of a shipped board card, or a path.
+    coefficients : "sensitivity", "training" or "published", optional
+        Source of the coefficients of the paper's least squares and percentile method; by default the published table
+        where the card names one, else the sensitivity of one solve.
+    seed : int
+        Everything random follows from it.
+    effects : sequence of str, optional
+        Declared effects in place of the card's. Transverse shear is left out of the thin plate and added to the other;
+        its moduli are the card's, or the effect's own prior.
+    out : path, optional
+        Folder for compare.json; nothing is written without it.
+    force : bool
+        Replace a compare.json that is there.
+    progress : callable, optional
+        Told after every chunk of sampling.
+
+    Returns
+    -------
+    dict
+        name, seed, theories (thin, then shear-flexible: coefficients, methods, modes, error) and verdict.
+
+    Raises
+    ------
+    InputError
+        If the card, the table or the folder cannot be used; then nothing is written.
+    NotIdentifiableError
+        If the data leave a constant open.
+    NotConvergedError
+        If the sampler fails its gate.
+    """
+    files = require_new(Path(out), [COMPARISON], force=force) if out is not None else ()
+    declared = prepare(card, effects).board.effects
+    others = [name for name in declared if name != _SHEAR]
+    asked = [others, [*others, _SHEAR]]
+    prepared = [prepare(card, names) for names in asked]
+    if coefficients == "published":
+        board = prepared[0].board
+        for setup in board.setups:
+            fitting_table(board.name, setup, aspect_ratio_of(board.nominal(), setup))
+    problems = [pose(one.board, one.prior, law="exact") for one in prepared]
+    systems = [paper_system(problem.board, problem.estimate, coefficients) for problem in problems]
+    theories = []
+    for problem, system in zip(problems, systems, strict=True):
+        methods = point_methods(problem, system, expected_sd(problem))
+        posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
+        theories.append(theory_entry(problem, system, [*methods, *posteriors], inference, draws))
+    result = {
+        "format": _FORMAT,
+        "name": problems[0].board.name,
+        "seed": seed,
+        "versions": versions(),
+        "card_sha256": prepared[0].card.sha256,
+        "prior": problems[0].prior.name,
+        "theories": theories,
+        "verdict": verdict(*theories),
+    }
+    for path in files:
+        make_folder(path.parent)
+        write_text(path, json_text(result))
+    return result
+
+
+def _posteriors(problem: Problem, settings: SamplerSettings, progress: Tell) -> tuple[list[Method], Inference, Draws]:
+    """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough."""
+    inference, draws = _sampled(problem, settings, progress)
+    methods = []
+    for law in get_args(LawName):
+        weights = law_weights(inference, draws, law)
+        if effective_draws(weights) >= FEWEST_DRAWS:
+            methods.append(posterior_method(f"{law}_posterior", problem, draws, weights))
+        else:
+            own, own_draws = _sampled(problem.under(law), settings, progress)
+            methods.append(posterior_method(f"{law}_posterior", problem, own_draws, law_weights(own, own_draws, law)))
+    return methods, inference, draws
+
+
+def _sampled(problem: Problem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
+    inference = infer(problem, settings, progress=progress)
+    if not inference.convergence.passed:
+        reasons = "\n".join(inference.convergence.reasons)
+        raise NotConvergedError(f"the sampler did not converge, so nothing is compared:\n{reasons}")
+    return inference, named_draws(inference, settings.seed)

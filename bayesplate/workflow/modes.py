@@ -1,0 +1,158 @@
+"""`modes`: the lowest modes of a board, as a table and as a sheet of Chladni figures to print."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesplate.errors import NotIdentifiableError
+from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
+from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.frequencies.spectrum import spectrum
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.board import Board, Values
+from bayesplate.results.folder import make_folder, require_new
+from bayesplate.results.prior_bands import prior_bands, prior_medians
+from bayesplate.results.sheet import NUMBERS_OF_MODES, Sheet, sheet
+from bayesplate.workflow.prepare import Prepared, prepare
+
+_AT_ESTIMATE = "at the weighted least-squares estimate"
+_AT_PRIOR = "at the median of the prior"
+
+
+@dataclass(frozen=True, eq=False)
+class ModesResult:
+    """What `modes` leaves: the report, the sheets behind it, and the files that were written."""
+
+    report: dict[str, Any]
+    sheets: tuple[Sheet, ...]
+    files: tuple[Path, ...]
+
+
+def modes(
+    card: str | os.PathLike[str],
+    *,
+    out: str | os.PathLike[str] | None = None,
+    write: bool = True,
+    effects: Sequence[str] | None = None,
+    seed: int = 1,
+    force: bool = False,
+) -> ModesResult:
+    """Compute the lowest modes of a board and draw them.
+
+    Parameters
+    ----------
+    card : str or path
+        Name of a shipped board card, or a path. It may be without frequencies: then the modes are those of the prior's
+        median, with the range in which the prior expects each.
+    out : path, optional
+        Folder of modes.png and modes.svg (modes-SETUP.png where there are several setups); by default results/NAME.
+    write : bool
+        False draws nothing.
+    effects : sequence of str, optional
+        Declared effects in place of the card's.
+    seed : int
+        Of the draws from the prior.
+    force : bool
+        Replace sheets that are there.
+
+    Returns
+    -------
+    ModesResult
+
+    Raises
+    ------
+    InputError
+        If the card or the folder cannot be used; then nothing is written.
+    """
+    prepared = prepare(card, effects, may_lack_frequencies=True)
+    board = prepared.board
+    folder = Path(out) if out is not None else Path("results") / board.name
+    stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
+    names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
+    files = require_new(folder, names, force=force) if write else ()
+    values, basis, why = _constants(prepared)
+    sheets = tuple(_sheets(prepared, values, basis, np.random.default_rng(seed)))
+    if write:
+        _draw(sheets, folder, files)
+    report = {
+        "name": board.name,
+        "title": board.title,
+        "basis": basis,
+        "setups": [_entry(one) for one in sheets],
+        "notes": [*why, *board.notes],
+        "files": [str(path) for path in files],
+    }
+    return ModesResult(report, sheets, files)
+
+
+def _constants(prepared: Prepared) -> tuple[Values, str, list[str]]:
+    """Where to compute the modes, in one clause, and why if not at the board's own estimate."""
+    board = prepared.board
+    try:
+        require_labels(board)
+        estimate = weighted_least_squares(board)
+        require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales))
+    except NotIdentifiableError as error:
+        return prior_medians(board, prepared.prior), _AT_PRIOR, [str(error)] if _has_labels(board) else []
+    return estimate.values, _AT_ESTIMATE, []
+
+
+def _has_labels(board: Board) -> bool:
+    return any(setup.readings for setup in board.setups)
+
+
+def _sheets(prepared: Prepared, values: Values, basis: str, rng: np.random.Generator) -> list[Sheet]:
+    board, made = prepared.board, []
+    for setup in board.setups:
+        system = system_of(board, setup)
+        bands = None
+        if basis == _AT_PRIOR:
+            _, named = spectrum(system, values, NUMBERS_OF_MODES[-1])
+            labels = [mode.label for mode in named if mode.label is not None]
+            bands = prior_bands(board, prepared.prior, setup, labels, rng)
+        made.append(sheet(board, system, values, basis, bands))
+    return made
+
+
+def _draw(sheets: Sequence[Sheet], folder: Path, files: Sequence[Path]) -> None:
+    from bayesplate.report.chladni import chladni_sheet
+    from bayesplate.report.saving import save_figure
+
+    make_folder(folder)
+    for i, one in enumerate(sheets):
+        figure = chladni_sheet(one)
+        for path in files[2 * i : 2 * i + 2]:
+            save_figure(figure, path)
+
+
+def _entry(one: Sheet) -> dict[str, Any]:
+    return {
+        "setup": one.setup,
+        "edges": dict(one.edges),
+        "theory": one.theory,
+        "modes": [
+            {
+                "label": mode.name,
+                "hz": mode.hertz,
+                "measured_hz": mode.measured_hz,
+                "miss_cents": mode.miss_cents,
+                "likely_hz": None if mode.band_hz is None else list(mode.band_hz),
+                "share_percent": {
+                    name: round(100.0 * float(share), 1)
+                    for name, share in zip(("D_x", "D_y", "D_s", "effects"), mode.shares, strict=True)
+                },
+                **{name: float(value) for name, value in zip("abc", mode.coefficients, strict=True)},
+            }
+            for mode in one.modes
+        ],
+        "combined": [
+            {"name": combined.name, "modulus": combined.modulus, "weights": dict(combined.weights)}
+            for combined in one.combined
+        ],
+    }

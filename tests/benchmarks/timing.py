@@ -1,0 +1,117 @@
+"""What is timed: solves, laws, likelihoods and whole commands; each function returns seconds."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.terms import term_weights
+from bayesplate.modes import line
+from bayesplate.modes.mesh import mesh
+from bayesplate.modes.plate import Weights, thin_plate
+from bayesplate.modes.solve import solve, solve_classes
+from bayesplate.plate.setup import Ends
+from bayesplate.posterior.inference import Problem, pose
+from bayesplate.workflow.prepare import prepare
+
+N_MODES = 12
+
+
+def best(run: Callable[[], object], repeats: int) -> float:
+    """Shortest of several runs, s: what the machine does when nothing else disturbs it."""
+    times = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - started)
+    return min(times)
+
+
+def posed(board: str, law: LawName) -> Problem:
+    """A shipped board under a law, ready to be sampled."""
+    prepared = prepare(board)
+    return pose(prepared.board, prepared.prior, law=law)
+
+
+def draws(problem: Problem, n_draws: int) -> NDArray[np.float64]:
+    """Points where the sampler would ask: a normal approximation of the posterior, (n_draws, n_dim) array."""
+    return np.random.default_rng(1).multivariate_normal(problem.centre, problem.covariance, n_draws)
+
+
+def likelihood(problem: Problem, n_draws: int, repeats: int = 7) -> float:
+    """One evaluation of the log likelihood at `n_draws` points together."""
+    theta = draws(problem, n_draws)
+    together = max(1, 2048 // n_draws)
+
+    def run() -> None:
+        for _ in range(together):
+            problem.posterior.log_likelihood(theta)
+
+    run()
+    return best(run, repeats) / together
+
+
+def law(problem: Problem, name: LawName, n_draws: int, repeats: int = 7) -> float:
+    """The frequencies of the labelled modes alone at `n_draws` points, without noise and readings."""
+    values = problem.parameters.values(draws(problem, n_draws))
+    (model,) = problem.posterior.models
+    return best(lambda: model.log_frequencies(values, name), repeats)
+
+
+def full_solve(problem: Problem, repeats: int = 7) -> float:
+    """The labelled modes of one draw from the matrices of the whole plate, only as many as are needed in each class."""
+    (model,) = problem.posterior.models
+    values = problem.parameters.values(draws(problem, 1))
+    weights = term_weights(values, model.setup).at(0)
+    wanted = {place.parity: 0 for place in model.places}
+    for place in model.places:
+        wanted[place.parity] = max(wanted[place.parity], place.rank + 1)
+    return best(lambda: solve_classes(model.plate, weights, wanted), repeats)
+
+
+def plate_at_estimate(problem: Problem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
+    """Edges, mesh and weights of a problem's plate."""
+    (model,) = problem.posterior.models
+    weights = term_weights(problem.estimate.values, model.setup).at(0)
+    return model.setup.ends_x, model.setup.ends_y, mesh(weights), weights
+
+
+def assembly(problem: Problem, repeats: int = 5) -> float:
+    """Matrices of a plate that was never assembled before in this process, its libraries imported."""
+    ends_x, ends_y, (n_x, n_y), _ = plate_at_estimate(problem)
+
+    def run() -> None:
+        thin_plate.cache_clear()
+        line.line.cache_clear()
+        thin_plate(ends_x, ends_y, n_x, n_y)
+
+    return best(run, repeats)
+
+
+def twelve_modes(problem: Problem, repeats: int = 7) -> float:
+    """The lowest twelve modes from matrices that are there."""
+    ends_x, ends_y, (n_x, n_y), weights = plate_at_estimate(problem)
+    plate = thin_plate(ends_x, ends_y, n_x, n_y)
+    return best(lambda: solve(plate, weights, N_MODES), repeats)
+
+
+def command(*arguments: str, repeats: int = 1) -> float:
+    """A whole command in a process of its own, from nothing to its exit, with one thread."""
+    program = [sys.executable, "-m", "bayesplate.cli", *arguments]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    return best(lambda: subprocess.run(program, check=True, capture_output=True, env=environment), repeats)
+
+
+def whole_fit(board: str, repeats: int = 1) -> float:
+    """`bayesplate fit` of a shipped board, cold."""
+    with tempfile.TemporaryDirectory() as folder:
+        return command("fit", board, "--force", "--out", str(Path(folder) / "out"), repeats=repeats)

@@ -1,0 +1,124 @@
+"""Calibrate the inference: `python tests/calibration/run.py --simulations 200 --workers 2 --out ranks.jsonl`.
+
+Prints a table of every quantity and mutant. Exit code 0: calibrated and every mutant caught; 1: not; 2: usage. A run
+that was interrupted goes on where it stopped if it is given the same file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from calibration.sbc import Design, identity, simulate_one
+from calibration.table import family_p_value, is_calibrated, is_caught, rows, text
+
+FEWEST_FOR_MUTANTS = 40
+
+
+def read_done(path: Path, design: Design) -> list[dict[str, Any]]:
+    """Records of a file of the same design; a last line that was cut off is forgotten."""
+    if not path.exists() or not path.read_text().strip():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(identity(design)) + "\n")
+        return []
+    lines = path.read_text().splitlines(keepends=True)
+    if json.loads(lines[0]) != identity(design):
+        raise SystemExit(f"{path}: made with another design, wanted {json.dumps(identity(design))}")
+    whole = [line for line in lines if line.endswith("\n")]
+    if len(whole) < len(lines):
+        path.write_text("".join(whole))
+    return [json.loads(line) for line in whole[1:]]
+
+
+def run(
+    design: Design, n_simulations: int, n_mutants: int, workers: int, out: Path, *, quiet: bool = False
+) -> list[dict[str, Any]]:
+    """Do what is not done yet, and return the records of all simulations asked for, in their order."""
+    records = read_done(out, design)
+    done = {(r["simulation"], "noise fixed at half" in r.get("ranks", {})) for r in records}
+    open_ones = [
+        (i, i < n_mutants)
+        for i in range(n_simulations)
+        if (i, True) not in done and ((i, False) not in done or i < n_mutants)
+    ]
+    started = time.perf_counter()
+    with ProcessPoolExecutor(workers) as pool, out.open("a") as file:
+        futures = [pool.submit(simulate_one, design, i, mutant) for i, mutant in open_ones]
+        for count, future in enumerate(as_completed(futures), start=1):
+            records.append(future.result())
+            file.write(json.dumps(records[-1]) + "\n")
+            file.flush()
+            if not quiet and (count % 10 == 0 or count == len(futures)):
+                left = (time.perf_counter() - started) / count * (len(futures) - count)
+                print(f"{count} of {len(futures)} done, {left / 60:.1f} minutes left", file=sys.stderr, flush=True)
+    latest = {record["simulation"]: record for record in records if record["simulation"] < n_simulations}
+    return [latest[i] for i in sorted(latest)]
+
+
+def judge(records: list[dict[str, Any]]) -> tuple[list[str], bool]:
+    """Paragraphs to print, and whether all is well."""
+    failed = [r for r in records if "error" in r]
+    good = [r for r in records if "ranks" in r]
+    paragraphs = []
+    if failed:
+        paragraphs.append(f"{len(failed)} simulations gave no draws; the first: {failed[0]['error']}")
+    if not good:
+        return paragraphs, False
+    table = rows([r["ranks"]["production"] for r in good])
+    well = is_calibrated(table) and not failed
+    paragraphs.append(text("production", table, len(good)))
+    paragraphs.append(
+        f"  family-wise p {family_p_value(table):.3f}; relabelled at a veering: {sum(r['relabelled'] for r in good)}; "
+        f"started anew: {sum(r['attempts'] > 1 for r in good)}; linear law: {sum(r['law'] == 'linear' for r in good)}; "
+        f"median {sorted(r['seconds'] for r in good)[len(good) // 2]:.1f} s"
+    )
+    for mutant in ("likelihood omitted", "noise fixed at half"):
+        ranks = [r["ranks"][mutant] for r in good if mutant in r["ranks"]]
+        if len(ranks) < FEWEST_FOR_MUTANTS:
+            paragraphs.append(f"mutant: {mutant}: {len(ranks)} simulations, {FEWEST_FOR_MUTANTS} are needed to judge")
+            well = False
+            continue
+        found = rows(ranks)
+        caught = is_caught(mutant, found)
+        well &= caught
+        paragraphs.append(text(f"mutant: {mutant}", found, len(ranks)))
+        paragraphs.append("  caught" if caught else "  NOT CAUGHT")
+    return paragraphs, well
+
+
+def main() -> int:
+    """Run the command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--simulations", type=int, default=200)
+    parser.add_argument("--mutants", type=int, default=50, help="simulations that are also fitted with half the noise")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
+    parser.add_argument("--edges", choices=("free", "cantilever"), default="free")
+    parser.add_argument(
+        "--generator", choices=("package", "ritz"), default="package", help="whose frequencies are true"
+    )
+    parser.add_argument("--law", choices=("exact", "auto", "fixed-linear"), default="exact")
+    parser.add_argument("--resolution", type=float, default=1.0, help="Hz; 0 for readings that are not rounded")
+    parser.add_argument("--base-seed", type=int, default=1)
+    arguments = vars(parser.parse_args())
+    design = Design(**{f.name: arguments[f.name] for f in fields(Design) if f.name in arguments})
+    started = time.perf_counter()
+    records = run(design, arguments["simulations"], arguments["mutants"], arguments["workers"], arguments["out"])
+    paragraphs, well = judge(records)
+    print("\n".join(paragraphs))
+    print(f"{'calibrated' if well else 'NOT CALIBRATED'}, {(time.perf_counter() - started) / 60:.1f} minutes")
+    return 0 if well else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,79 @@
+"""What a set of ranks says: one row a quantity, and whether the whole may be called calibrated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from calibration.bands import band_p_value, central_coverage, chi2_p_value
+from calibration.sbc import N_DRAWS
+
+FAMILY_LEVEL = 0.05
+"""Chance that a correct code is called miscalibrated: the band of each of n quantities is widened to 1 - 0.05 / n.
+
+Ten bands of 95 % would reject a correct code four times in ten.
+"""
+
+MUTANT_LEVEL = 1e-3
+
+NOT_COUNTED = {"noise fixed at half": ("noise",)}
+"""The noise of that mutant is wrong by construction; it has to be found by what follows from it."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Verdict on one quantity: chance of leaving the band so far, chi-squared, mean rank, coverage of intervals."""
+
+    name: str
+    band: float
+    chi2: float
+    mean_rank: float
+    within_50: float
+    within_90: float
+
+
+def rows(ranks: Sequence[Mapping[str, int]]) -> list[Row]:
+    """One row a quantity."""
+    found = []
+    for name in ranks[0]:
+        values = np.array([one[name] for one in ranks])
+        found.append(
+            Row(
+                name,
+                band_p_value(values, N_DRAWS),
+                chi2_p_value(values, N_DRAWS),
+                float(values.mean() / N_DRAWS),
+                central_coverage(values, N_DRAWS, 0.5),
+                central_coverage(values, N_DRAWS, 0.9),
+            )
+        )
+    return found
+
+
+def family_p_value(table: Sequence[Row], leave_out: Sequence[str] = ()) -> float:
+    """Bonferroni: the smallest band probability times the number of quantities."""
+    counted = [row.band for row in table if row.name not in leave_out]
+    return min(1.0, min(counted) * len(counted))
+
+
+def is_calibrated(table: Sequence[Row]) -> bool:
+    """Whether every quantity stays within its band."""
+    return family_p_value(table) > FAMILY_LEVEL
+
+
+def is_caught(mutant: str, table: Sequence[Row]) -> bool:
+    """Whether the bands find a mutant out."""
+    return family_p_value(table, NOT_COUNTED.get(mutant, ())) < MUTANT_LEVEL
+
+
+def text(title: str, table: Sequence[Row], n: int) -> str:
+    """The table as it is printed."""
+    lines = [f"{title}, {n} simulations", f"  {'quantity':16} band p  chi2 p  mean rank  in 50 %  in 90 %"]
+    for row in table:
+        mark = "" if row.band > 0.05 else "  outside its own 95 % band"
+        lines.append(
+            f"  {row.name:16} {row.band:6.4f}  {row.chi2:6.4f}  {row.mean_rank:9.3f}  {100 * row.within_50:7.1f}"
+            f"  {100 * row.within_90:7.1f}{mark}"
+        )
+    return "\n".join(lines)

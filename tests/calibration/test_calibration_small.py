@@ -1,0 +1,102 @@
+"""Calibration of the whole inference: a small one by the linear law, and the full one by the exact law, slow."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from calibration.run import judge, read_done, run
+from calibration.sbc import N_DRAWS, Design, identity, simulate_one
+from calibration.table import family_p_value, is_calibrated, is_caught, rows
+
+SMALL = Design(law="fixed-linear", resolution=0.0, thickness_sd=0.0, n_walkers=12)
+N_SMALL, N_HALVED = 32, 16
+
+
+@pytest.fixture(scope="module")
+def small():
+    """The same simulations whenever they are made."""
+    records = [simulate_one(SMALL, i, with_half_noise=i < N_HALVED) for i in range(N_SMALL)]
+    assert [record for record in records if "error" in record] == []
+    return records
+
+
+def ranks_of(records, kind):
+    return [record["ranks"][kind] for record in records if kind in record["ranks"]]
+
+
+def test_ranks_of_the_truth_are_uniform(small):
+    table = rows(ranks_of(small, "production"))
+    assert {row.name for row in table} >= {"D_x", "D_y", "D_s", "E_x", "E_y", "G_xy", "noise", "log_likelihood"}
+    assert is_calibrated(table), table
+
+
+@pytest.mark.parametrize("mutant", ["likelihood omitted", "noise fixed at half"])
+def test_a_wrong_posterior_is_caught(small, mutant):
+    table = rows(ranks_of(small, mutant))
+    assert is_caught(mutant, table), table
+
+
+def test_without_the_likelihood_only_the_likelihood_tells(small):
+    """Draws from the prior are calibrated for every parameter: why the log likelihood is ranked."""
+    table = {row.name: row for row in rows(ranks_of(small, "likelihood omitted"))}
+    told = table.pop("log_likelihood")
+    assert told.mean_rank == 1.0
+    assert family_p_value(list(table.values())) > 0.01
+
+
+def test_a_simulation_is_the_same_whenever_it_is_made(small):
+    again = simulate_one(SMALL, 20)
+    assert again["ranks"] == small[20]["ranks"]
+    assert again["ranks"] != small[21]["ranks"]
+
+
+def test_an_interrupted_run_goes_on(small, tmp_path):
+    out = tmp_path / "ranks.jsonl"
+    lines = [json.dumps(identity(SMALL)), *(json.dumps(record) for record in small)]
+    out.write_text("\n".join(lines[:-1]) + "\n" + lines[-1][:40])  # killed while it wrote the last one
+    records = run(SMALL, N_SMALL - 1, N_HALVED, 1, out, quiet=True)
+    assert records == small[:-1]  # nothing was left to do
+    assert len(out.read_text().splitlines()) == N_SMALL
+    _, well = judge(records)
+    assert not well  # too few simulations of the mutants to say that they would be caught
+
+
+def test_a_file_of_another_design_is_refused(tmp_path):
+    out = tmp_path / "ranks.jsonl"
+    read_done(out, SMALL)
+    with pytest.raises(SystemExit, match="made with another design"):
+        read_done(out, Design())
+
+
+def test_simulations_without_draws_are_not_passed_over():
+    ranks = {"D_x": 50, "log_likelihood": 50}
+    rng = np.random.default_rng(0)
+    good = [
+        {
+            "simulation": i,
+            "ranks": {
+                "production": {name: int(rng.integers(N_DRAWS + 1)) for name in ranks},
+                "likelihood omitted": ranks,
+                "noise fixed at half": ranks,
+            },
+            "seconds": 1.0,
+            "law": "exact",
+            "attempts": 1,
+            "relabelled": False,
+        }
+        for i in range(60)
+    ]
+    assert judge(good)[1]
+    paragraphs, well = judge([*good, {"simulation": 60, "error": "NotConvergedError: too short"}])
+    assert not well
+    assert "1 simulations gave no draws" in paragraphs[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("design", [Design(), Design(generator="ritz", law="auto")], ids=["exact", "another solver"])
+def test_the_full_calibration(design, tmp_path):
+    """As `python tests/calibration/run.py`: 200 simulations; 95 % family-wise, both mutants caught."""
+    paragraphs, well = judge(run(design, 200, 50, 2, tmp_path / "ranks.jsonl", quiet=True))
+    assert well, "\n".join(paragraphs)

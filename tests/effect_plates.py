@@ -1,0 +1,97 @@
+"""Plates with effects, solved by the package and by the generator's own polynomials, for the tests of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import made_boards
+import numpy as np
+from generator.effects import NoEffect
+from generator.effects import TransverseShear as GeneratorShear
+from generator.plate import EDGES, Plate
+from generator.plate import solve as solve_generator
+
+from bayesplate.effects import EFFECTS, Effect, declare
+from bayesplate.effects.transverse_shear import TransverseShear
+from bayesplate.frequencies.system import System
+from bayesplate.modes.naming import find
+from bayesplate.modes.solve import Modes, solve
+from bayesplate.plate.setup import AttachedItem, Setup
+from bayesplate.posterior.inference import Problem, pose
+from bayesplate.workflow.prepare import prepare
+
+SETUP = "made"
+ALL_SUPPORTED = dict.fromkeys(EDGES, "supported")
+G_XZ, G_YZ = 0.62e9, 0.03e9
+SHEAR = {"transverse_shear.G_xz": G_XZ, "transverse_shear.G_yz": G_YZ}
+
+Parameters = Mapping[str, float]
+Beams = tuple[int, int]
+
+
+def setup_of(plate: Plate) -> Setup:
+    """A setup with the edges of a plate."""
+    return made_boards.setup_of(plate.edges, {(2, 2): 1.0}, name=SETUP)
+
+
+def values_of(plate: Plate, parameters: Parameters) -> dict[str, np.ndarray]:
+    """Constants and sizes of a plate, and parameters of effects; those of a setup without its name."""
+    own = {"length_x": plate.L_x, "length_y": plate.L_y, "thickness": plate.h, "density": plate.rho}
+    own |= {"D_x": plate.D_x, "D_y": plate.D_y, "D_s": plate.G_xy * plate.h**3 / 3.0, "poisson_xy": plate.nu_xy}
+    of_effects = {f"{n}[{SETUP}]" if _is_of_setup(n) else n: v for n, v in parameters.items()}
+    return {name: np.asarray(value) for name, value in (own | of_effects).items()}
+
+
+def _is_of_setup(name: str) -> bool:
+    """Whether a value is a parameter of an effect that belongs to a setup."""
+    effect, dot, _ = name.partition(".")
+    return bool(dot) and EFFECTS[effect].scope == "setup"
+
+
+def modes_of(plate: Plate, effects: Sequence[Effect], parameters: Parameters, n_modes: int) -> Modes:
+    """Lowest modes by the package."""
+    system, values = System(setup_of(plate), tuple(effects)), values_of(plate, parameters)
+    return solve(system.plate(values), system.weights(values).at(0), n_modes)
+
+
+def hertz(plate: Plate, effects: Sequence[Effect], parameters: Parameters, n_modes: int) -> np.ndarray:
+    """Lowest frequencies by the package."""
+    return np.sqrt(modes_of(plate, effects, parameters, n_modes).eigenvalues) / (2.0 * np.pi)
+
+
+def hertz_apart(
+    plate: Plate,
+    effects: Sequence[Effect],
+    parameters: Parameters,
+    generator: Sequence[NoEffect],
+    n_modes: int,
+    is_sheared: bool = False,
+) -> np.ndarray:
+    """The package's frequencies against the generator's, cents."""
+    if is_sheared:
+        effects, parameters = (*effects, TransverseShear()), {**parameters, **SHEAR}
+        generator = (*generator, GeneratorShear(G_XZ, G_YZ))
+    n_rigid = 3 if set(plate.edges.values()) == {"free"} else 0
+    independent = solve_generator(plate, generator, n_modes + n_rigid).frequencies[n_rigid:]
+    return 1200.0 * np.log2(hertz(plate, effects, parameters, n_modes) / independent)
+
+
+def shifts(plate: Plate, effects: Sequence[Effect], parameters: Parameters, beams: Sequence[Beams]) -> np.ndarray:
+    """Shift of named modes by effects, cents."""
+    squared = []
+    for present in ((), tuple(effects)):
+        system, values = System(setup_of(plate), present), values_of(plate, parameters)
+        found = find(system.plate(values), system.weights(values).at(0), beams)
+        squared.append(np.array([found[b].eigenvalue for b in beams]))
+    return 600.0 * np.log2(squared[1] / squared[0])
+
+
+def posed(card: str, effects: Sequence[str], attached: AttachedItem | None = None) -> Problem:
+    """A shipped board with declared effects, ready to be sampled."""
+    prepared = prepare(card)
+    setups = prepared.board.setups
+    if attached is not None:
+        setups = tuple(replace(setup, attached=(attached,)) for setup in setups)
+    board = declare(replace(prepared.board, effects=tuple(effects), setups=setups))
+    return pose(board, prepared.prior)

@@ -1,0 +1,86 @@
+"""Grain angle: a quarter turn, the generator, Mascia and Lahr's numbers, and where a first-order column fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import generator.effects
+import numpy as np
+import pytest
+from effect_plates import SHEAR, hertz_apart, modes_of, posed, setup_of, shifts, values_of
+from generator.known_boards import BEAMS, FINNISH, FREE
+
+from bayesplate.effects.grain_angle import GrainAngle
+from bayesplate.effects.transverse_shear import TransverseShear
+from bayesplate.frequencies.system import System
+from bayesplate.modes.naming import find
+from bayesplate.posterior.region import worst_cents
+
+ANGLE = "grain_angle.angle"
+EXACT = [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]
+FIRST_ORDER = [-4.7, 23.0, -4.6, 12.0, 10.0, 20.0]
+"""physics.md 4, at 3 degrees on the cantilever."""
+
+
+@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
+@pytest.mark.parametrize("degrees", [3.0, 6.0, 12.0])
+@pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
+def test_against_the_generator(plate, degrees, is_sheared):
+    angle = np.radians(degrees)
+    independent = generator.effects.GrainAngle(angle)
+    apart = hertz_apart(plate, [GrainAngle()], {ANGLE: angle}, [independent], 6, is_sheared)
+    assert apart == pytest.approx(0.0, abs=0.5)
+
+
+@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
+def test_a_quarter_turn_swaps_the_axes(is_sheared):
+    """Weights: those of the plate with the other D and nu_yx D_x = nu_xy D_y; nothing couples."""
+    effects = (TransverseShear(),) if is_sheared else ()
+    own = {**values_of(FINNISH, SHEAR), ANGLE: np.asarray(np.pi / 2)}
+    swapped = {**own, "D_x": own["D_y"], "D_y": own["D_x"], "poisson_xy": own["poisson_xy"] * own["D_y"] / own["D_x"]}
+    names = ["transverse_shear.G_xz", "transverse_shear.G_yz"]
+    swapped |= dict(zip(names, [own[n] for n in reversed(names)], strict=True))
+    turned = System(setup_of(FINNISH), (*effects, GrainAngle())).weights(own).stiffness[0]
+    expected = System(setup_of(FINNISH), effects).weights(swapped).stiffness[0]
+    np.testing.assert_allclose(turned[: expected.size], expected, rtol=1e-12)
+    np.testing.assert_allclose(turned[expected.size :] / expected.max(), 0.0, atol=1e-14)
+
+
+def test_sizes_on_the_papers_cantilever():
+    moved = shifts(FINNISH, [GrainAngle()], {ANGLE: np.radians(3.0)}, BEAMS["cantilever"])
+    assert moved == pytest.approx(EXACT, abs=0.06)
+
+
+def test_first_order_use_fails():
+    """The energies of the unturned modes under the turned weights: another answer, with wrong signs."""
+    system, values = System(setup_of(FINNISH), (GrainAngle(),)), values_of(FINNISH, {ANGLE: 0.0})
+    turned = {**values, ANGLE: np.asarray(np.radians(3.0))}
+    found = find(system.plate(values), system.weights(values).at(0), BEAMS["cantilever"])
+    weights = system.weights(turned).stiffness[0]
+    column = np.array([600 * np.log2(found[b].stiffness @ weights / found[b].eigenvalue) for b in BEAMS["cantilever"]])
+
+    assert column == pytest.approx(FIRST_ORDER, abs=0.6)
+    assert np.abs(column - EXACT).max() > 20.0
+
+
+def test_the_sign_of_the_angle_is_not_seen():
+    up, down = (modes_of(FREE, [GrainAngle()], {ANGLE: a}, 6).eigenvalues for a in (0.08, -0.08))
+    np.testing.assert_allclose(up, down, rtol=1e-8)
+    assert GrainAngle().parameters()[0].prior.lower == 0.0
+
+
+def test_a_material_alike_both_ways_has_no_grain():
+    isotropic = replace(FINNISH, E_y=FINNISH.E_x, nu_xy=0.3, G_xy=FINNISH.E_x / 2.6)
+    assert shifts(isotropic, [GrainAngle()], {ANGLE: 0.5}, BEAMS["cantilever"]) == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("card", "effects"),
+    [
+        ("finnish-spruce-cantilever", ["grain_angle"]),
+        ("spruce-free-2R", ["grain_angle"]),
+        pytest.param("finnish-spruce-cantilever", ["transverse_shear", "grain_angle"], marks=pytest.mark.slow),
+    ],
+)
+def test_modal_matrices_are_exact(card, effects):
+    assert worst_cents(posed(card, effects).posterior.models) < 0.5

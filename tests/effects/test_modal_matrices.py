@@ -1,0 +1,62 @@
+"""Modal matrices of shipped boards with effects: as exact as they say, over the whole range of the effects' priors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_plates import posed
+
+from bayesplate.frequencies.laws import cents, log_frequency
+from bayesplate.modes.solve import solve_class
+from bayesplate.plate.setup import AttachedItem
+from bayesplate.posterior.region import worst_cents
+
+N_FRESH = 6
+ACCEPTED_CENTS = 0.5
+CANTILEVER, CLAMPED, FREE = "finnish-spruce-cantilever", "fiemme-spruce-clamped", "spruce-free-2R"
+SENSOR = AttachedItem("accelerometer", ((0.23, 0.09),))
+CASES = [
+    (CANTILEVER, "clamp_rotation"),
+    (CANTILEVER, "clamp_translation"),
+    (CANTILEVER, "clamp_rotation clamp_translation"),
+    (CANTILEVER, "support_stiffness"),
+    (CANTILEVER, "attached_mass"),
+    (CLAMPED, "clamp_rotation"),
+    (CLAMPED, "clamp_translation"),
+    (CLAMPED, "membrane_tension"),
+    (CLAMPED, "support_mass"),
+    (FREE, "support_stiffness"),
+    (FREE, "attached_mass"),
+]
+
+
+def full_solve(model, values):
+    """ln f of every labelled mode at one point, by an eigen-solve of the whole plate."""
+    weights = model.system.weights(values).at(0)
+    found = [
+        solve_class(model.plate.block(place.parity), weights, place.rank + 1).eigenvalues[place.rank]
+        for place in model.places
+    ]
+    return log_frequency(np.array(found))
+
+
+def errors(problem):
+    """Exact law less full solves at fresh draws within the bounds of the priors, cents."""
+    theta = np.random.default_rng(5).multivariate_normal(problem.centre, problem.covariance, N_FRESH)
+    columns, bounds = problem.parameters.fitted_columns, problem.parameters.fitted_bounds
+    theta[:, columns] = np.clip(theta[:, columns], bounds.lower, bounds.upper)
+    values = {n: np.broadcast_to(v, N_FRESH) for n, v in problem.parameters.values(theta).items()}
+    (model,) = problem.posterior.models
+    solved = np.stack([full_solve(model, {n: v[i] for n, v in values.items()}) for i in range(N_FRESH)])
+    return cents(model.log_frequencies(values, "exact") - solved)
+
+
+@pytest.mark.parametrize(
+    "theory", ["", pytest.param(" transverse_shear", marks=pytest.mark.slow)], ids=["thin", "shear-flexible"]
+)
+@pytest.mark.parametrize(("card", "effects"), CASES)
+def test_modal_matrices_are_exact(card, effects, theory):
+    attached = SENSOR if (card, effects) == (CANTILEVER, "attached_mass") else None
+    problem = posed(card, (effects + theory).split(), attached)
+    assert worst_cents(problem.posterior.models) < ACCEPTED_CENTS
+    assert np.abs(errors(problem)).max() < ACCEPTED_CENTS

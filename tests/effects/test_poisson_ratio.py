@@ -1,0 +1,83 @@
+"""Poisson ratio: the generator, the sizes of physics.md, and that every use of the input follows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import ritz
+from effect_plates import posed, setup_of, shifts, values_of
+from generator.known_boards import BEAMS, FIEMME, FINNISH
+from made_boards import board_of
+
+from bayesplate.effects import declare
+from bayesplate.effects.poisson_ratio import FREE_POISSON, PoissonRatio
+from bayesplate.frequencies.system import System
+from bayesplate.modes.naming import find
+from bayesplate.plate.material import moduli
+from bayesplate.posterior.region import worst_cents
+from bayesplate.quantities import Quantity
+
+
+@pytest.mark.parametrize(
+    ("plate", "beams", "lowest", "highest"),
+    [(FINNISH, "cantilever", [-5, -3, 5, -14, -5, -9], None), (FIEMME, "clamped", -30, -18)],
+    ids=["cantilever", "clamped"],
+)
+def test_sizes_on_the_papers_boards(plate, beams, lowest, highest):
+    """physics.md 6: nu_xy lower by 0.16 at the same E."""
+    lower = replace(plate, nu_xy=plate.nu_xy - 0.16)
+    both = [values_of(p, {}) for p in (plate, lower)]
+    found = _hertz(plate, both[1], BEAMS[beams]) - _hertz(plate, both[0], BEAMS[beams])
+    cents = 1200 * found / np.log(2)
+    if highest is None:
+        assert cents == pytest.approx(lowest, abs=0.7)
+    else:
+        assert cents.min() > lowest - 0.6
+        assert cents.max() < highest + 0.6
+
+
+def _hertz(plate, values, beams):
+    system = System(setup_of(plate), (PoissonRatio(),))
+    found = find(system.plate(values), system.weights(values).at(0), beams)
+    return 0.5 * np.log([found[b].eigenvalue for b in beams])
+
+
+def test_declared_it_is_the_boards_own_input():
+    """One value, in the weights and in E from D."""
+    board = board_of(ritz.FINNISH, [setup_of(FINNISH)])
+    declared = declare(replace(board, effects=("poisson_ratio",)))
+
+    assert declared.uncertain_inputs == {"poisson_xy": FREE_POISSON}
+    assert declare(declared) == declared
+    assert [e.key("nu_xy") for e in (PoissonRatio(),)] == ["poisson_xy"]
+
+
+def test_the_posterior_takes_it_everywhere():
+    problem = posed("finnish-spruce-cantilever", ["poisson_ratio"])
+    theta = np.tile(problem.centre, (2, 1))
+    column = problem.parameters.names.index("z[poisson_xy]")
+    theta[1, column] += 1.0
+    values = problem.parameters.values(theta)
+
+    assert np.diff(values["poisson_xy"]) == pytest.approx(FREE_POISSON.sd)
+    assert np.diff(problem.posterior.log_frequencies(theta)[0], axis=0).any()
+    assert np.diff(moduli(*(values[n] for n in ("D_x", "D_y", "D_s", "thickness", "poisson_xy"))).E_x)[0] != 0
+    assert worst_cents(problem.posterior.models) < 0.5
+
+
+@pytest.mark.parametrize("nu_xy", [-0.01, 0.91])
+def test_range_is_physical(nu_xy):
+    assert FREE_POISSON.log_prior(FREE_POISSON.standard(nu_xy)) == -np.inf
+
+
+def test_no_candidate_where_the_ratio_is_uncertain_already():
+    board = board_of(ritz.FINNISH, [setup_of(FINNISH)])
+    uncertain = replace(board, inputs={**board.inputs, "poisson_xy": Quantity.from_mean(0.4, 0.08, "normal")})
+    assert not PoissonRatio.refusal(board, board.setups[0])
+    assert "already uncertain" in PoissonRatio.refusal(uncertain, board.setups[0])
+
+
+def test_nothing_changes_without_a_change():
+    assert shifts(FINNISH, [PoissonRatio()], {}, BEAMS["cantilever"]) == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,120 @@
+"""What cannot be determined is refused by name, with what would help; what is weakly determined is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import ritz
+from made_boards import CANTILEVER_LABELS, board_of, setup_of
+
+from bayesplate.cards import load_prior
+from bayesplate.errors import NotIdentifiableError
+from bayesplate.estimates.identifiability import identifiability, remarks, require_labels
+from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.posterior.inference import pose
+from bayesplate.workflow.prepare import prepare
+
+
+@pytest.fixture(scope="module")
+def hertz():
+    """Six modes of the paper's cantilever board without noise, by beam orders; its labels begin at (1,0)."""
+    return ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS)
+
+
+def cantilever(hertz, *labels):
+    return board_of(ritz.FINNISH, [setup_of(ritz.CANTILEVER, {label: hertz[label] for label in labels})])
+
+
+def posed(board):
+    return pose(board, load_prior("weakly-informative"))
+
+
+@pytest.mark.parametrize("n_modes", [1, 2])
+def test_fewer_modes_than_constants_are_refused(hertz, n_modes):
+    with pytest.raises(
+        NotIdentifiableError, match=rf"{n_modes} labelled modes? for three .* {3 - n_modes} more"
+    ) as caught:
+        posed(cantilever(hertz, *CANTILEVER_LABELS[:n_modes]))
+    assert caught.value.exit_code == 4
+
+
+def test_a_setup_without_labels_is_refused(hertz):
+    board = cantilever(hertz, *CANTILEVER_LABELS)
+    bare = replace(board.setups[0], name="bare", readings=(), unlabelled=(50.0, 100.0))
+    with pytest.raises(NotIdentifiableError, match="'bare' has no labelled mode, its 2 peaks have none"):
+        require_labels(replace(board, setups=(*board.setups, bare)))
+
+
+def test_three_modes_that_leave_a_constant_open_name_it_and_what_would_help(hertz):
+    """(1,0), (1,1), (2,1) in the paper's labels bend along the grain and twist: nothing bends across it."""
+    with pytest.raises(
+        NotIdentifiableError, match=r"D_y \(so E_y\).* add a mode that bends across the grain"
+    ) as caught:
+        posed(cantilever(hertz, (0, 0), (0, 1), (1, 1)))
+    message = str(caught.value)
+    assert "D_x (so" not in message
+    assert "condition number" in message
+    posed(cantilever(hertz, (0, 0), (0, 1), (1, 1), (0, 2)))  # as advised: accepted
+
+
+def test_three_modes_that_suffice_leave_nothing_to_check_with(hertz):
+    board = cantilever(hertz, (0, 0), (0, 1), (0, 2))
+    problem = posed(board)
+    sentences = " ".join(remarks(board, problem.identifiability))
+    assert "three modes fix three constants exactly" in sentences
+    assert problem.identifiability.leverages == pytest.approx(np.ones(3), abs=1e-9)
+    four = cantilever(hertz, (0, 0), (0, 1), (0, 2), (1, 1))
+    assert "three modes" not in " ".join(remarks(four, posed(four).identifiability))
+
+
+def test_a_mode_that_carries_a_constant_alone_is_named(hertz):
+    board = cantilever(hertz, (0, 0), (0, 1), (1, 0), (1, 1), (0, 2))
+    problem = posed(board)
+    leverages = dict(zip(board.setups[0].labels, problem.identifiability.leverages, strict=True))
+    named = [
+        label
+        for label in leverages
+        if f"mode {label} alone carries" in " ".join(remarks(board, problem.identifiability))
+    ]
+    assert named == [label for label, leverage in leverages.items() if leverage > 0.9]
+    assert (0, 2) in named
+    assert (0, 0) not in named
+
+
+def test_a_fully_clamped_board_is_told_what_it_sees():
+    for name, told in (("fiemme-spruce-clamped", True), ("finnish-spruce-cantilever", False)):
+        board = prepare(name).board
+        estimate = weighted_least_squares(board)
+        sentences = " ".join(remarks(board, identifiability(estimate.sensitivities, estimate.scales)))
+        assert ("only D_s + 2 nu_xy D_y is seen" in sentences) == told
+        assert "G_xy" in sentences or not told
+
+
+def test_leverages_and_errors_are_those_of_linear_regression():
+    rng = np.random.default_rng(1)
+    sensitivities, scales = rng.uniform(0, 0.5, (7, 3)), rng.uniform(0.002, 0.01, 7)
+    weighted = sensitivities / scales[:, None]
+    found = identifiability(sensitivities, scales)
+    inverse = np.linalg.inv(weighted.T @ weighted)
+    assert found.covariance == pytest.approx(inverse, rel=1e-9)
+    assert found.leverages == pytest.approx(np.diagonal(weighted @ inverse @ weighted.T), rel=1e-9)
+    assert found.leverages.sum() == pytest.approx(3.0)
+    assert found.condition_number == pytest.approx(np.linalg.cond(weighted))
+    assert found.blind() == ()
+
+
+@pytest.mark.parametrize(("factor", "blind"), [(1.9, ()), (2.1, ("D_s",))])
+def test_blind_is_what_stays_within_no_factor_of_two(factor, blind):
+    """Three modes, each of one constant: the 95 % interval of D_s is the estimate times and over the factor."""
+    scales = np.array([0.01, 0.01, 0.5 * np.log(factor) / 1.959964])
+    assert identifiability(0.5 * np.eye(3), scales).blind() == blind
+
+
+def test_a_direction_that_no_mode_sees_is_infinitely_uncertain():
+    sensitivities = np.array([[0.5, 0, 0], [0.25, 0, 0.25], [0.1, 0, 0.4], [0.3, 0, 0.2]])
+    found = identifiability(sensitivities, np.full(4, 0.01))
+    assert found.condition_number == np.inf
+    assert np.isinf(found.standard_errors).all()
+    assert found.leverages.sum() == pytest.approx(2.0)

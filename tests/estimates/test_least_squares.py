@@ -1,0 +1,70 @@
+"""Relative weighted least squares against a general minimiser, and against constants that are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import ritz
+from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
+from scipy.optimize import least_squares
+
+from bayesplate.estimates.least_squares import log_measured, reading_scales, weighted_least_squares
+from bayesplate.plate.material import moduli
+from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
+
+
+def misfits(board, log_rigidities):
+    """Weighted residuals with every setup solved anew at these constants."""
+    values = board.nominal() | dict(zip(("D_x", "D_y", "D_s"), np.exp(log_rigidities), strict=True))
+    models = models_at(board, np.exp(log_rigidities))
+    predicted = np.concatenate([model.log_frequencies(values, "linear")[0] for model in models])
+    return (predicted - log_measured(board)) / reading_scales(board)
+
+
+@pytest.mark.parametrize("name", ["finnish-spruce-cantilever", "fiemme-spruce-clamped"])
+def test_the_estimate_is_where_a_general_minimiser_ends(name):
+    board = prepare(name).board
+    estimate = weighted_least_squares(board)
+    assert estimate.converged
+    x = np.log(estimate.rigidities)
+    start = x + np.array([0.05, -0.05, 0.05])
+    found = least_squares(lambda x: misfits(board, x), start, diff_step=1e-5, method="lm", xtol=1e-9, ftol=1e-12)
+    # in standard errors; slopes by differences 1e-5 wide leave the minimiser's gradient uncertain by about as much
+    assert np.linalg.norm(found.jac @ (x - found.x)) < 1e-3
+    assert np.linalg.norm(found.jac @ (x + np.array([1e-3, 0.0, 0.0]) - found.x)) > 1e-2  # control: 0.1 % would be seen
+    # the sensitivities that come with the solve are the slopes of full solves
+    slopes = estimate.sensitivities / estimate.scales[:, None]
+    assert slopes == pytest.approx(found.jac, abs=1e-3 * np.abs(found.jac).max())
+
+
+def test_the_constants_of_another_solver_s_board_are_found():
+    """Two setups of one board from the independent solver, readings exact: 0.1 cent is 1e-4 of a modulus."""
+    free = replace(ritz.FINNISH, edges=ritz.ALL_FREE, L_x=ritz.FINNISH.L_x + 0.03)
+    setups = [
+        setup_of(ritz.CANTILEVER, ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS), name="held",
+                 clamped={"x0": Quantity.exact(0.03)}),
+        setup_of(ritz.ALL_FREE, ritz.simulate(free, FREE_LABELS), name="free"),
+    ]  # fmt: skip
+    estimate = weighted_least_squares(board_of(ritz.FINNISH, setups))
+    found = moduli(*estimate.rigidities, ritz.FINNISH.h, ritz.FINNISH.nu_xy)
+    assert np.stack(found) == pytest.approx([13.0e9, 0.702e9, 0.668e9], rel=5e-4)
+    assert np.abs(estimate.residuals).max() * 1200 / np.log(2) < 0.5
+
+
+def test_a_reading_s_own_uncertainty_weighs_it():
+    """A reading that is said to be poor is hardly followed."""
+    hertz = with_noise(ritz.simulate(ritz.FREE_SPRUCE, FREE_LABELS), 1e-4, np.random.default_rng(1))
+    hertz[1, 1] *= 1.05
+    poor = hertz | {(1, 1): Quantity.from_mean(hertz[1, 1], 0.05 * hertz[1, 1])}
+    truth = np.array([12.0e9, 0.9e9, 0.75e9])
+    errors = []
+    for readings in (hertz, poor):
+        estimate = weighted_least_squares(board_of(ritz.FREE_SPRUCE, [setup_of(ritz.ALL_FREE, readings)]))
+        found = np.stack(moduli(*estimate.rigidities, ritz.FREE_SPRUCE.h, ritz.FREE_SPRUCE.nu_xy))
+        errors.append(np.abs(found / truth - 1).max())
+    assert errors[1] < 0.005 < errors[0]
+    # a weight of (0.003 / 0.05)^2 leaves that share of the bias
+    assert errors[1] < 0.05 * errors[0] + 1e-3

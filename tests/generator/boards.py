@@ -1,0 +1,214 @@
+"""Boards with planted effects: constants drawn around spruce, effects of a size, noise, and a card to read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from generator.card import card_text
+from generator.designs import DESIGNS, MEDIANS, POISSON, Design
+from generator.naming import LEAST_CORRELATION, Label, frequencies
+from generator.recipes import KNOWN_SIZE, LIBRARY, RECIPES
+
+MOST_DRAWS = 200
+KINDS = {"none": 0.25, "one": 0.5, "two": 0.125, "outside": 0.125}
+"""Shares of boards without effect, with one, with two, and with one that no library knows."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is true of a planted board.
+
+    Attributes
+    ----------
+    constants : dict
+        E_x, E_y, G_xy, Pa, and nu_xy as tabulated (a planted poisson_ratio replaces it).
+    effects : dict
+        Name -> parameters, SI units; empty for an ideal board.
+    size : dict
+        Name -> multiple of the design's nominal size.
+    noise_cents : float
+        Standard deviation of the readings.
+    """
+
+    constants: dict[str, float]
+    effects: dict[str, dict[str, Any]]
+    size: dict[str, float]
+    noise_cents: float
+
+    @property
+    def is_in_library(self) -> bool:
+        """Whether the package knows every planted effect by name."""
+        return all(name in LIBRARY for name in self.effects)
+
+
+@dataclass(frozen=True)
+class PlantedBoard:
+    """A simulated board.
+
+    Attributes
+    ----------
+    name : str
+    design : Design
+    truth : Truth
+    readings : dict
+        Setup name -> laboratory's label -> Hz, with noise.
+    exact : dict
+        The same without noise.
+    n_draws : int
+        How many boards were drawn until every label was beyond doubt.
+    places_known : bool
+        Whether the card says where the attached mass sits.
+    """
+
+    name: str
+    design: Design
+    truth: Truth
+    readings: dict[str, dict[Label, float]]
+    exact: dict[str, dict[Label, float]]
+    n_draws: int
+    places_known: bool = True
+    prior: str = ""
+
+    def card_text(self) -> str:
+        """The board card, which tells nothing of the truth but the noise and the place of an attached mass."""
+        places = self.truth.effects.get("attached_mass", {}).get("places", ()) if self.places_known else ()
+        return card_text(
+            self.name,
+            self.design,
+            self.readings,
+            noise_cents=self.truth.noise_cents,
+            places=places,
+            outline=self.truth.effects.get("outline_profile"),
+            prior=self.prior,
+        )
+
+    def shifts(self) -> dict[str, dict[Label, float]]:
+        """What the effects do, against the ideal board of the same constants: setup -> label -> cents, no noise."""
+        ideal = _frequencies(self.design, self.truth.constants, {})[0]
+        return {
+            setup: {label: 1200.0 * float(np.log2(hz / ideal[setup][label])) for label, hz in exact.items()}
+            for setup, exact in self.exact.items()
+        }
+
+
+def plant(
+    rng: np.random.Generator,
+    design: Design | str,
+    effects: Sequence[str] | None = None,
+    size: float | None = 1.0,
+    noise_cents: float | None = 5.0,
+    *,
+    name: str = "planted",
+    scale_known: bool = False,
+    n_places: int = 1,
+    places_known: bool = True,
+    prior: str = "",
+) -> PlantedBoard:
+    """Simulate a board.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    design : Design or str
+        One of `DESIGNS`.
+    effects : sequence of str, optional
+        Names to plant, of the library or outside it; empty for an ideal board. None draws none, one, two, or one
+        outside the library, with the shares `KINDS`.
+    size : float, optional
+        Multiple of the design's nominal sizes; None draws it from 1/2 to 2, log-uniform, for each effect.
+    noise_cents : float, optional
+        Standard deviation of the noise of a reading; None draws it from 2 to 17, log-uniform.
+    name : str
+        Of the card.
+    scale_known : bool
+        Whether size acts on the air and the shear compliance too, beyond what is physical.
+    n_places : int
+        Places over which an attached mass roves.
+    places_known : bool
+        Whether the card states the place of a planted mass.
+    prior : str
+        Prior card named in the card; empty: the package's default.
+
+    Returns
+    -------
+    PlantedBoard
+
+    Raises
+    ------
+    ValueError
+        If an effect is unknown, or acts in no setup of the design.
+    RuntimeError
+        If no board with labels beyond doubt was found in `MOST_DRAWS` draws.
+    """
+    design = DESIGNS[design] if isinstance(design, str) else design
+    planted = _choose(rng, design) if effects is None else tuple(effects)
+    _refuse_wrong(planted, design)
+    noise = _log_uniform(rng, 2.0, 17.0) if noise_cents is None else noise_cents
+    for n_draws in range(1, MOST_DRAWS + 1):
+        constants = _draw_constants(rng)
+        sizes = {effect: _size(rng, effect, size, scale_known) for effect in planted}
+        drawn = {effect: RECIPES[effect].draw(rng, design, sizes[effect]) for effect in planted}
+        if n_places > 1 and "attached_mass" in drawn:
+            more = [RECIPES["attached_mass"].draw(rng, design, 1.0)["places"][0] for _ in range(n_places - 1)]
+            drawn["attached_mass"]["places"] += tuple(more)
+        exact, correlation = _frequencies(design, constants, drawn)
+        if correlation >= LEAST_CORRELATION:
+            truth = Truth(constants, drawn, sizes, noise)
+            readings = {setup: _read(rng, hertz, noise) for setup, hertz in exact.items()}
+            return PlantedBoard(name, design, truth, readings, exact, n_draws, places_known, prior)
+    raise RuntimeError(f"{design.name} with {', '.join(planted)}: wanted a board with clear labels, got none")
+
+
+def _read(rng: np.random.Generator, hertz: Mapping[Label, float], noise_cents: float) -> dict[Label, float]:
+    """Frequencies with relative normal noise."""
+    return {label: hz * 2.0 ** (noise_cents * float(rng.standard_normal()) / 1200.0) for label, hz in hertz.items()}
+
+
+def _frequencies(
+    design: Design, constants: Mapping[str, float], drawn: Mapping[str, Mapping[str, Any]]
+) -> tuple[dict[str, dict[Label, float]], float]:
+    """Frequencies by setup and laboratory's label, and the smallest correlation with a beam product."""
+    hertz: dict[str, dict[Label, float]] = {}
+    least = 1.0
+    for setup in design.setups:
+        acting = [RECIPES[e].make(dict(values)) for e, values in drawn.items() if RECIPES[e].acts(setup)]
+        found, correlation = frequencies(design.plate(setup, constants), acting, setup.beams)
+        hertz[setup.name] = {setup.label(beams): value for beams, value in found.items()}
+        least = min(least, correlation)
+        if least < LEAST_CORRELATION:
+            break
+    return hertz, least
+
+
+def _draw_constants(rng: np.random.Generator) -> dict[str, float]:
+    drawn = {name: float(m * np.exp(np.log(f) * rng.standard_normal())) for name, (m, f) in MEDIANS.items()}
+    return {**drawn, "nu_xy": POISSON}
+
+
+def _choose(rng: np.random.Generator, design: Design) -> tuple[str, ...]:
+    kind = str(rng.choice(list(KINDS), p=list(KINDS.values())))
+    if kind == "outside":
+        return (str(rng.choice(design.drawn_outside)),)
+    n = {"none": 0, "one": 1, "two": 2}[kind]
+    return tuple(str(effect) for effect in rng.choice(design.drawn, size=n, replace=False))
+
+
+def _size(rng: np.random.Generator, effect: str, size: float | None, scale_known: bool) -> float:
+    wanted = _log_uniform(rng, 0.5, 2.0) if size is None else size
+    return wanted if scale_known or effect not in KNOWN_SIZE else 1.0
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _refuse_wrong(planted: Sequence[str], design: Design) -> None:
+    for effect in planted:
+        if effect not in RECIPES:
+            raise ValueError(f"effects: wanted one of {', '.join(RECIPES)}, got {effect}")
+        if not any(RECIPES[effect].acts(setup) for setup in design.setups):
+            raise ValueError(f"effects: wanted one that acts on {design.name}, got {effect}")

@@ -1,0 +1,104 @@
+"""A board card written out as text, in the format that the package's README of cards shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from generator.designs import POISSON, SHEAR_MEANS, Design, Setup
+from generator.naming import Label
+
+NOISE_FACTOR = 1.65
+LEAST_NOISE_CENTS = 0.1
+"""A card must state some noise; less than this is stated as this."""
+
+
+def card_text(
+    name: str,
+    design: Design,
+    readings: Mapping[str, Mapping[Label, float]],
+    *,
+    noise_cents: float,
+    places: Sequence[tuple[float, float]] = (),
+    outline: Mapping[str, Any] | None = None,
+    prior: str = "",
+) -> str:
+    """The card of a simulated board.
+
+    Parameters
+    ----------
+    name : str
+    design : Design
+    readings : mapping
+        Setup name -> laboratory's label -> Hz.
+    noise_cents : float
+        Stated as the median of the noise prior, with the factor 1.65.
+    places : sequence of (float, float), m
+        Of an accelerometer whose mass is not stated; several if it roved.
+    outline : mapping, optional
+        Stations and widths, m, of a board that is not a rectangle: they are measured, so the card has them.
+    prior : str
+        A prior card; empty: the package's default.
+
+    Returns
+    -------
+    str
+    """
+    width = f"{_mm(design.L_y)}"
+    if outline:
+        width = f"{{ readings = {_list(outline['widths'])}, at_x_mm = {_list(outline['stations'])} }}"
+    shear = {key: f"{{ mean = {mean / 1e9:.6g}, sd = {sd / 1e9:.6g} }}" for key, (mean, sd) in SHEAR_MEANS.items()}
+    lines = [
+        "format = 1",
+        f'name = "{name}"',
+        f'title = "A simulated board, {design.name}"',
+        'source = "computed by tests/generator, an independent discretisation; noise added"',
+        "",
+        "[plate]",
+        f"length_x_mm = {_mm(design.L_x)}",
+        f"length_y_mm = {width}",
+        f"thickness_mm = {_mm(design.h)}",
+        f"density_kg_m3 = {design.rho:.6g}",
+        "",
+        "[material]",
+        f"poisson_xy = {POISSON}",
+        f"shear_xz_gpa = {shear['G_xz']}",
+        f"shear_yz_gpa = {shear['G_yz']}",
+        *([f'prior = "{prior}"'] if prior else []),
+    ]
+    for setup in design.setups:
+        lines += ["", *_setup_lines(setup, readings[setup.name], noise_cents, places)]
+    return "\n".join(lines) + "\n"
+
+
+def noise_percent(cents: float) -> float:
+    """A noise in cents as a relative one, percent."""
+    return 100.0 * (2.0 ** (max(cents, LEAST_NOISE_CENTS) / 1200.0) - 1.0)
+
+
+def _setup_lines(
+    setup: Setup, hertz: Mapping[Label, float], noise_cents: float, places: Sequence[tuple[float, float]]
+) -> list[str]:
+    edges = ", ".join(f'{edge} = "{word}"' for edge, word in setup.edges.items())
+    at = [f"[{_mm(x)}, {_mm(y)}]" for x, y in places]
+    return [
+        "[[setup]]",
+        f'name = "{setup.name}"',
+        f"edges = {{ {edges} }}",
+        *([f"clamped_mm = {{ x0 = {_mm(setup.covered)} }}"] if setup.covered else []),
+        f"first_label = [{setup.first_label[0]}, {setup.first_label[1]}]",
+        f"noise_percent = {{ median = {noise_percent(noise_cents):.6g}, factor = {NOISE_FACTOR} }}",
+        "",
+        "[setup.frequencies_hz]",
+        *(f'"({m},{n})" = {value:.9g}' for (m, n), value in sorted(hertz.items(), key=lambda item: item[1])),
+        *(["", "[[setup.attached]]", 'kind = "accelerometer"'] if at else []),
+        *([f"at_mm = {at[0] if len(at) == 1 else '[' + ', '.join(at) + ']'}"] if at else []),
+    ]
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.6g}"
+
+
+def _list(metres: Sequence[float]) -> str:
+    return "[" + ", ".join(_mm(value) for value in metres) + "]"

@@ -1,0 +1,157 @@
+"""How each effect is drawn for a design: its parameters at a size, and the effect they make in a setup."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from generator import effects, outside
+from generator.designs import POISSON, SHEAR_MEANS, Design, Setup
+from generator.effects import NoEffect
+
+Parameters = dict[str, Any]
+Draw = Callable[[np.random.Generator, Design, float], Parameters]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How to draw an effect.
+
+    Attributes
+    ----------
+    draw : callable
+        (rng, design, size) -> parameters in SI units; size multiplies the nominal amplitude, compliance if a spring.
+    make : callable
+        Parameters -> effect.
+    acts : callable
+        Whether it can act in a setup.
+    """
+
+    draw: Draw
+    make: Callable[[Parameters], NoEffect]
+    acts: Callable[[Setup], bool] = lambda setup: True
+
+
+def _sign(rng: np.random.Generator) -> float:
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def _amplitude(parameter: str, nominal: str, signed: bool = False) -> Draw:
+    def draw(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+        return {parameter: size * design.nominal[nominal] * (_sign(rng) if signed else 1.0)}
+
+    return draw
+
+
+def _compliance(parameter: str, nominal: str) -> Draw:
+    return lambda rng, design, size: {parameter: design.nominal[nominal] / size}
+
+
+def _shear(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    """Log-normal with the mean and sd of the card, cut at two sd; size divides both."""
+    drawn = {}
+    for name, (mean, sd) in SHEAR_MEANS.items():
+        spread = np.sqrt(np.log1p((sd / mean) ** 2))
+        drawn[name] = float(mean * np.exp(spread * np.clip(rng.standard_normal(), -2.0, 2.0) - 0.5 * spread**2) / size)
+    return drawn
+
+
+def _air(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    return {"density": 1.2 * size * float(rng.uniform(0.97, 1.03)), "baffle": float(rng.uniform())}
+
+
+def _attached(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    """One place, in the outer part of the board if it is a cantilever."""
+    low = 0.4 if any("free" in s.edges.values() and s.is_clamped for s in design.setups) else 0.05
+    place = (float(design.L_x * rng.uniform(low, 0.95)), float(design.L_y * rng.uniform(0.05, 0.95)))
+    return {"mass": size * design.nominal["attached_mass"], "places": (place,), "rotary_radius": 0.0}
+
+
+def _tension(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    nominal = size * design.nominal["membrane_tension"]
+    return {name: nominal * float(rng.uniform(0.5, 1.5)) for name in ("N_x", "N_y")}
+
+
+def _taper(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    return {"taper_x": size * design.nominal["taper"] * _sign(rng), "taper_y": 0.0}
+
+
+def _outline(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    """Narrower at one end, straight from the middle to the other."""
+    narrow = design.L_y * (1.0 - size * design.nominal["outline"])
+    widths = (narrow, design.L_y, design.L_y)[:: int(_sign(rng))]
+    return {"stations": (0.0, 0.5 * design.L_x, design.L_x), "widths": widths}
+
+
+def _grain(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    return {"angle": float(np.radians(size * design.nominal["grain_angle"] * _sign(rng)))}
+
+
+def _poisson(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    return {"nu_xy": POISSON + size * design.nominal["poisson_ratio"] * _sign(rng)}
+
+
+def _rib(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    stiffness = size * design.nominal["rib"]
+    height = (12.0 * stiffness / 12e9) ** 0.25  # a square rib of spruce
+    place = float(design.L_x * rng.uniform(0.3, 0.8))
+    return {"place": place, "stiffness": stiffness, "line_mass": 430.0 * height**2}
+
+
+def _crack(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    """From one end of the board, over a quarter to a half of its length."""
+    return {
+        "start": float(design.L_x * rng.uniform(0.5, 0.75)),
+        "end": design.L_x,
+        "place": float(design.L_y * rng.uniform(0.25, 0.75)),
+        "width": 0.2 * design.L_y,
+        "loss": min(0.9, size * design.nominal["crack"]),
+    }
+
+
+def _make(effect: type[NoEffect]) -> Callable[[Parameters], NoEffect]:
+    return lambda parameters: effect(**parameters)
+
+
+LIBRARY: dict[str, Recipe] = {
+    "transverse_shear": Recipe(_shear, _make(effects.TransverseShear)),
+    "air_loading": Recipe(_air, _make(effects.AirLoading)),
+    "attached_mass": Recipe(_attached, _make(effects.AttachedMass)),
+    "clamp_rotation": Recipe(
+        _compliance("stiffness", "clamp_rotation"), _make(effects.ClampRotation), lambda setup: setup.is_clamped
+    ),
+    "clamp_translation": Recipe(
+        _compliance("stiffness", "clamp_translation"), _make(effects.ClampTranslation), lambda setup: setup.is_clamped
+    ),
+    "support_mass": Recipe(
+        _compliance("mass", "support_mass"), _make(effects.SupportMass), lambda setup: setup.is_framed
+    ),
+    "membrane_tension": Recipe(_tension, _make(effects.MembraneTension), lambda setup: setup.is_framed),
+    "support_stiffness": Recipe(
+        _amplitude("stiffness", "support_stiffness"), _make(effects.SupportStiffness), lambda setup: setup.is_free
+    ),
+    "thickness_profile": Recipe(_taper, _make(effects.ThicknessProfile)),
+    "outline_profile": Recipe(
+        _outline, _make(effects.OutlineProfile), lambda setup: setup.edges["y0"] == setup.edges["y1"] == "free"
+    ),
+    "density_gradient": Recipe(_amplitude("gradient", "density_gradient", signed=True), _make(effects.DensityGradient)),
+    "grain_angle": Recipe(_grain, _make(effects.GrainAngle)),
+    "poisson_ratio": Recipe(_poisson, _make(effects.PoissonRatio)),
+}
+"""The effects that the package's library also knows, by its names."""
+
+OUTSIDE: dict[str, Recipe] = {
+    "rib": Recipe(_rib, _make(outside.Rib)),
+    "stiffness_gradient": Recipe(
+        _amplitude("gradient", "stiffness_gradient", signed=True), _make(outside.StiffnessGradient)
+    ),
+    "crack": Recipe(_crack, _make(outside.Crack)),
+}
+"""The effects that it does not know."""
+
+RECIPES = LIBRARY | OUTSIDE
+KNOWN_SIZE = ("transverse_shear", "air_loading")
+"""Effects whose size nature sets: they are left alone when a size is asked for, unless that is asked for too."""

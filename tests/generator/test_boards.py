@@ -1,0 +1,153 @@
+"""Planted boards: clear labels, the stated noise, cards that the package reads, nothing taken from the package."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesplate.cards import physical_faults, read_board_text
+from generator.__main__ import main
+from generator.boards import plant
+from generator.designs import DESIGNS
+from generator.naming import named
+from generator.plate import solve
+from generator.recipes import OUTSIDE, RECIPES
+
+FOLDER = Path(__file__).parent
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A seeded generator."""
+    return np.random.default_rng(20)
+
+
+@pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+def test_every_effect_of_a_design_moves_its_labelled_modes(design, rng: np.random.Generator) -> None:
+    """By 1 to 150 cents rms at nominal size, air on the light clamped board most; the package reads every card."""
+    for effect in (*design.drawn, *design.drawn_outside):
+        board = plant(rng, design, [effect])
+        shifts = np.array([cents for setup in board.shifts().values() for cents in setup.values()])
+        card = read_board_text(board.card_text(), "planted.toml")
+
+        assert list(board.truth.effects) == [effect]
+        assert board.truth.is_in_library == (effect not in OUTSIDE)
+        assert len(shifts) == sum(len(setup.beams) for setup in design.setups)
+        assert 1.0 < np.sqrt(np.mean(shifts**2)) < 150.0, effect
+        assert not list(physical_faults(card))
+
+
+def test_labels_are_the_lowest_modes_of_the_nominal_cantilever() -> None:
+    design = DESIGNS["cantilever-9"]
+    setup = design.setups[0]
+    plate = design.plate(setup, {"E_x": 11.5e9, "E_y": 0.9e9, "G_xy": 0.7e9, "nu_xy": 0.4})
+    names = named(solve(plate, (), 16), plate.edges)
+    lowest = sorted(names, key=lambda beams: names[beams][0])[:9]
+
+    assert sorted(lowest) == sorted(setup.beams)
+    assert setup.label((0, 2)) == (1, 2)
+
+
+def test_noise_is_what_the_truth_says(rng: np.random.Generator) -> None:
+    """Mean square of 40 boards' residuals within four of its standard errors; without noise there are none."""
+    noise = 7.0
+    residuals = []
+    for _ in range(40):
+        board = plant(rng, "cantilever-6", [], noise_cents=noise)
+        read, exact = board.readings["cantilever"], board.exact["cantilever"]
+        residuals += [1200.0 * np.log2(read[label] / exact[label]) for label in exact]
+    n = len(residuals)
+
+    assert np.mean(np.square(residuals)) / noise**2 == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / n))
+    assert np.mean(residuals) == pytest.approx(0.0, abs=4.0 * noise / np.sqrt(n))
+    quiet = plant(rng, "cantilever-6", [], noise_cents=0.0)
+    assert quiet.readings == quiet.exact
+    assert all(shift == 0.0 for shift in quiet.shifts()["cantilever"].values())
+
+
+def test_card_says_what_a_laboratory_would_know(rng: np.random.Generator) -> None:
+    board = plant(rng, "cantilever-6-free-6", ["attached_mass", "outline_profile"], noise_cents=5.0, n_places=2)
+    card = tomllib.loads(board.card_text())
+    cantilever, free = card["setup"]
+
+    assert cantilever["clamped_mm"] == {"x0": 30}
+    assert "resolution_hz" not in cantilever
+    assert cantilever["noise_percent"] == {"median": pytest.approx(0.28923, rel=1e-4), "factor": 1.65}
+    assert len(free["attached"][0]["at_mm"]) == 2
+    assert "mass_g" not in free["attached"][0]
+    assert card["plate"]["length_y_mm"]["at_x_mm"] == [0, 126.5, 253]
+    assert card["material"]["poisson_xy"] == 0.4
+    assert free["frequencies_hz"]["(1,1)"] == pytest.approx(board.readings["free"][1, 1], rel=1e-8)
+    silent = plant(rng, "cantilever-6", ["attached_mass"], places_known=False)
+    assert "attached" not in silent.card_text()
+
+
+def test_same_seed_same_board() -> None:
+    first, second, other = (plant(np.random.default_rng(seed), "clamped-9", size=None) for seed in (4, 4, 5))
+
+    assert first.card_text() == second.card_text()
+    assert first.card_text() != other.card_text()
+
+
+def test_random_boards_have_random_effects_sizes_and_noise(rng: np.random.Generator) -> None:
+    truths = [plant(rng, "cantilever-6", size=None, noise_cents=None).truth for _ in range(60)]
+    numbers = {len(truth.effects) for truth in truths}
+    sizes = list(itertools.chain.from_iterable(truth.size.values() for truth in truths))
+
+    assert numbers == {0, 1, 2}
+    assert any(not truth.is_in_library for truth in truths)
+    assert all(0.5 <= size <= 2.0 for size in sizes)
+    assert np.ptp(sizes) > 0.5
+    assert all(2.0 <= truth.noise_cents <= 17.0 for truth in truths)
+
+
+def test_air_and_shear_keep_their_physical_size_unless_told(rng: np.random.Generator) -> None:
+    physical, doubled = (
+        plant(rng, "free-12", ["air_loading"], 2.0, scale_known=scale).truth.effects["air_loading"]["density"]
+        for scale in (False, True)
+    )
+
+    assert physical == pytest.approx(1.2, rel=0.04)
+    assert doubled == pytest.approx(2.4, rel=0.04)
+
+
+@pytest.mark.parametrize("effect", ["membrane_tension", "support_mass", "support_stiffness"])
+def test_an_effect_that_cannot_act_is_refused(effect: str, rng: np.random.Generator) -> None:
+    with pytest.raises(ValueError, match=f"wanted one that acts on cantilever-6, got {effect}"):
+        plant(rng, "cantilever-6", [effect])
+
+
+def test_an_unknown_effect_is_refused(rng: np.random.Generator) -> None:
+    with pytest.raises(ValueError, match=r"wanted one of transverse_shear, .*, got gravity"):
+        plant(rng, "cantilever-6", ["gravity"])
+
+
+def test_command_prints_a_card(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["--design", "cantilever-6", "--effect", "attached_mass", "--seed", "3", "--truth"])
+    card, truth = capsys.readouterr()
+
+    assert tomllib.loads(card)["setup"][0]["attached"][0]["kind"] == "accelerometer"
+    assert '"attached_mass": {"mass":' in truth
+
+
+def test_nothing_comes_from_the_package() -> None:
+    """Only the tests may import it, to read the cards."""
+    for file in FOLDER.glob("*.py"):
+        if file.name.startswith("test_"):
+            continue
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = (
+                [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "") or ""]
+            )
+            assert not any(name.split(".")[0] == "bayesplate" for name in names), file.name
+
+
+def test_every_recipe_has_a_design() -> None:
+    drawn = {effect for design in DESIGNS.values() for effect in (*design.drawn, *design.drawn_outside)}
+
+    assert set(RECIPES) - drawn == {"outline_profile"}, "an outline is measured, so it is planted on request"

@@ -1,0 +1,76 @@
+"""The air of the panels against strips, squares, and the wavenumber integrals of physics.md."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+from generator.designs import ALL_FREE
+from generator.effects import AirLoading
+from generator.known_boards import BEAMS, FIEMME, FINNISH, cents, field
+from generator.naming import frequencies
+from generator.panels import air_mass, source_pairs
+from generator.plate import Plate, solve
+
+
+def piston(L_x: float, L_y: float, baffled: bool, n_panels: int = 400) -> float:
+    """Air moved by a rigid rectangle, both faces, m^3 per unit density."""
+    basis = Plate(1.0, 1.0, 1.0, 0.0, 1.0, 1.0, L_x, L_y, ALL_FREE).basis((4, 4))
+    moved = field(basis, lambda x, y: np.ones_like(x))
+    return float(moved @ air_mass(basis, baffled, n_panels) @ moved)
+
+
+def test_pairs_of_panels_against_direct_integration() -> None:
+    table = source_pairs(3, 3, 1.0, 0.7)
+    direct = scipy.integrate.dblquad(
+        lambda v, u: (1.0 - abs(u)) * (0.7 - abs(v)) / np.hypot(u + 2.0, v + 0.7), -1.0, 1.0, -0.7, 0.7, epsabs=1e-5
+    )[0]
+
+    assert table[0, 7] == pytest.approx(direct, rel=1e-4)
+    assert source_pairs(1, 1, 1.0, 1.0)[0, 0] == pytest.approx(4.0 * (np.arcsinh(1.0) + (1.0 - np.sqrt(2.0)) / 3.0))
+
+
+def test_rigid_squares() -> None:
+    """In a wall: the self-potential of a square; in the open: 0.579 of pi a^3 / 4, the coefficient of the handbooks."""
+    assert piston(1.0, 1.0, True) == pytest.approx(2.97321 / np.pi, rel=1e-4)
+    assert piston(1.0, 1.0, False) == pytest.approx(0.579 * np.pi / 4.0, rel=2e-3)
+
+
+def test_long_narrow_strip() -> None:
+    """pi b^2 / 4 per length from the difference of two long strips, whose ends cancel."""
+    longer, shorter = piston(5.0, 0.1, False), piston(3.0, 0.1, False)
+
+    assert (longer - shorter) / 2.0 == pytest.approx(np.pi * 0.1**2 / 4.0, rel=4e-3)
+
+
+@pytest.mark.parametrize(
+    ("baffled", "printed"),
+    [(True, [0.34, 0.14, 0.18, 0.12, 0.12, 0.09]), (False, [0.25, 0.13, 0.16, 0.11, 0.09, 0.08])],
+)
+def test_added_mass_of_the_clamped_board(baffled: bool, printed: list[float]) -> None:
+    """1.2 kg m^-3, modes in the order of BEAMS; half a unit of the last printed digit and the 15 % of the brief."""
+    bare = solve(FIEMME, (), 6)
+    ratios = 1.2 * np.einsum("ik,ij,jk->k", bare.vectors, air_mass(bare.basis, baffled), bare.vectors)
+
+    assert ratios == pytest.approx(printed, rel=0.03, abs=0.005)
+
+
+def test_lattices_have_converged() -> None:
+    basis = FINNISH.basis()
+    vectors = solve(FINNISH, (), 6).vectors
+    coarse, fine = (
+        [vectors[:, k] @ air_mass(basis, baffled, n) @ vectors[:, k] for k in range(6) for baffled in (False, True)]
+        for n in (300, 900)
+    )
+
+    assert coarse == pytest.approx(fine, rel=3e-3)
+
+
+def test_baffle_lies_between_its_ends() -> None:
+    shifts = [cents(FINNISH, [AirLoading(1.2, baffle)], BEAMS["cantilever"]) for baffle in (0.0, 0.5, 1.0)]
+
+    assert np.all(shifts[0] > shifts[1])
+    assert np.all(shifts[1] > shifts[2])
+    none = frequencies(FINNISH, [AirLoading(0.0)], BEAMS["cantilever"])[0]
+    assert none == pytest.approx(frequencies(FINNISH, (), BEAMS["cantilever"])[0])

@@ -1,0 +1,183 @@
+"""The paper's training of twenty-five plates: its coefficients, its R^2, and what its figure of MAC matrices shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesplate.errors import NotIdentifiableError
+from bayesplate.frequencies.terms import paper_coefficients
+from bayesplate.modes import training
+from bayesplate.modes.naming import find
+from bayesplate.modes.plate import thin_plate
+from bayesplate.modes.training import REFERENCE, TrainingConstants, train, training_weights
+
+CANTILEVER = (("clamped", "free"), ("free", "free"), 223 / 114, 3 / 223)
+CLAMPED = (("clamped", "clamped"), ("clamped", "clamped"), 150 / 103, 3 / 600)
+CONSTANTS = TrainingConstants(E_x=10.7e9, E_y=0.716e9, G_xy=0.50e9, nu_xy=0.51, G_xz=0.62e9, G_yz=0.023e9)
+MIDDLE = np.array([5.44, 0.364, 1.0])  # p, q, 1 of the plate in the middle of the set
+
+# Tables "Linear fit results" of the paper: a, b, c by label. The cantilever's first label is (1,0).
+CANTILEVER_TABLE = {
+    (1, 0): (3.21, 0.00, 0.00),
+    (1, 1): (3.99, 0.94, 40.5),
+    (2, 0): (117.0, 41.9, 13.6),
+    (1, 2): (14.4, 1720, 155),
+    (2, 1): (124, 15.6, 328),
+    (2, 2): (134, 1910, 1260),
+}
+CLAMPED_TABLE = {
+    (0, 0): (236, 1214, 146.9),
+    (0, 1): (237.5, 8589, 552.3),
+    (1, 0): (1790, 1652, 534.9),
+    (0, 2): (242, 31910, 1196),
+    (1, 1): (1792, 10180, 2051),
+    (1, 2): (1799, 35250, 4469),
+}
+VEERING = {(2, 0), (1, 2)}
+
+
+def beams(label):
+    """Orders of the beam functions behind a label of the cantilever."""
+    return label[0] - 1, label[1]
+
+
+def plane(mode):
+    return np.array([mode.a, mode.b, mode.c])
+
+
+@pytest.fixture(scope="module")
+def cantilever():
+    return train(*CANTILEVER, CONSTANTS, "shear-flexible", [beams(label) for label in CANTILEVER_TABLE])
+
+
+@pytest.fixture(scope="module")
+def thin_cantilever():
+    return train(*CANTILEVER, CONSTANTS, "thin", [beams(label) for label in CANTILEVER_TABLE])
+
+
+@pytest.fixture(scope="module")
+def clamped():
+    return train(*CLAMPED, CONSTANTS, "thin", list(CLAMPED_TABLE))
+
+
+def assert_printed(mode, printed):
+    """a and c to 1 % or a unit of the last digit, b to what 0.2 % of omega_bar^2 allows: it is the smallest share."""
+    assert (mode.a, mode.c) == pytest.approx((printed[0], printed[2]), rel=0.01, abs=0.005)
+    assert abs(mode.b - printed[1]) * MIDDLE[1] < 0.002 * plane(mode) @ MIDDLE
+
+
+@pytest.mark.parametrize("label", [label for label in CANTILEVER_TABLE if label not in VEERING], ids=str)
+def test_cantilever_coefficients_are_the_printed_ones(cantilever, label):
+    mode = cantilever.modes[beams(label)]
+
+    assert_printed(mode, CANTILEVER_TABLE[label])
+    assert mode.n_plates == 25
+
+
+@pytest.mark.parametrize("label", VEERING, ids=str)
+def test_veering_modes_lie_on_the_printed_planes(cantilever, label):
+    """Their coefficients depend on which plates are discarded; their planes agree to 0.6 % wherever recognised."""
+    printed = np.array(CANTILEVER_TABLE[label])
+    mode = cantilever.modes[beams(label)]
+    points = np.array([[p.p, p.q, 1.0] for p in cantilever.plates if beams(label) in p.matches])
+
+    assert 3 <= mode.n_plates == len(points) < 25
+    np.testing.assert_allclose(points @ plane(mode), points @ printed, rtol=0.006)
+
+
+def test_thin_plates_do_not_give_the_cantilever_table(thin_cantilever):
+    """The printed cantilever has transverse shear in it: without, (2,2) is 7 % stiffer along and 14 % across."""
+    mode = thin_cantilever.modes[beams((2, 2))]
+
+    with pytest.raises(AssertionError):
+        assert_printed(mode, CANTILEVER_TABLE[2, 2])
+    assert mode.a / CANTILEVER_TABLE[2, 2][0] == pytest.approx(1.07, abs=0.01)
+    assert mode.b / CANTILEVER_TABLE[2, 2][1] == pytest.approx(1.14, abs=0.01)
+
+
+@pytest.mark.parametrize("label", CLAMPED_TABLE, ids=str)
+def test_clamped_coefficients_are_the_printed_ones(clamped, label):
+    mode = clamped.modes[label]
+
+    assert (mode.a, mode.b) == pytest.approx(CLAMPED_TABLE[label][:2], rel=0.01)
+    assert mode.c == pytest.approx(CLAMPED_TABLE[label][2], rel=0.035)
+
+
+def test_clamped_training_agrees_with_the_energy_shares_of_one_solve(clamped):
+    """Clamped modes hardly change their shapes, so that chord and tangent agree to 0.15 %."""
+    ends_x, ends_y, aspect_ratio, _ = CLAMPED
+    weights = training_weights(*CLAMPED[2:], CONSTANTS, "thin")
+    found = find(thin_plate(ends_x, ends_y, 16, 16), weights, CLAMPED_TABLE)
+    shares = paper_coefficients(
+        np.stack([found[label].stiffness for label in CLAMPED_TABLE]), aspect_ratio, CONSTANTS.nu_xy
+    )
+
+    np.testing.assert_allclose([plane(clamped.modes[label]) for label in CLAMPED_TABLE], shares, rtol=1.5e-3)
+
+
+def test_non_negativity_hides_a_negative_share(thin_cantilever):
+    """More E_y lowers the lowest mode of a cantilever, by way of nu_yx: b = -0.34. The fit can only answer zero."""
+    ends_x, ends_y, aspect_ratio, _ = CANTILEVER
+    weights = training_weights(*CANTILEVER[2:], CONSTANTS, "thin")
+    found = find(thin_plate(ends_x, ends_y, 16, 16), weights, [(0, 0)])
+    (share,) = paper_coefficients(found[0, 0].stiffness[None], aspect_ratio, CONSTANTS.nu_xy)
+
+    assert share[1] == pytest.approx(-0.34, abs=0.05)
+    assert thin_cantilever.modes[0, 0].b == 0.0
+
+
+@pytest.mark.parametrize("name", ["cantilever", "clamped"])
+def test_planes_explain_the_frequencies(request, name):
+    modes = request.getfixturevalue(name).modes.values()
+
+    assert all(0.999 <= mode.r_squared <= 1.0 for mode in modes)
+    assert len({mode.r_squared for mode in modes}) == 6
+
+
+def test_plates_cover_the_printed_ranges(cantilever):
+    """4.3 < p < 6.6 and 0.28 < q < 0.45."""
+    p, q = (np.array([getattr(plate, name) for plate in cantilever.plates]) for name in "pq")
+
+    assert len({plate.factors for plate in cantilever.plates}) == 25
+    assert 4.3 < p.min() < p.max() < 6.6
+    assert 0.28 < q.min() < q.max() < 0.45
+    reference = cantilever.plate(REFERENCE)
+    assert (reference.p, reference.q) == pytest.approx((4.36, 0.29), abs=0.005)
+
+
+def test_reference_recognises_itself(cantilever):
+    np.testing.assert_allclose(cantilever.plate(REFERENCE).mac[:, :6], np.eye(6), atol=1e-3)
+
+
+def test_modes_cross_where_the_figure_says(cantilever):
+    """At p = 4.36, q = 0.40 mode (2,1) has come below (1,2); the paper keeps nu_yx fixed, so its p is 0.03 lower."""
+    reference, crossed = cantilever.plate(REFERENCE), cantilever.plate((0.8, 1.1))
+
+    assert (crossed.p, crossed.q) == pytest.approx((4.36, 0.40), abs=0.03)
+    assert (reference.matches[beams((1, 2))], reference.matches[beams((2, 1))]) == (3, 4)
+    assert (crossed.matches[beams((1, 2))], crossed.matches[beams((2, 1))]) == (4, 3)
+
+
+def test_modes_are_ambiguous_where_the_figure_says(cantilever):
+    """At p = 6.53, q = 0.29 (2,0) and (1,2) are mixtures of their references; the others are what they were."""
+    plate = cantilever.plate((1.2, 0.8))
+    rows = [list(CANTILEVER_TABLE).index(label) for label in VEERING]
+
+    assert (plate.p, plate.q) == pytest.approx((6.53, 0.29), abs=0.04)
+    assert set(plate.matches) == {beams(label) for label in CANTILEVER_TABLE if label not in VEERING}
+    assert np.all((plate.mac[np.ix_(rows, [2, 3])] > 0.2) & (plate.mac[np.ix_(rows, [2, 3])] < 0.8))
+
+
+def test_a_mode_no_plate_shows_is_refused(monkeypatch):
+    monkeypatch.setattr(training, "LOWEST_MAC", 1.01)
+
+    with pytest.raises(NotIdentifiableError, match=r"\(0, 0\): recognised in 0 of 25 training plates"):
+        train(*CLAMPED, CONSTANTS, "thin", [(0, 0)])
+
+
+def test_shear_needs_its_moduli():
+    without = TrainingConstants(E_x=10.7e9, E_y=0.716e9, G_xy=0.50e9, nu_xy=0.51)
+
+    with pytest.raises(ValueError, match="needs G_xz and G_yz"):
+        training_weights(223 / 114, 3 / 223, without, "shear-flexible")

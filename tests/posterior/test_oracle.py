@@ -1,0 +1,266 @@
+"""The whole of `infer` against posteriors that are known: one in closed form, one by quadrature.
+
+A difference is more than four Monte Carlo errors of a mean, a standard deviation or a quantile. Each comparison is made
+again with a posterior that is wrong in a known way, which must differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import ritz
+from made_boards import CANTILEVER_LABELS, NARROW, board_of, setup_of, with_noise
+from scipy import stats
+from statistics_checks import Truth, differences, differences_from_normal
+
+from bayesplate.cards import load_prior
+from bayesplate.cards.prior import Density
+from bayesplate.plate.board import Board
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.inference import Problem, infer, pose
+from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.posterior.target import Posterior
+from bayesplate.quantities import Quantity
+
+NOISE = 0.01
+ESS = 2500.0
+"""Makes a Monte Carlo error of a mean 2 % of the standard deviation."""
+
+PRIOR_MEDIANS, PRIOR_FACTORS = np.array([25.0, 2.0, 5.0]), np.array([1.2, 1.5, 1.3])
+THINNING_LOSS = 0.9
+"""Share of the effective size that thinning to half an autocorrelation time leaves."""
+
+
+@dataclass(frozen=True, eq=False)
+class PowerLaw:
+    """A model whose ln f is linear in ln D, so that normal noise and a log-normal prior give a normal posterior."""
+
+    slopes: np.ndarray
+    constant: np.ndarray
+
+    def log_frequencies(self, values, law):
+        logs = np.log(np.stack([values[name] for name in ("D_x", "D_y", "D_s")], axis=-1))
+        return self.constant + logs @ self.slopes.T
+
+
+SLOPES = 0.5 * np.array(
+    [[0.97, 0.0, 0.03], [0.1, 0.05, 0.85], [0.9, 0.05, 0.05], [0.05, 0.8, 0.15], [0.4, 0.1, 0.5], [0.1, 0.5, 0.4]]
+)
+
+
+def rigidity_prior(medians=PRIOR_MEDIANS, factors=PRIOR_FACTORS):
+    densities = [Density("log-normal", m, f) for m, f in zip(medians, factors, strict=True)]
+    stated = dict(zip(("D_x", "D_y", "D_s"), densities, strict=True)) | dict.fromkeys(("E_x", "E_y", "G_xy"))
+    return load_prior("weakly-informative").model_copy(update=stated)
+
+
+def fixed_noise(value):
+    return Quantity.from_median(value, NARROW)
+
+
+def conjugate(seed):
+    """A board, its power law, and the mean and covariance of its posterior in ln D."""
+    rng = np.random.default_rng(seed)
+    prior_mean, prior_sd = np.log(PRIOR_MEDIANS), np.log(PRIOR_FACTORS)
+    truth = prior_mean + prior_sd * rng.normal(size=3)
+    constant = np.log([20.0, 40.0, 130.0, 300.0, 160.0, 330.0])
+    log_f = constant + SLOPES @ truth + NOISE * rng.normal(size=6)
+    hertz = dict(zip(CANTILEVER_LABELS, np.exp(log_f).tolist(), strict=True))
+    board = board_of(ritz.FINNISH, [setup_of(ritz.CANTILEVER, hertz, noise=fixed_noise(NOISE))])
+    mean, covariance = closed_form(log_f - constant, np.full(6, NOISE))
+    return board, PowerLaw(SLOPES, constant), log_f - constant, mean, covariance
+
+
+def closed_form(data, scales):
+    """Posterior of ln D: normal prior, normal noise, linear model; an infinite scale drops a mode."""
+    prior_precision = np.diag(np.log(PRIOR_FACTORS) ** -2.0)
+    precision = prior_precision + (SLOPES.T / scales**2) @ SLOPES
+    covariance = np.linalg.inv(precision)
+    mean = covariance @ (prior_precision @ np.log(PRIOR_MEDIANS) + (SLOPES.T / scales**2) @ data)
+    return mean, covariance
+
+
+def stated(board: Board, prior, model, mean, covariance):
+    """A problem posed by hand, started off the truth by a standard deviation; only sampling is under test here."""
+    posterior = Posterior(board, prior, (model,), "linear")
+    centre = np.r_[mean + np.sqrt(np.diagonal(covariance)), np.log(board.setups[0].noise.median)]
+    wide = np.zeros((4, 4))
+    wide[:3, :3], wide[3, 3] = covariance, board.setups[0].noise.log_sd ** 2
+    return Problem(board, prior, None, None, posterior, centre, wide)
+
+
+def sampled(problem, seed):
+    inference = infer(problem, SamplerSettings(seed=seed, gate=Gate(ess_min=ESS)))
+    assert inference.convergence.passed, inference.convergence.reasons
+    return inference
+
+
+@pytest.fixture(scope="module")
+def known():
+    board, law, data, mean, covariance = conjugate(seed=1)
+    inference = sampled(stated(board, rigidity_prior(), law, mean, covariance), seed=2)
+    return inference, data, mean, covariance
+
+
+def found_differences(inference, mean, covariance, draws=None):
+    draws = inference.chains.pooled[:, :3] if draws is None else draws
+    return differences_from_normal(draws, inference.convergence.ess[:3], mean, np.sqrt(np.diagonal(covariance)))
+
+
+def test_a_normal_posterior_is_recovered(known):
+    inference, _, mean, covariance = known
+    assert inference.convergence.ess_min >= ESS
+    assert found_differences(inference, mean, covariance) == []
+    drawn = np.corrcoef(inference.chains.pooled[:, :3].T)[np.triu_indices(3, 1)]
+    sd = np.sqrt(np.diagonal(covariance))
+    true = (covariance / np.outer(sd, sd))[np.triu_indices(3, 1)]
+    error = (1 - true**2) / np.sqrt(inference.convergence.ess[:3].min())
+    assert np.all(np.abs(drawn - true) < 4 * error)
+
+
+def test_the_thinned_draws_are_of_the_same_posterior(known):
+    from bayesplate.results.archive import thin_walker_major
+
+    inference, _, mean, covariance = known
+    thinned = thin_walker_major(inference.chains.draws, inference.chains.burn_in, inference.convergence.tau_max)
+    flat = thinned.reshape(-1, 4)[:, :3]
+    sd = np.sqrt(np.diagonal(covariance))
+    assert len(flat) < len(inference.chains.pooled) / 2
+    assert differences_from_normal(flat, THINNING_LOSS * inference.convergence.ess[:3], mean, sd) == []
+
+
+def test_the_log_posterior_of_the_draws_is_that_of_theta(known):
+    inference, *_ = known
+    some = (slice(None), slice(-3, None))
+    theta = inference.chains.draws[some]
+    expected = inference.problem.posterior(theta.reshape(-1, 4)).reshape(theta.shape[:-1])
+    assert inference.chains.log_prob[some] == pytest.approx(expected, abs=1e-8)
+
+
+def test_control_a_wider_posterior_differs(known):
+    inference, _, mean, covariance = known
+    wider = mean + 1.15 * (inference.chains.pooled[:, :3] - mean)
+    assert sum("standard deviation" in one for one in found_differences(inference, mean, covariance, wider)) == 3
+
+
+def test_control_exchanged_rigidities_differ(known):
+    inference, _, mean, covariance = known
+    assert found_differences(inference, mean, covariance, inference.chains.pooled[:, [1, 0, 2]])
+
+
+@pytest.mark.parametrize("mode", range(6))
+def test_control_a_posterior_without_one_mode_differs(known, mode):
+    inference, data, *_ = known
+    scales = np.full(6, NOISE)
+    scales[mode] = np.inf
+    assert found_differences(inference, *closed_form(data, scales))
+
+
+@pytest.mark.slow
+def test_fifty_normal_posteriors_have_normal_errors():
+    """At most one of 150 standardised errors of the means beyond three; all of them normal."""
+    z = []
+    for seed in range(50):
+        board, law, _, mean, covariance = conjugate(seed=100 + seed)
+        inference = sampled(stated(board, rigidity_prior(), law, mean, covariance), seed=seed)
+        error = np.sqrt(np.diagonal(covariance) / inference.convergence.ess[:3])
+        z.extend((inference.chains.pooled[:, :3].mean(axis=0) - mean) / error)
+    z = np.array(z)
+    assert np.sum(np.abs(z) > 3) <= 1
+    assert stats.kstest(z, stats.norm.cdf).pvalue > 1e-3
+    assert stats.kstest(1.5 * z, stats.norm.cdf).pvalue < 0.05  # control: the errors are not merely small
+
+
+N_GRID, REACH = 121, 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class Quadrature:
+    """The posterior of a board under the linear law, rounded readings, known noise: a sum over a grid in ln D."""
+
+    grids: list
+    density: np.ndarray
+
+    @classmethod
+    def of(cls, problem, left_out=None):
+        setup = problem.board.setups[0]
+        model = problem.posterior.models[0]
+        columns = model.linear.stiffness @ _columns(problem)
+        sd = np.sqrt(np.diagonal(problem.covariance))[:3]
+        grids = [c + s * np.linspace(-REACH, REACH, N_GRID) for c, s in zip(problem.centre, sd, strict=False)]
+        log_D = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1)
+        log_f = 0.5 * np.log(np.exp(log_D) @ columns.T) - np.log(2 * np.pi)
+        noise, half = setup.noise.median, setup.resolution / 2
+        total = _log_prior(problem, log_D)
+        for mode, f in enumerate(setup.measured):
+            if mode != left_out:
+                low, high = ((np.log(f + end) - log_f[..., mode]) / noise for end in (-half, half))
+                total += _log_between(low, high)
+        return cls(grids, np.exp(total - total.max()))
+
+    def truth(self):
+        marginals = [self.density.sum(axis=tuple({0, 1, 2} - {i})) for i in range(3)]
+        assert all(max(m[0], m[-1]) < 1e-6 * m.max() for m in marginals)  # the box holds it all
+        return Truth.from_marginals(self.grids, marginals)
+
+
+def _columns(problem):
+    """(D_x, D_y, D_s) to the weights of the four thin terms, written out again from the paper's eq. (11)."""
+    plate = ritz.FINNISH
+    sigma, area = plate.L_x / plate.L_y, plate.L_x * plate.L_y
+    columns = np.zeros((4, 3))
+    columns[0, 0] = sigma**-2.0
+    columns[1, 1] = sigma**2
+    columns[2, 1] = plate.nu_xy
+    columns[3, 2] = 1.0
+    return columns / (plate.rho * plate.h * area**2)
+
+
+def _log_prior(problem, log_D):
+    """Log-normal densities of the moduli, in ln E, of equal volume with ln D."""
+    plate, density = ritz.FINNISH, problem.prior.E_x
+    log_factor = np.log1p(-(plate.nu_xy**2) * np.exp(log_D[..., 1] - log_D[..., 0]))
+    log_E = log_D + np.log(np.array([12.0, 12.0, 3.0]) / plate.h**3)
+    log_E[..., :2] += log_factor[..., None]
+    return -0.5 * np.sum(((log_E - np.log(density.median)) / np.log(density.factor)) ** 2, axis=-1)
+
+
+def _log_between(low, high):
+    """ln(Phi(high) - Phi(low)) where it matters; nothing below e^-600."""
+    upper = low > 0
+    p = np.where(upper, stats.norm.sf(low) - stats.norm.sf(high), stats.norm.cdf(high) - stats.norm.cdf(low))
+    return np.log(np.maximum(p, 1e-260))
+
+
+@pytest.fixture(scope="module")
+def rounded():
+    """A cantilever board read to 1 Hz, noise 0.5 %, under the linear law."""
+    hertz = with_noise(ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS), 0.005, np.random.default_rng(3), resolution=1.0)
+    setup = setup_of(ritz.CANTILEVER, hertz, resolution=1.0, noise=fixed_noise(0.005))
+    problem = pose(board_of(ritz.FINNISH, [setup]), load_prior("weakly-informative"), law="linear")
+    return sampled(problem, seed=4)
+
+
+def test_the_linear_law_with_rounded_readings_agrees_with_quadrature(rounded):
+    truth = Quadrature.of(rounded.problem).truth()
+    draws, ess = rounded.chains.pooled[:, :3], rounded.convergence.ess[:3]
+    assert differences(draws, ess, truth) == []
+
+    wider = truth.mean + 1.15 * (draws - truth.mean)
+    assert differences(wider, ess, truth)
+    assert differences(draws[:, [1, 0, 2]], ess, truth)
+
+
+@pytest.mark.parametrize("mode", [4, 5])
+def test_control_quadrature_without_one_mode_differs(rounded, mode):
+    truth = Quadrature.of(rounded.problem, left_out=mode).truth()
+    assert differences(rounded.chains.pooled[:, :3], rounded.convergence.ess[:3], truth)
+
+
+def test_control_quadrature_that_ignores_the_rounding_differs(rounded):
+    setup = rounded.problem.board.setups[0]
+    sharp = replace(rounded.problem.board, setups=(replace(setup, resolution=1e-3),))
+    truth = Quadrature.of(replace(rounded.problem, board=sharp)).truth()
+    assert differences(rounded.chains.pooled[:, :3], rounded.convergence.ess[:3], truth)

@@ -1,0 +1,106 @@
+"""The region of the posterior, and whether the exact law there is as exact as it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.frequencies.laws import cents, log_frequency
+from bayesplate.modes.solve import solve_class
+from bayesplate.posterior.inference import pose
+from bayesplate.posterior.region import linearisation_errors, noise_widenings, worst_cents
+from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
+
+N_FRESH = 12
+
+BOARDS = ("finnish-spruce-cantilever", "fiemme-spruce-clamped", "spruce-free-2R")
+
+
+@pytest.fixture(scope="module", params=BOARDS)
+def problem(request):
+    prepared = prepare(request.param)
+    return pose(prepared.board, prepared.prior)
+
+
+def draws(problem, n, seed=5):
+    return np.random.default_rng(seed).multivariate_normal(problem.centre, problem.covariance, n)
+
+
+def full_solve(model, values):
+    """ln f of every labelled mode at one point, by an eigen-solve of the whole plate."""
+    weights = model.system.weights(values).at(0)
+    found = [
+        solve_class(model.plate.block(place.parity), weights, place.rank + 1).eigenvalues[place.rank]
+        for place in model.places
+    ]
+    return log_frequency(np.array(found))
+
+
+def test_the_exact_law_errs_no_more_than_it_says_where_nobody_looked(problem):
+    """The claim is the largest error of at least two points over the box; these are other points, inside it."""
+    theta = draws(problem, N_FRESH)
+    values = {n: np.broadcast_to(v, N_FRESH) for n, v in problem.parameters.values(theta).items()}
+    worst, of_linear = 0.0, 0.0
+    for model in problem.posterior.models:
+        solved = np.stack([full_solve(model, {n: v[i] for n, v in values.items()}) for i in range(N_FRESH)])
+        worst = max(worst, np.abs(cents(model.log_frequencies(values, "exact") - solved)).max())
+        of_linear = max(of_linear, np.abs(cents(model.log_frequencies(values, "linear") - solved)).max())
+    claimed = worst_cents(problem.posterior.models)
+    # twelve points against two: a factor; a tenth of a cent is what the basis is grown to
+    assert worst <= 3 * claimed
+    assert claimed < 0.1
+    assert of_linear > 30 * claimed  # control: another law at the same points would break the claim
+
+
+def test_the_two_laws_meet_at_the_centre(problem):
+    values = problem.parameters.values(problem.centre[None, :])
+    for model in problem.posterior.models:
+        at_centre = cents(model.log_frequencies(values, "linear") - model.log_frequencies(values, "exact"))
+        assert at_centre == pytest.approx(0.0, abs=worst_cents(problem.posterior.models))
+
+
+def test_linearisation_errors_are_those_of_the_laws(problem):
+    theta = draws(problem, 5)
+    values = problem.parameters.values(theta)
+    apart = [m.log_frequencies(values, "linear") - m.log_frequencies(values, "exact") for m in problem.posterior.models]
+    expected = 1200 * np.concatenate(apart, axis=1) / np.log(2)
+    assert linearisation_errors(problem.board, problem.posterior.models, theta) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_mixing_pair_of_a_cantilever_is_where_the_linear_law_fails():
+    """physics.md 1: modes (2,0) and (1,2) of the Finnish board, no others; a clamped plate has no such pair."""
+    rms = {}
+    for name in BOARDS[:2]:
+        prepared = prepare(name)
+        found = pose(prepared.board, prepared.prior)
+        errors = linearisation_errors(prepared.board, found.posterior.models, draws(found, 1000))
+        rms[name] = dict(
+            zip(map(str, prepared.board.setups[0].labels), np.sqrt(np.mean(errors**2, axis=0)), strict=True)
+        )
+        assert found.posterior.law == ("exact" if name == BOARDS[0] else "linear")
+    cantilever = rms[BOARDS[0]]
+    pair = {label: cantilever.pop(label) for label in ("(2,0)", "(1,2)")}
+    assert min(pair.values()) > 10 * max(cantilever.values())
+    assert max(rms[BOARDS[1]].values()) < 0.5
+
+
+@pytest.mark.parametrize("log_sd", [1e-3, 0.1, 0.5, 3.0])
+def test_the_noise_follows_the_residuals_as_far_as_its_prior_lets_it(log_sd):
+    """Against the highest of a fine grid; the prior's ends: at its median if narrow, at the residuals' size if wide."""
+    board = prepare("finnish-spruce-cantilever").board
+    median = board.setups[0].noise.median
+    setup = replace(board.setups[0], noise=Quantity.from_median(median, np.exp(log_sd)), resolution=0.0)
+    board = replace(board, setups=(setup,))
+    estimate = weighted_least_squares(board)
+    squares = float(np.sum((estimate.residuals / median) ** 2))
+    spare = estimate.residuals.size - 3
+    log_w = np.linspace(0.0, 2.0, 200_001)
+    density = -spare * log_w - 0.5 * squares * np.exp(-2.0 * log_w) - 0.5 * (log_w / log_sd) ** 2
+    (found,) = noise_widenings(board, estimate)
+    assert np.log(found) == pytest.approx(log_w[np.argmax(density)], abs=2e-5)  # two steps of the grid
+    assert (found < 1.001) == (log_sd < 0.01)
+    assert (found > 0.97 * np.sqrt(squares / spare)) == (log_sd > 1.0)

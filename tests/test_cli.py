@@ -1,0 +1,256 @@
+"""The real command line on input that cannot be used: exit code, every fault in one message, nothing written."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from runs import files_in, read_json
+
+from bayesplate.cli import main
+
+CARD = """\
+format = 1
+name = "my-board"
+
+[plate]
+length_x_mm = 253
+length_y_mm = 114
+thickness_mm = 3
+mass_g = 41
+
+[material]
+poisson_xy = 0.4
+
+[setup]
+name = "free"
+edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }
+
+[setup.frequencies_hz]
+"(1,1)" = 150
+"(2,0)" = 240
+"(0,2)" = 330
+
+[[setup.attached]]
+kind = "accelerometer"
+at_mm = [200, 20]
+"""
+
+BAD_CARDS = {
+    "unknown key": ([("mass_g = 41", "desnity = 473.9")],
+                    ["[plate] desnity: wanted one of length_x_mm", "did you mean density_kg_m3?",
+                     "[plate]: wanted exactly one of mass_g and density_kg_m3, got neither"]),
+    "missing key": ([("thickness_mm = 3\n", "")], ["[plate] thickness_mm: wanted the thickness in mm, got nothing"]),
+    "wrong type": ([("length_x_mm = 253", 'length_x_mm = "253"'), ("length_y_mm = 114", "length_y_mm = true")],
+                   ['[plate] length_x_mm: wanted a number, got "253" (no quotes around a number)',
+                    "[plate] length_y_mm: wanted a number, got true"]),
+    "negative": ([("thickness_mm = 3", "thickness_mm = -3"), ('"(2,0)" = 240', '"(2,0)" = -240')],
+                 ["[plate] thickness_mm: wanted a positive number, got -3",
+                  'frequencies_hz."(2,0)": wanted a positive number, got -240']),
+    "zero": ([('"(1,1)" = 150', '"(1,1)" = 0')], ['frequencies_hz."(1,1)": wanted a positive number, got 0']),
+    "not a number": ([('"(1,1)" = 150', '"(1,1)" = nan'), ("mass_g = 41", "mass_g = inf")],
+                     ['frequencies_hz."(1,1)": wanted a finite number, got nan',
+                      "[plate] mass_g: wanted a finite number, got inf"]),
+    "label twice": ([('"(2,0)" = 240', '"(2,0)" = 240\n"( 2, 0 )" = 241')],
+                    ["frequencies_hz: wanted the label (2,0) once",
+                     '"(2,0)" = 240 and "( 2, 0 )" = 241 (repeated measurements are a list']),
+    "rigid label": ([('"(1,1)" = 150', '"(0,0)" = 150')],
+                    ['frequencies_hz "(0,0)": wanted a mode of a plate with edges x0 free', "at 0 Hz",
+                     "(the lowest are (0,2), (1,1), (2,0)"]),
+    "label beyond the model": ([('"(2,0)" = 240', '"(39,0)" = 240'), ('"(0,2)" = 330', '"(1,0)" = 330')],
+                               ['frequencies_hz "(39,0)": wanted a mode of a plate', "more than 9 nodal lines",
+                                'frequencies_hz "(1,0)": wanted a mode of a plate']),
+    "Poisson ratio": ([("poisson_xy = 0.4", "poisson_xy = 1.7")],
+                      ["[material] poisson_xy: wanted a number from -1.5 to 1.5, got 1.7"]),
+    "sensor off the plate": ([("at_mm = [200, 20]", "at_mm = [300, 20]"), ("mass_g = 41", "mass_g = 0.041")],
+                             ["attached 1 at_mm: wanted a place on the free part of the board, x 0 to 253 mm",
+                              "[plate] mass_g: wanted a density from 20 to 25000 kg/m3"]),
+    "syntax": ([('"(2,0)" = 240', '"(2,0)" = 240,5')],
+               ["my-board.toml line 19: wanted TOML", "(a number has a decimal point, not a comma)"]),
+    "effect": ([('name = "my-board"', 'name = "my-board"\neffects = ["transverse_sheer"]')],
+               ['effects 1: wanted "transverse_shear"', "(did you mean transverse_shear?)"]),
+}  # fmt: skip
+BAD_FILES = {
+    "empty": (b"", "my-board.toml: wanted a card, got an empty file"),
+    "not UTF-8": (b'format = 1\nname = "caf\xe9"\n', "my-board.toml line 2: wanted UTF-8 text, got the byte 0xe9"),
+    "an image": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "my-board.toml: wanted a text file, got binary data"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def invoke(*arguments: str) -> Result:
+    return CliRunner().invoke(main, arguments)
+
+
+def spoiled(*changes: tuple[str, str]) -> str:
+    text = CARD
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+def assert_refused(command: str, card: str, wanted: list[str]) -> None:
+    """Exit 3; every wanted passage in one message without traceback; JSON says the same; nothing new is on disk."""
+    before = files_in(Path())
+    plain = invoke(command, card)
+    mirrored = invoke(command, card, "--json")
+    error = read_json(mirrored.stdout)["error"]
+
+    assert plain.exit_code == mirrored.exit_code == error["exit_code"] == 3
+    assert [passage for passage in wanted if passage not in plain.stderr] == []
+    assert "Traceback" not in plain.stderr
+    assert plain.stdout == ""
+    assert mirrored.stderr == plain.stderr
+    assert error["message"] + "\n" == plain.stderr
+    assert len(error["faults"]) == len(plain.stderr.splitlines())
+    for fault, line in zip(error["faults"], plain.stderr.splitlines(), strict=True):
+        assert line.startswith(f"{fault['place']}: wanted {fault['wanted']}, got {fault['got']}")
+    assert files_in(Path()) == before
+    assert not Path("results").exists()
+
+
+def test_the_card_is_sound_before_it_is_spoiled():
+    """Otherwise a fault of the card itself could stand in for the one that is made."""
+    Path("my-board.toml").write_text(CARD, encoding="utf-8")
+
+    assert invoke("check", "my-board.toml").exit_code == 0
+
+
+@pytest.mark.parametrize("command", ["check", "fit"])
+@pytest.mark.parametrize("fault", BAD_CARDS)
+def test_a_bad_card_is_refused_with_all_its_faults(command, fault):
+    changes, wanted = BAD_CARDS[fault]
+    Path("my-board.toml").write_text(spoiled(*changes), encoding="utf-8")
+
+    assert_refused(command, "my-board.toml", wanted)
+
+
+@pytest.mark.parametrize("command", ["check", "fit"])
+@pytest.mark.parametrize("fault", BAD_FILES)
+def test_what_is_no_card_is_refused(command, fault):
+    content, message = BAD_FILES[fault]
+    Path("my-board.toml").write_bytes(content)
+
+    assert_refused(command, "my-board.toml", [message])
+
+
+@pytest.mark.parametrize("command", ["check", "fit"])
+def test_a_missing_card_a_folder_and_a_misspelt_name_are_refused(command, tmp_path):
+    Path("folder.toml").mkdir()
+
+    assert_refused(command, "nowhere.toml", ["nowhere.toml: wanted a card, got no such file", str(tmp_path)])
+    assert_refused(command, "folder.toml", ["folder.toml: wanted a regular file, got a directory"])
+    assert_refused(command, "finish-spruce-cantilever", ["did you mean finnish-spruce-cantilever?"])
+
+
+def test_schema_and_physical_faults_are_told_one_after_the_other():
+    """What a fault of writing means cannot be judged: the physical faults come once the card can be read."""
+    both = spoiled(("mass_g = 41", "mass_g = 0.041"), ("length_x_mm = 253", "length_x_mm = -1"))
+    Path("my-board.toml").write_text(both, encoding="utf-8")
+    first = invoke("check", "my-board.toml").stderr
+    Path("my-board.toml").write_text(both.replace("= -1", "= 253"), encoding="utf-8")
+    second = invoke("check", "my-board.toml").stderr
+
+    assert "length_x_mm" in first
+    assert "density" not in first
+    assert "wanted a density from 20 to 25000 kg/m3" in second
+
+
+def test_an_unknown_effect_is_refused():
+    Path("my-board.toml").write_text(CARD, encoding="utf-8")
+    result = invoke("fit", "my-board.toml", "--effects", "air_loadin")
+
+    assert result.exit_code == 3
+    assert "air_loadin" in result.stderr
+    assert not Path("results").exists()
+
+
+def test_an_output_folder_that_cannot_be_one():
+    """A file in its place, and a file on the way to it; neither is touched."""
+    Path("taken").write_bytes(b"mine")
+
+    for out, got in (("taken", "a file"), ("taken/inside", "Not a directory")):
+        result = invoke("fit", "fiemme-spruce-clamped", "--out", out)
+        assert result.exit_code == 3
+        assert f"--out {out}: wanted a folder" in result.stderr
+        assert got in result.stderr
+    assert files_in(Path()) == {"taken": b"mine"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["chek", "fiemme-spruce-clamped"], "No such command 'chek'. Did you mean 'check'?"),
+        (["zzzz"], "No such command 'zzzz'."),
+        (["fit", "fiemme-spruce-clamped", "--sed", "2"], "No such option '--sed'. Did you mean '--seed'?"),
+        (["fit", "fiemme-spruce-clamped", "--seed", "-1"], "-1 is not in the range x>=0"),
+        (["fit", "fiemme-spruce-clamped", "--seed", "one"], "'one' is not a valid integer"),
+        (["fit", "fiemme-spruce-clamped", "--force", "--resume"], "--force starts anew and --resume continues"),
+        (["fit"], "Missing argument 'CARD'"),
+        (["fit", "one", "two"], "unexpected extra argument (two)"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_mistyped_command_line_is_a_usage_error(arguments, said):
+    result = invoke(*arguments)
+
+    assert result.exit_code == 2
+    assert said in result.stderr.replace("No such option: --sed ", "No such option '--sed'. ")
+    assert "Traceback" not in result.stderr
+    assert files_in(Path()) == {}
+
+
+def test_debug_shows_the_traceback_and_keeps_the_exit_code():
+    plain = invoke("fit", "nowhere.toml")
+    debug = invoke("fit", "nowhere.toml", "--debug")
+
+    assert plain.exit_code == debug.exit_code == 3
+    assert "Traceback (most recent call last)" in debug.stderr
+    assert debug.stderr.endswith(plain.stderr)
+
+
+def test_an_internal_error_is_one_line_without_debug(monkeypatch):
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("of a test")
+
+    monkeypatch.setattr("bayesplate.workflow.fit.prepare", broken)
+    plain, debug = invoke("fit", "fiemme-spruce-clamped"), invoke("fit", "fiemme-spruce-clamped", "--debug", "--json")
+
+    assert plain.exit_code == debug.exit_code == 70
+    assert plain.stderr == "internal error: ZeroDivisionError: of a test (--debug shows where)\n"
+    assert "in broken" in debug.stderr
+    assert read_json(debug.stdout)["error"] == {"exit_code": 70, "message": plain.stderr[:-1], "faults": []}
+
+
+def test_the_commands_and_exit_codes_of_a_real_process():
+    """The same through an interpreter of its own: what click's runner may hide."""
+    Path("my-board.toml").write_text(spoiled(*BAD_CARDS["negative"][0]), encoding="utf-8")
+    program = [sys.executable, "-m", "bayesplate.cli"]
+    done = subprocess.run([*program, "fit", "my-board.toml"], capture_output=True, text=True, check=False)
+    shown = subprocess.run([*program, "--version"], capture_output=True, text=True, check=True)
+
+    assert done.returncode == 3
+    assert len(done.stderr.splitlines()) == 2
+    assert done.stdout == ""
+    assert shown.stdout.endswith(f", version {version('bayesplate')}\n")
+
+
+def test_a_reader_that_stops_early_is_no_error():
+    """`bayesplate check ... | head -1`: the pipe is closed before anything is printed."""
+    program = [sys.executable, "-m", "bayesplate.cli", "check", "fiemme-spruce-clamped"]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        said = process.stderr.read()
+        assert process.wait(timeout=60) == 0
+    assert said == ""

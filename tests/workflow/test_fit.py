@@ -1,0 +1,328 @@
+"""`fit` from card to files: what the output contract promises is in them, and in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import arviz
+import numpy as np
+import pytest
+import ritz
+from runs import Run, read_json
+
+import bayesplate
+from bayesplate.cards import card_names, load_board, load_prior
+from bayesplate.plate.board import board_from_card
+from bayesplate.posterior.inference import pose
+from bayesplate.workflow.prepare import prepare
+
+QUANTILES = ("q05", "q25", "q50", "q75", "q95")
+ELASTIC = {"E_x": "Pa", "E_y": "Pa", "G_xy": "Pa"}
+RIGIDITY = {"D_x": "N m", "D_y": "N m", "D_s": "N m"}
+POINT = {*ELASTIC, *RIGIDITY, "condition_number"}
+KEYS = {
+    "": {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "elastic", "rigidity", "effects",
+         "noise", "inputs", "derived", "least_squares", "weighted_least_squares", "percentile", "linear_means",
+         "exact_means", "modes", "error", "sampler", "identifiability", "warnings"},
+    "model": {"theory", "law", "effects"},
+    "elastic": {*ELASTIC},
+    "rigidity": {*RIGIDITY},
+    "least_squares": POINT,
+    "weighted_least_squares": POINT,
+    "percentile": {*ELASTIC, "n_subsets"},
+    "linear_means": {*ELASTIC},
+    "exact_means": {*ELASTIC},
+    "error": {"in_sample_rms_cents", "leave_one_out_rms_cents", "linearisation_rms_cents"},
+    "sampler": {"ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance"},
+}  # fmt: skip
+"""Section 5 of the design: the least that summary.json holds, by the place it stands in."""
+GROUPS = ("posterior", "log_likelihood", "posterior_predictive", "sample_stats", "observed_data")
+
+FINNISH_HZ = {"(1,0)": 52, "(1,1)": 98, "(2,0)": 310, "(1,2)": 337, "(2,1)": 398, "(2,2)": 637}
+FIEMME_HZ = {"(0,0)": 57, "(0,1)": 100, "(1,0)": 130, "(1,1)": 162, "(0,2)": 170, "(1,2)": 224}
+UNLABELLED_2R = [404.01, 543.70, 594.09, 671.20, 707.01, 850.00, 995.25]
+
+
+@pytest.fixture(scope="module")
+def summaries(fiemme: bayesplate.FitResult, finnish: Run, free: Run) -> dict[str, dict[str, Any]]:
+    return {"fiemme": read_json(_text(fiemme)), "finnish": finnish.summary, "free": free.summary}
+
+
+def _text(result: bayesplate.FitResult) -> str:
+    assert result.folder is not None
+    return (result.folder / "summary.json").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("board", ["fiemme", "finnish", "free"])
+@pytest.mark.parametrize("place", KEYS, ids=lambda place: place or "top")
+def test_the_summary_has_every_key_of_the_contract(summaries, board, place):
+    entry = summaries[board][place] if place else summaries[board]
+
+    assert KEYS[place] - set(entry) == set()
+
+
+@pytest.mark.parametrize("board", ["fiemme", "finnish", "free"])
+def test_every_quantity_has_its_unit_and_quantiles_in_order(summaries, board):
+    summary = summaries[board]
+    units = {"length_x": "m", "length_y": "m", "thickness": "m", "mass": "kg", "density": "kg/m^3", "poisson_xy": "1"}
+    wanted = {"elastic": ELASTIC, "rigidity": RIGIDITY, "noise": dict.fromkeys(summary["noise"], "1"), "inputs": units}
+    for place, names in wanted.items():
+        for name, entry in summary[place].items():
+            assert set(entry) == {"mean", "sd", *QUANTILES, "unit"}
+            assert entry["unit"] == names[name]
+            assert entry["sd"] > 0
+            assert sorted(entry[q] for q in QUANTILES) == [entry[q] for q in QUANTILES]
+    for entry in summary["derived"].values():
+        assert set(entry) == {"mean", "sd", *QUANTILES, "unit"}
+
+
+def test_constants_are_in_si_units(summaries):
+    """By hand from the summary's own medians: D = E h^3 / 12 (1 - nu^2 E_y / E_x), D_s = G h^3 / 3 with h = 3 mm.
+
+    Where one number decides, the median of a function is the function of the median, but for the interpolation between
+    two draws; where E_y / E_x joins in, its spread of 8 % moves the factor by 0.1 %.
+    """
+    for board in ("fiemme", "finnish"):
+        elastic, rigidity = ({n: e["q50"] for n, e in summaries[board][p].items()} for p in ("elastic", "rigidity"))
+        factor = 0.003**3 / 12 / (1 - 0.51**2 * elastic["E_y"] / elastic["E_x"])
+        assert rigidity["D_x"] == pytest.approx(elastic["E_x"] * factor, rel=2e-3)
+        assert rigidity["D_y"] == pytest.approx(elastic["E_y"] * factor, rel=2e-3)
+        assert rigidity["D_s"] == pytest.approx(elastic["G_xy"] * 0.003**3 / 3, rel=1e-12)
+        speed = summaries[board]["derived"]["wave_speed_x"]
+        density = {"fiemme": 399.0, "finnish": 473.9}[board]
+        assert speed["unit"] == "m/s"
+        assert speed["q50"] == pytest.approx(np.sqrt(elastic["E_x"] / density), rel=1e-6)
+
+
+def test_the_paper_s_own_constants_lie_in_the_posterior(summaries):
+    """Its least squares, from its own coefficients: inside the central 99.9 % of a normal with our mean and sd."""
+    printed = {"fiemme": (10.4e9, 1.003e9, 0.530e9), "finnish": (13.0e9, 0.702e9, 0.668e9)}
+    for board, constants in printed.items():
+        for name, value in zip(ELASTIC, constants, strict=True):
+            entry = summaries[board]["elastic"][name]
+            assert abs(value - entry["mean"]) < 3.3 * entry["sd"], (board, name)
+
+
+def test_the_summary_is_strict_json_that_names_what_was_run(fiemme, summaries):
+    summary = summaries["fiemme"]
+    card = load_board("fiemme-spruce-clamped")
+
+    assert _text(fiemme).endswith("}\n")
+    assert summary == fiemme.summary
+    assert (summary["format"], summary["name"], summary["seed"]) == (1, "fiemme-spruce-clamped", 1)
+    assert summary["card_sha256"] == card.sha256
+    assert {"python", "bayesplate", "numpy", "scipy", "emcee"} <= set(summary["versions"])
+    assert "unknown" not in summary["versions"].values()
+    assert summary["converged"] is True
+    assert summary["sampler"]["ensembles"] == 4
+    assert summary["sampler"]["rhat_max"] <= 1.01
+    assert summary["sampler"]["ess_min"] >= 400
+
+
+def test_the_law_is_chosen_by_its_error(summaries):
+    """A quarter of the noise: the clamped board's modes hardly change within its posterior, the cantilever's do."""
+    for board, law in {"fiemme": "linear", "finnish": "exact", "free": "linear"}.items():
+        summary = summaries[board]
+        assert summary["model"]["law"] == law
+        limit = 0.25 * 1200 / np.log(2) * next(iter(summary["noise"].values()))["q50"]
+        assert (summary["error"]["linearisation_rms_cents"] < limit) == (law == "linear")
+
+
+@pytest.mark.parametrize(
+    ("board", "setup", "hertz"), [("fiemme", "clamped", FIEMME_HZ), ("finnish", "cantilever", FINNISH_HZ)]
+)
+def test_modes_are_keyed_by_label(summaries, board, setup, hertz):
+    modes = {mode["label"]: mode for mode in summaries[board]["modes"]}
+
+    assert {label: mode["measured_hz"] for label, mode in modes.items()} == hertz
+    for mode in modes.values():
+        assert {"setup", "residual_cents", "left_out_cents", "leverage"} <= set(mode)
+        assert mode["setup"] == setup
+        predicted = mode["predicted_hz"]
+        assert predicted["q05"] < predicted["mean"] < predicted["q95"]
+        assert abs(1200 * np.log2(mode["measured_hz"] / predicted["mean"])) < 60
+        assert np.sign(mode["left_out_cents"]) == np.sign(mode["residual_cents"])
+        assert abs(mode["left_out_cents"]) > abs(mode["residual_cents"])
+    assert sum(mode["leverage"] for mode in modes.values()) == pytest.approx(3.0, abs=1e-9)
+
+
+def test_unlabelled_peaks_stand_beside_the_predictions(free):
+    """Held-out evidence: peaks that nobody fitted lie within 30 cents of modes predicted from the others."""
+    peaks = {peak["measured_hz"]: peak for peak in free.summary["unlabelled"]}
+
+    assert list(peaks) == UNLABELLED_2R
+    for measured, peak in peaks.items():
+        assert peak["cents"] == pytest.approx(1200 * np.log2(measured / peak["predicted_hz"]), abs=1e-9)
+        assert abs(peak["cents"]) < 30
+        assert peak["setup"] == "free"
+    assert len({peak["nearest"] for peak in peaks.values()}) == 7
+
+
+def test_unlabelled_peaks_are_not_fitted(free, tmp_path):
+    """The density of the board is the same without them, to the last bit."""
+    (shipped,) = (load_board(name).path for name in card_names("boards") if name == "spruce-free-2R")
+    assert shipped is not None
+    lines = shipped.read_text(encoding="utf-8").splitlines(keepends=True)
+    without = tmp_path / "spruce-free-2R.toml"
+    without.write_text("".join(line for line in lines if not line.startswith("unlabelled_hz")), encoding="utf-8")
+    theta, values = None, []
+    for card in (shipped, without):
+        prepared = prepare(card)
+        problem = pose(prepared.board, prepared.prior)
+        theta = problem.centre + np.linspace(-0.02, 0.02, 5)[:, None] if theta is None else theta
+        values.append(problem.posterior(theta))
+
+    np.testing.assert_array_equal(*values)
+    assert len(free.summary["modes"]) == 9
+
+
+@pytest.fixture(scope="module")
+def archive(fiemme: bayesplate.FitResult) -> Any:
+    assert fiemme.folder is not None
+    return arviz.from_netcdf(str(fiemme.folder / "posterior.nc"), engine="h5netcdf")
+
+
+def test_the_archive_opens_in_arviz_with_its_five_groups(archive, fiemme):
+    posterior = archive["posterior"]
+    assert {*ELASTIC, *RIGIDITY, "noise"} <= set(posterior.data_vars)
+    for group in GROUPS[:4]:
+        assert archive[group].sizes["chain"] == 4
+        assert archive[group].sizes["draw"] == posterior.sizes["draw"]
+    for group in ("log_likelihood", "posterior_predictive"):
+        assert archive[group]["frequency"].dims == ("chain", "draw", "reading")
+    observed = archive["observed_data"]["frequency"]
+    assert dict(zip(observed["reading"].values.tolist(), observed.values.tolist(), strict=True)) == {
+        f"clamped {label}": hertz for label, hertz in FIEMME_HZ.items()
+    }
+    assert posterior["noise"]["setup"].values.tolist() == ["clamped"]
+    assert list(archive["sample_stats"]["parameter"].values) == ["log_D_x", "log_D_y", "log_D_s", "log_noise[clamped]"]
+    assert {"lp", "tau", "rhat", "ess"} <= set(archive["sample_stats"].data_vars)
+    for name, entry in fiemme.summary["elastic"].items():
+        assert float(posterior[name].mean()) == pytest.approx(entry["mean"], rel=1e-12)
+
+
+def test_a_chain_is_an_ensemble_walker_after_walker(archive, fiemme):
+    """The first draws of a chain are the kept steps of its first walker; then come those of the second."""
+    chains, tau = fiemme.inference.chains, fiemme.inference.convergence.tau_max
+    n_steps = chains.draws.shape[1]
+    every = max(int(tau / 2), -(-(n_steps - chains.burn_in) // (4000 // 32)))  # at most 4000 draws a chain
+    log_D_x = np.log(archive["posterior"]["D_x"].values)
+    n_kept = len(range(chains.burn_in, n_steps, every))
+
+    assert log_D_x.shape == (4, 32 * n_kept)
+    for ensemble, walker in ((0, 0), (0, 1), (3, 31)):
+        expected = chains.draws[ensemble, chains.burn_in :: every, walker, 0]
+        found = log_D_x[ensemble, walker * n_kept : (walker + 1) * n_kept]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def test_sample_stats_are_our_own(archive, summaries):
+    """ArviZ would take walkers of one ensemble for independent draws; what was judged stands beside the draws."""
+    stats, sampler = archive["sample_stats"], summaries["fiemme"]["sampler"]
+
+    assert float(stats["tau"].max()) == sampler["tau_max"]
+    assert float(stats["rhat"].max()) == sampler["rhat_max"]
+    assert float(stats["ess"].min()) == sampler["ess_min"]
+
+
+def test_predictions_are_rounded_as_the_readings_are(archive):
+    values = archive["posterior_predictive"]["frequency"].values
+
+    np.testing.assert_array_equal(values, np.round(values))
+
+
+def test_the_attributes_hold_card_priors_versions_and_seed(archive, summaries):
+    card = load_board("fiemme-spruce-clamped")
+    assert card.path is not None
+
+    assert archive.attrs["card"] == card.path.read_text(encoding="utf-8")
+    assert archive.attrs["card_sha256"] == card.sha256
+    assert archive.attrs["seed"] == "1"
+    assert archive.attrs["prior"] == "weakly-informative"
+    assert read_json(archive.attrs["versions"]) == summaries["fiemme"]["versions"]
+    assert set(read_json(archive.attrs["priors"])) == set(load_prior("weakly-informative").densities)
+
+
+def test_the_table_gives_every_mean_with_its_sd(finnish):
+    """To the digits of the table: two significant ones of the sd."""
+    assert finnish.exit_code == 0
+    for name, entry in finnish.summary["elastic"].items():
+        row = next(line for line in finnish.stdout.splitlines() if name in line)
+        mean, sd = (float(word) for word in row.split("│")[2].split("±"))
+        digits = len(row.split("│")[2].split("±")[1].strip().partition(".")[2])
+        assert mean == pytest.approx(entry["mean"] / 1e9, abs=0.5001 * 10**-digits)
+        assert sd == pytest.approx(entry["sd"] / 1e9, abs=0.5001 * 10**-digits)
+        assert len(f"{sd:.{digits}f}".replace(".", "").lstrip("0")) == 2
+    assert all(label in finnish.stdout for label in FINNISH_HZ)
+    assert finnish.stdout.endswith(f"written to {finnish.folder}\n")
+
+
+def test_json_prints_the_summary_and_nothing_else(free):
+    assert free.exit_code == 0
+    assert read_json(free.stdout) == free.summary
+    assert free.stderr == ""
+
+
+def test_only_the_two_files_are_left(fiemme_files, finnish, free):
+    for files in (fiemme_files, finnish.files, free.files):
+        assert set(files) == {"summary.json", "posterior.nc"}
+
+
+TRUTH = {"E_x": 11e9, "E_y": 0.9e9, "G_xy": 0.7e9}
+LENGTH, WIDTH, THICKNESS, COVERED, DENSITY, NU_XY = 0.300, 0.120, 0.003, 0.030, 430.0, 0.4
+CANTILEVER_LABELS = ((1, 0), (1, 1), (2, 0), (1, 2))
+FREE_LABELS = ((1, 1), (2, 0), (2, 1), (0, 2))
+
+
+def _two_setups() -> str:
+    """A card of one board held in two ways; frequencies from the independent solver, rounded to 0.1 Hz."""
+    held = {
+        "cantilever": (ritz.CANTILEVER, LENGTH - COVERED, CANTILEVER_LABELS, (1, 0)),
+        "free": (ritz.ALL_FREE, LENGTH, FREE_LABELS, (0, 0)),
+    }
+    text = (
+        'format = 1\nname = "two-ways"\n'
+        f"[plate]\nlength_x_mm = {LENGTH * 1e3}\nlength_y_mm = {WIDTH * 1e3}\nthickness_mm = {THICKNESS * 1e3}\n"
+        f"density_kg_m3 = {DENSITY}\n[material]\npoisson_xy = {NU_XY}\n"
+    )
+    for name, (edges, length, labels, first) in held.items():
+        plate = ritz.Plate.from_moduli(
+            *TRUTH.values(), NU_XY, rho=DENSITY, h=THICKNESS, L_x=length, L_y=WIDTH, edges=edges
+        )
+        words = ", ".join(f'{edge} = "{word}"' for edge, word in edges.items())
+        text += f'[[setup]]\nname = "{name}"\nedges = {{ {words} }}\nresolution_hz = 0.1\n'
+        text += f"first_label = {list(first)}\n"
+        text += "clamped_mm = { x0 = 30 }\n" if name == "cantilever" else ""
+        text += "[setup.frequencies_hz]\n"
+        for (m, n), hertz in ritz.simulate(plate, labels, first).items():
+            text += f'"({m},{n})" = {hertz:.1f}\n'
+    return text
+
+
+def test_a_card_with_two_setups_gives_the_constants_it_was_made_from(tmp_path):
+    """Eight readings of one board held in two ways: noise by setup, modes by setup, the truth within the posterior.
+
+    Only rounding separates the readings from the truth, so the mean lies well within one posterior sd; four leave room
+    for what the Monte Carlo error adds.
+    """
+    path = tmp_path / "two-ways.toml"
+    path.write_text(_two_setups(), encoding="utf-8")
+    result = bayesplate.fit(path, out=tmp_path / "out")
+
+    summary = result.summary
+    assert set(summary["noise"]) == {"cantilever", "free"}
+    by_setup: Mapping[str, list[str]] = {name: [] for name in summary["noise"]}
+    for mode in summary["modes"]:
+        by_setup[mode["setup"]].append(mode["label"])
+    assert by_setup == {
+        "cantilever": [f"({m},{n})" for m, n in CANTILEVER_LABELS],
+        "free": [f"({m},{n})" for m, n in FREE_LABELS],
+    }
+    for name, truth in TRUTH.items():
+        entry = summary["elastic"][name]
+        assert abs(entry["mean"] - truth) < 4 * entry["sd"], name
+        assert entry["sd"] < 0.05 * truth, name
+    assert len(board_from_card(load_board(path)).setups) == 2
+    readings = arviz.from_netcdf(str(tmp_path / "out" / "posterior.nc"), engine="h5netcdf")["observed_data"]["reading"]
+    assert readings.values.tolist() == [f"{setup} {label}" for setup, labels in by_setup.items() for label in labels]

@@ -1,0 +1,135 @@
+"""`modes`: the table of the lowest modes, the sheet's files, and boards that were not measured yet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import runs
+from click.testing import CliRunner
+
+from bayesplate.cli import main
+from bayesplate.workflow.modes import modes
+
+UNMEASURED = """\
+format = 1
+name = "not-yet"
+
+[plate]
+length_x_mm = 400
+length_y_mm = 200
+thickness_mm = 3
+density_kg_m3 = 450
+
+[material]
+prior = "spruce"
+poisson_xy = 0.4
+
+[setup]
+edges = { x0 = "supported", x1 = "supported", y0 = "supported", y1 = "supported" }
+"""
+
+
+@pytest.fixture(scope="session")
+def finnish_sheet(tmp_path_factory):
+    """The cantilever board through the command line, with its output folder."""
+    folder = tmp_path_factory.mktemp("modes")
+    result = CliRunner().invoke(main, ["modes", "finnish-spruce-cantilever", "--json", "--out", str(folder)])
+    assert result.exit_code == 0, result.stderr
+    return runs.Run(result.exit_code, result.stdout, result.stderr, folder)
+
+
+@pytest.fixture
+def unmeasured(tmp_path):
+    path = tmp_path / "not-yet.toml"
+    path.write_text(UNMEASURED, encoding="utf-8")
+    return path
+
+
+def test_the_table_of_the_cantilever_board(finnish_sheet):
+    (setup,) = runs.read_json(finnish_sheet.stdout)["setups"]
+    by_label = {mode["label"]: mode for mode in setup["modes"]}
+
+    assert len(setup["modes"]) == 12
+    assert [mode["hz"] for mode in setup["modes"]] == sorted(mode["hz"] for mode in setup["modes"])
+    # Forward check of `compare`: the weighted fit's residuals, cents.
+    expected = {"(1,0)": -20.5, "(1,1)": 4.8, "(2,0)": 36.8, "(1,2)": -10.6, "(2,1)": -6.5, "(2,2)": -3.9}
+    assert {label: by_label[label]["miss_cents"] for label in expected} == pytest.approx(expected, abs=0.3)
+    for mode in setup["modes"]:
+        assert sum(mode["share_percent"].values()) == pytest.approx(100, abs=0.2)
+        assert mode["share_percent"]["effects"] == 0
+    # The paper's (1,0): a = 3.21, b really negative.
+    assert (by_label["(1,0)"]["a"], by_label["(1,0)"]["b"]) == pytest.approx((3.21, -0.34), abs=0.05)
+
+
+def test_the_combined_modes_decouple_the_constants(finnish_sheet):
+    (setup,) = runs.read_json(finnish_sheet.stdout)["setups"]
+    measured = [mode for mode in setup["modes"] if mode["measured_hz"] is not None]
+    weights = np.array([[one["weights"][mode["label"]] for mode in measured] for one in setup["combined"]])
+    coefficients = np.array([[mode[letter] for letter in "abc"] for mode in measured])
+
+    assert [one["name"] for one in setup["combined"]] == ["alpha", "beta", "gamma"]
+    np.testing.assert_allclose(weights @ coefficients, np.eye(3), atol=1e-8)
+
+
+def test_the_sheet_is_written_once_and_replaced_only_if_forced(finnish_sheet):
+    first = runs.files_in(finnish_sheet.folder)
+    arguments = ["modes", "finnish-spruce-cantilever", "--out", str(finnish_sheet.folder)]
+    again, forced = CliRunner().invoke(main, arguments), CliRunner().invoke(main, [*arguments, "--force", "--quiet"])
+
+    assert set(first) == {"modes.png", "modes.svg"}
+    assert first["modes.png"].startswith(b"\x89PNG")
+    assert b"<svg" in first["modes.svg"]
+    assert again.exit_code == 3
+    assert "modes.png, modes.svg already there (--force replaces them" in again.stderr
+    assert (forced.exit_code, forced.stdout) == (0, "")
+    assert runs.files_in(finnish_sheet.folder) == first  # no time stamp: the same bytes
+
+
+def test_shear_has_a_share_where_it_is_declared():
+    (setup,) = modes("fiemme-spruce-clamped", effects=["transverse_shear"], write=False).report["setups"]
+
+    assert setup["theory"] == "shear-flexible"
+    assert all(0 < mode["share_percent"]["effects"] < 15 for mode in setup["modes"])
+
+
+def test_a_board_not_measured_yet_is_computed_from_the_prior(unmeasured):
+    """Supported all round: closed form, omega^2 = pi^4 (D_x m^4 / L_x^4 + ... ) / rho h, at the median of the prior."""
+    result = modes(unmeasured, write=False)
+    (setup,) = result.report["setups"]
+    E_x, E_y, G, h, rho, nu = 11e9, 0.95e9, 0.67e9, 3e-3, 450.0, 0.4
+    D_x, D_y = (E * h**3 / 12 / (1 - nu**2 * E_y / E_x) for E in (E_x, E_y))
+    D_s = G * h**3 / 3
+
+    for mode in setup["modes"][:6]:
+        m, n = (int(number) + 1 for number in mode["label"].strip("()").split(","))
+        x, y = m * np.pi / 0.4, n * np.pi / 0.2
+        squared = (D_x * x**4 + D_y * y**4 + (2 * nu * D_y + D_s) * x**2 * y**2) / (rho * h)
+        assert mode["hz"] == pytest.approx(np.sqrt(squared) / (2 * np.pi), rel=1e-3)
+        low, high = mode["likely_hz"]
+        assert low < mode["hz"] < high
+    assert "median of the prior" in result.report["basis"]
+
+
+def test_the_band_follows_the_prior(unmeasured):
+    """To first order ln f has half the shares times the prior's log sds; two thirds of a normal lie within 0.967 sd."""
+    (setup,) = modes(unmeasured, write=False).report["setups"]
+    log_sds = np.log([1.35, 1.75, 1.5])
+
+    for mode in setup["modes"]:
+        shares = np.array([mode["share_percent"][name] for name in ("D_x", "D_y", "D_s")]) / 100
+        half_width = 0.967 * np.sqrt(np.sum((shares * log_sds / 2) ** 2))
+        low, high = np.log(np.array(mode["likely_hz"]))
+        assert (high - low) / 2 == pytest.approx(half_width, rel=0.1)
+
+
+def test_a_fit_still_wants_frequencies(unmeasured):
+    result = CliRunner().invoke(main, ["fit", str(unmeasured)])
+
+    assert result.exit_code == 3
+    assert "wanted measured frequencies" in result.stderr
+
+
+def test_a_sheet_does_not_keep_a_fit_from_the_folder(finnish_sheet):
+    from bayesplate.results.folder import OutputFolder
+
+    OutputFolder(finnish_sheet.folder).require_usable(force=False, resume=False)

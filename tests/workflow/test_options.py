@@ -1,0 +1,84 @@
+"""Options of `fit`, and cards of the user's own: laws, noise, places, and no network."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import bayesplate
+from bayesplate.cli import main
+
+
+@pytest.mark.parametrize(
+    ("board", "options", "law", "robust"),
+    [
+        ("finnish-spruce-cantilever", ("--linear",), "linear", False),
+        ("fiemme-spruce-clamped", ("--exact", "--robust"), "exact", True),
+    ],
+)
+def test_a_forced_law_and_robust_noise_reach_the_summary(quick_fit, board, options, law, robust):
+    summary = quick_fit(board, *options, "--quiet").summary
+
+    assert summary["model"]["law"] == law
+    assert summary["model"]["robust"] is robust
+    assert summary[f"{law}_means"]["E_x"] == pytest.approx(summary["elastic"]["E_x"]["mean"], rel=1e-12)
+    is_warned = any("the linear law is off by more than a quarter of the noise" in w for w in summary["warnings"])
+    assert is_warned == (law == "linear")
+
+
+def test_robust_noise_changes_the_draws(quick_fit):
+    plain = quick_fit("fiemme-spruce-clamped", "--quiet").summary["elastic"]
+    robust = quick_fit("fiemme-spruce-clamped", "--quiet", "--robust", "--force").summary["elastic"]
+
+    assert plain["E_x"]["mean"] != robust["E_x"]["mean"]
+
+
+def test_quiet_prints_nothing(quick_fit):
+    run = quick_fit("fiemme-spruce-clamped", "--quiet")
+
+    assert (run.exit_code, run.stdout, run.stderr) == (0, "", "")
+
+
+def test_nothing_is_written_unless_asked_for(tmp_path, monkeypatch, fiemme):
+    """The same draws as with files: writing and checkpoints change nothing."""
+    monkeypatch.chdir(tmp_path)
+    result = bayesplate.fit("fiemme-spruce-clamped", write=False)
+
+    assert result.folder is None
+    assert list(tmp_path.iterdir()) == []
+    assert result.summary == fiemme.summary
+
+
+def test_the_default_folder_is_results_and_the_name_of_the_board(quick_fit, monkeypatch, tmp_path, own_card):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(main, ["fit", str(own_card)])
+
+    assert result.exit_code == 0
+    assert (tmp_path / "results" / "fiemme-spruce-clamped" / "summary.json").is_file()
+
+
+def test_a_card_is_fitted_by_path_and_no_place_of_the_machine_is_told(quick_fit, own_card):
+    """Neither home, nor working folder, nor card, nor package: only the folder that the user named is printed."""
+    run = quick_fit(str(own_card))
+    folders = (own_card.parent, Path.home(), Path.cwd(), Path(bayesplate.__file__).parent)
+    places = [str(folder).encode() for folder in folders]
+
+    assert run.exit_code == 0
+    assert str(run.folder) in run.stdout
+    for content in (*run.files.values(), run.stdout.replace(str(run.folder), "").encode()):
+        assert [place for place in places if place in content] == []
+
+
+def test_no_network_is_used(quick_fit, monkeypatch):
+    def blocked(*_: object, **__: object) -> None:
+        raise AssertionError("a network connection was asked for")
+
+    for name in ("socket", "create_connection", "getaddrinfo"):
+        monkeypatch.setattr(socket, name, blocked)
+    with pytest.raises(AssertionError, match="a network connection was asked for"):
+        socket.create_connection(("localhost", 1))
+
+    assert quick_fit("fiemme-spruce-clamped", "--quiet").exit_code == 0

@@ -1,0 +1,194 @@
+"""A run that was stopped is continued to the same bytes, and refused where it is another run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import runs
+from runs import files_in, read_json
+
+BOARD = "fiemme-spruce-clamped"
+UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings"}
+RESULTS = {"summary.json", "posterior.nc"}
+
+
+def start(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """A fit in a process of its own."""
+    program = [sys.executable, "-m", "bayesplate.cli", "fit", *arguments, "--out", str(folder)]
+    variables = {**os.environ, **environment}
+    return subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=variables)
+
+
+def stop_while_sampling(folder: Path, stop: signal.Signals, n_chunks: int) -> tuple[int, str]:
+    """Send a signal once so many chunks are saved; the exit code and what was said."""
+    with start(folder, BOARD) as process:
+        last = folder / "checkpoint" / "linear" / f"chunk-{n_chunks - 1:04d}.npz"
+        deadline = time.monotonic() + 60
+        while not last.exists() and process.poll() is None:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.send_signal(stop)
+        _, stderr = process.communicate(timeout=60)
+    return process.returncode, stderr
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files, stop):
+    exit_code, stderr = stop_while_sampling(tmp_path / "out", stop, n_chunks=1)
+
+    assert exit_code == 130
+    assert stderr == "interrupted; --resume continues from the last checkpoint\n"
+    assert RESULTS & set(files_in(tmp_path / "out")) == set()
+    assert runs.fit(tmp_path / "out", BOARD, "--resume").exit_code == 0
+    assert files_in(tmp_path / "out") == fiemme_files
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a signal that cannot be caught")
+def test_a_killed_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files):
+    exit_code, _ = stop_while_sampling(tmp_path / "out", signal.SIGKILL, n_chunks=2)
+
+    assert exit_code == -signal.SIGKILL
+    left = files_in(tmp_path / "out")
+    assert RESULTS & set(left) == set()
+    assert "checkpoint/linear/chunk-0001.npz" in left
+    assert runs.fit(tmp_path / "out", BOARD, "--resume").exit_code == 0
+    assert files_in(tmp_path / "out") == fiemme_files
+
+
+def test_an_interrupt_before_sampling_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(*_: object, **__: object) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(10)
+
+    monkeypatch.setattr("bayesplate.workflow.fit.pose", interrupted)
+    run = runs.fit(tmp_path / "out", BOARD)
+
+    assert run.exit_code == 130
+    assert not run.folder.exists()
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_a_run_that_does_not_converge_says_so_and_gives_no_constants(stopped):
+    assert stopped.exit_code == 5
+    assert stopped.summary["converged"] is False
+    assert set(stopped.summary) == UNCONVERGED
+    assert stopped.summary["sampler"]["steps"] == 200
+    assert stopped.summary["sampler"]["tau_max"] > 0
+    assert any("autocorrelation" in sentence for sentence in stopped.summary["warnings"])
+    assert "posterior.nc" not in stopped.files
+    assert "the sampler did not converge, so no constants are given" in stopped.stderr
+    assert read_json(stopped.stdout)["error"]["exit_code"] == 5
+    assert not any(name in stopped.stdout + stopped.stderr for name in ("E_x", "GPa"))
+
+
+def test_a_run_that_did_not_converge_is_continued_where_more_steps_are_allowed(stopped, fiemme_files):
+    """200 steps and then the others are the same draws as all of them at once, and the same burn-in is dropped."""
+    assert runs.fit(stopped.folder, BOARD, "--resume", "--quiet").exit_code == 0
+    assert stopped.files == fiemme_files
+
+
+def test_a_damaged_chunk_shortens_the_run_and_the_draws_are_the_same(stopped, fiemme_files):
+    chunk = stopped.folder / "checkpoint" / "linear" / "chunk-0001.npz"
+    chunk.write_bytes(chunk.read_bytes()[:1000])
+
+    assert runs.fit(stopped.folder, BOARD, "--resume", "--quiet").exit_code == 0
+    left = stopped.files
+    assert {name: left.pop(name) for name in fiemme_files} == fiemme_files
+    assert len(left["checkpoint/linear/chunk-0001.npz.damaged"]) == 1000
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "options", "what"),
+    [
+        ('"(0,0)" = 57', '"(0,0)" = 58', (), "differs in its fingerprint"),
+        ("density_kg_m3 = 399", "density_kg_m3 = 400", (), "differs in its fingerprint"),
+        ("poisson_xy = 0.51", "poisson_xy = 0.50", (), "differs in its fingerprint"),
+        ("format = 1", "format = 1 # the archive holds the text of the card", (), "differs in its fingerprint"),
+        ("", "", ("--seed", "2"), "differs in its seed: wanted 2, got 1"),
+        ("", "", ("--robust",), "differs in its fingerprint"),
+        ("", "", ("--exact",), "wanted a saved run under the exact law, got none to resume"),
+    ],
+)
+def test_another_run_is_not_continued(stopped, own_card, old, new, options, what):
+    """Exit 6, the difference named, and what the first run left stays as it was."""
+    before = stopped.files
+    text = own_card.read_text(encoding="utf-8")
+    assert text.count(old) == 1 or not old
+    own_card.write_text(text.replace(old, new) if old else text, encoding="utf-8")
+    run = runs.fit(stopped.folder, str(own_card), "--resume", *options)
+
+    assert run.exit_code == 6
+    assert what in run.stderr
+    assert "--force" in run.stderr
+    assert run.files == {**before, "checkpoint/linear/lock": run.files["checkpoint/linear/lock"]}
+
+
+def test_a_folder_with_a_run_is_neither_overwritten_nor_continued_unasked(stopped):
+    before = stopped.files
+    run = runs.fit(stopped.folder, BOARD)
+
+    assert run.exit_code == 3
+    assert "--force replaces its results, --resume continues an interrupted run" in run.stderr
+    assert run.files == before
+
+
+@pytest.mark.parametrize("content", [{}, {"notes.txt": b"mine"}, {"summary.json": b"{}"}])
+def test_there_is_nothing_to_resume(tmp_path, content):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name, data in content.items():
+        (folder / name).write_bytes(data)
+    run = runs.fit(folder, BOARD, "--resume")
+
+    assert run.exit_code == 6
+    assert "wanted the checkpoint of an interrupted run" in run.stderr
+    assert run.files == content
+
+
+def test_force_replaces_the_results_and_the_checkpoint_and_nothing_else(stopped, quick_fit):
+    (stopped.folder / "posterior.nc").write_bytes(b"old")
+    (stopped.folder / "notes.txt").write_bytes(b"mine")
+    run = quick_fit(BOARD, "--force", "--quiet")
+
+    assert run.folder == stopped.folder
+
+    assert run.exit_code == 0
+    assert set(run.files) == {*RESULTS, "notes.txt"}
+    assert run.files["notes.txt"] == b"mine"
+    assert run.summary["converged"] is True
+    assert run.files["posterior.nc"] != b"old"
+
+
+def test_force_of_a_refused_card_keeps_the_old_results(quick_fit, own_card):
+    before = quick_fit(str(own_card), "--quiet").files
+    own_card.write_text(own_card.read_text(encoding="utf-8").replace("= 600", "= -600"), encoding="utf-8")
+    run = quick_fit(str(own_card), "--force")
+
+    assert run.exit_code == 3
+    assert run.files == before
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(quick_fit):
+    first = quick_fit(BOARD, "--quiet").files
+    again = quick_fit(BOARD, "--quiet", "--force").files
+    other = quick_fit(BOARD, "--quiet", "--force", "--seed", "2").files
+
+    assert set(first) == RESULTS
+    assert again == first
+    assert all(other[name] != first[name] for name in first)
+    assert read_json(other["summary.json"].decode())["seed"] == 2
+
+
+def test_the_number_of_threads_changes_no_byte(tmp_path, fiemme_files):
+    """The same machine, asked for another number of threads than this process was: long sums must not follow it."""
+    other = "2" if os.environ.get("OMP_NUM_THREADS") == "1" else "1"
+    with start(tmp_path / "out", BOARD, "--quiet", OMP_NUM_THREADS=other, OPENBLAS_NUM_THREADS=other) as process:
+        assert process.communicate(timeout=300) == ("", "")
+
+    assert files_in(tmp_path / "out") == fiemme_files
