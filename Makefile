@@ -15,7 +15,7 @@ test: $(VENV)/tested-with
 	$(BIN)/python -m pytest -n 2 -m "not slow"
 
 calibration: $(VENV)/tested-with
-	$(BIN)/python -m pytest tests/calibration -m slow
+	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl
 
 benchmarks: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/run.py

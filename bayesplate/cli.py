@@ -78,6 +78,9 @@ def main() -> None:
 
     CARD is the name of a shipped board or the path of a card (a .toml file).
     """
+    # Thousands of small matrices: more than one thread each only waits for the others. Before numpy is loaded.
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
 
 
 @main.command()
