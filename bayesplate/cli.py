@@ -270,12 +270,15 @@ def _progress(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]:
 
 @contextmanager
 def _reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterator[None]:
-    """Turn errors into one message and an exit code, and a termination signal into an interruption."""
+    """Turn errors into one message and an exit code, and signals to stop into an interruption."""
 
     def interrupt(signum: int, frame: object) -> None:
+        signal.signal(signum, signal.SIG_IGN)  # a second one must not disturb the farewell of the first
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    # A run in the background of a shell ignores interrupts, and goes on doing so.
+    heeded = [s for s in (signal.SIGTERM, signal.SIGINT) if signal.getsignal(s) != signal.SIG_IGN]
+    before = {s: signal.signal(s, interrupt) for s in heeded}
     try:
         yield
     except BayesplateError as error:
@@ -293,7 +296,8 @@ def _reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterat
             traceback.print_exc()
         _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", INTERNAL, as_json)
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for heard, handler in before.items():
+            signal.signal(heard, handler)
 
 
 def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:

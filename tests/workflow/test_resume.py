@@ -19,10 +19,15 @@ RESULTS = {"summary.json", "posterior.nc"}
 
 
 def start(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
-    """A fit in a process of its own."""
+    """A fit in a process of its own, which heeds an interrupt even where the tests themselves run in the background."""
+
+    def heed_interrupts() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
     program = [sys.executable, "-m", "bayesplate.cli", "fit", *arguments, "--out", str(folder)]
     variables = {**os.environ, **environment}
-    return subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=variables)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(program, **pipes, text=True, env=variables, preexec_fn=heed_interrupts)
 
 
 def stop_while_sampling(folder: Path, stop: signal.Signals, n_chunks: int) -> tuple[int, str]:
