@@ -4,7 +4,7 @@ PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: fit test calibration benchmarks
+.PHONY: fit test docs calibration trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -14,8 +14,17 @@ test: $(VENV)/tested-with
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 -m "not slow"
 
+docs: $(VENV)/tested-with
+	$(BIN)/python -m sphinx -W --keep-going -n -b html docs docs/_build/html
+
 calibration: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl
+
+trial: $(VENV)/tested-with
+	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl
+
+coverage: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl
 
 benchmarks: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/run.py

@@ -2,6 +2,10 @@
 
     fit(card)       board card to posterior
     check(card)     what a card can identify, without sampling
+    compare(card)   every method side by side
+    cite(card)      references of exactly what a fit uses
+
+`modes(card)` is imported from `bayesplate.workflow.modes`: its name here is that of the folder of plate solutions.
 
 Glossary of symbols
 -------------------
@@ -27,13 +31,17 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from bayesplate.workflow.check import check
+    from bayesplate.workflow.cite import cite
+    from bayesplate.workflow.compare import compare
     from bayesplate.workflow.fit import FitResult, fit
 
-__all__ = ["FitResult", "check", "fit"]
+__all__ = ["FitResult", "check", "cite", "compare", "fit"]
 
 _HOMES = {
     "FitResult": "bayesplate.workflow.fit",
     "check": "bayesplate.workflow.check",
+    "cite": "bayesplate.workflow.cite",
+    "compare": "bayesplate.workflow.compare",
     "fit": "bayesplate.workflow.fit",
 }
 

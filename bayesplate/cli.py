@@ -57,6 +57,9 @@ def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None
         ),
         "write_to": click.option("--out", type=click.Path(), help="Folder for compare.json (default: not written)."),
         "force": click.option("--force", is_flag=True, help="Replace the results in the output folder."),
+        "report": click.option(
+            "--no-report", "report", is_flag=True, default=True, flag_value=False, help="Write no page and no figures."
+        ),
         "resume": click.option("--resume", is_flag=True, help="Continue an interrupted run."),
         "json": click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables."),
         "quiet": click.option("--quiet", is_flag=True, help="Print nothing but errors."),
@@ -101,7 +104,7 @@ def check(card: str, effects: str | None, as_json: bool, quiet: bool, debug: boo
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "law", "exact", "robust", "force", "resume", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "law", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
 def fit(
     card: str,
     out: str | None,
@@ -109,13 +112,14 @@ def fit(
     effects: str | None,
     law: Any,
     robust: bool,
+    report: bool,
     force: bool,
     resume: bool,
     as_json: bool,
     quiet: bool,
     debug: bool,
 ) -> None:
-    """Posterior of the elastic constants of CARD: summary.json, posterior.nc."""
+    """Posterior of the elastic constants of CARD: report.html, summary.json, posterior.nc."""
     if force and resume:
         raise click.UsageError("--force starts anew and --resume continues: give one of them.")
     with _reporting(as_json=as_json, debug=debug, resumable=True):
@@ -129,6 +133,7 @@ def fit(
                 effects=_names(effects),
                 law=law,
                 robust=robust,
+                report=report,
                 force=force,
                 resume=resume,
                 progress=tell,
@@ -194,6 +199,39 @@ def compare(
             from bayesplate.workflow.shown import show_compare
 
             _print(show_compare(result))
+
+
+@main.command()
+@click.argument("card")
+@_options("out", "seed", "effects", "force", "resume", "json", "quiet", "debug")
+def diagnose(
+    card: str,
+    out: str | None,
+    seed: int,
+    effects: str | None,
+    force: bool,
+    resume: bool,
+    as_json: bool,
+    quiet: bool,
+    debug: bool,
+) -> None:
+    """Trace the residual of CARD to an effect, add it, and report the error before and after."""
+    if force and resume:
+        raise click.UsageError("--force starts anew and --resume continues: give one of them.")
+    with _reporting(as_json=as_json, debug=debug, resumable=True):
+        with _progress(shown=not quiet and not as_json) as tell:
+            from bayesplate.workflow.diagnose import diagnose as run
+
+            result = run(
+                card, out=out, seed=seed, effects=_names(effects), force=force, resume=resume, progress=tell
+            )
+        if as_json:
+            _print_json(result.diagnosis)
+        elif not quiet:
+            from bayesplate.workflow.shown import show_diagnosis
+
+            _print(show_diagnosis(result.diagnosis))
+            click.echo(f"written to {result.folder}")
 
 
 @main.command()

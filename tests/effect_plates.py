@@ -67,13 +67,14 @@ def hertz_apart(
     generator: Sequence[NoEffect],
     n_modes: int,
     is_sheared: bool = False,
+    n: tuple[int, int] | None = None,
 ) -> np.ndarray:
-    """The package's frequencies against the generator's, cents."""
+    """The package's frequencies against the generator's, cents; n: polynomials of the generator along x and y."""
     if is_sheared:
         effects, parameters = (*effects, TransverseShear()), {**parameters, **SHEAR}
         generator = (*generator, GeneratorShear(G_XZ, G_YZ))
     n_rigid = 3 if set(plate.edges.values()) == {"free"} else 0
-    independent = solve_generator(plate, generator, n_modes + n_rigid).frequencies[n_rigid:]
+    independent = solve_generator(plate, generator, n_modes + n_rigid, n).frequencies[n_rigid:]
     return 1200.0 * np.log2(hertz(plate, effects, parameters, n_modes) / independent)
 
 

@@ -16,8 +16,6 @@ from bayesplate.quantities import Quantity
 
 LIGHTEST, HEAVIEST = 20.0, 25_000.0  # kg/m3: lighter than balsa foam, heavier than any metal in use
 THICKEST_SHARE = 0.5  # of the shorter side; beyond it no plate theory holds
-_HELD = ("clamped", "supported")
-_NEEDS_EDGE = {"clamp_rotation": ("clamped",), "clamp_translation": _HELD, "support_mass": _HELD}
 
 
 def physical_faults(card: BoardCard) -> list[Fault]:
@@ -30,10 +28,11 @@ def physical_faults(card: BoardCard) -> list[Fault]:
     Returns
     -------
     list of Fault
-        Empty if there is none. Labels that no mode of the board has are found where modes are computed, not here.
+        Empty if there is none. Labels that no mode of the board has are found where modes are computed, effects that
+        cannot act where effects are known, not here.
     """
     file = plain(card.path.name) if card.path else f"{card.name}.toml"
-    faults = [*_plate_faults(card, file), *_effect_faults(card, file), *_prior_faults(card, file)]
+    faults = [*_plate_faults(card, file), *_prior_faults(card, file)]
     for index, setup in enumerate(card.setups):
         where = f"{file} [setup]" if len(card.setups) == 1 else f'{file} [[setup]] {index + 1} "{setup.name}"'
         faults += [
@@ -88,15 +87,6 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
                 if not 0 <= value <= limits[axis]:
                     wanted = f"a place on the board, 0 to {limits[axis]:g} mm"
                     yield Fault(f"{file} [plate] {key}.{axis} {number}", wanted, f"{value:g} mm")
-
-
-def _effect_faults(card: BoardCard, file: str) -> Iterator[Fault]:
-    held = {word for setup in card.setups for word in setup.edges.words.values()}
-    for effect in card.effects:
-        needed = _NEEDS_EDGE.get(effect)
-        if needed and not held & set(needed):
-            wanted = f"a setup with a {' or '.join(needed)} edge for {effect}"
-            yield Fault(f"{file} effects", wanted, f"edges that are all {' or '.join(sorted(held))}")
 
 
 def _prior_faults(card: BoardCard, file: str) -> Iterator[Fault]:

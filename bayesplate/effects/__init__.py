@@ -61,15 +61,21 @@ def is_effect_parameter(name: str) -> bool:
 
 def effects_of(board: Board, setup: Setup) -> tuple[Effect, ...]:
     """The declared effects as they act in a setup, in the order of their declaration."""
-    return tuple(EFFECTS[name].of(board, setup) for name in board.effects if not EFFECTS[name].refusal(board, setup))
+    chosen = {(effect.name, effect.setup_name): effect for effect in board.chosen}
+    return tuple(
+        chosen.get((name, setup.name)) or EFFECTS[name].of(board, setup)
+        for name in board.effects
+        if not EFFECTS[name].refusal(board, setup)
+    )
 
 
 def implied_effects(board: Board) -> tuple[str, ...]:
-    """Effects that the card declares by what it states, in the setups where they can act."""
+    """Effects that the card declares by what it states, where they can act or a setup wants them to."""
     return tuple(
         name
         for name, effect in EFFECTS.items()
-        if effect.is_implied(board) and any(not effect.refusal(board, setup) for setup in board.setups)
+        if effect.is_implied(board)
+        and any(effect.is_wanted(setup) or not effect.refusal(board, setup) for setup in board.setups)
     )
 
 
@@ -83,14 +89,27 @@ def declare(board: Board) -> Board:
 
 
 def effect_faults(board: Board) -> list[Fault]:
-    """Declared effects that act in no setup of the board, with the reasons."""
+    """Declared effects that act in no setup of the board, or not in the one that states them, with the reasons."""
     faults = []
+    file = f"{board.name}.toml"
     for name in board.effects:
-        place = f"{board.name}.toml effects"
-        if name not in EFFECTS:
-            faults.append(Fault(place, f"one of {', '.join(EFFECTS)}", name))
+        effect = EFFECTS.get(name)
+        if effect is None:
+            faults.append(Fault(f"{file} effects", f"one of {', '.join(EFFECTS)}", name))
             continue
-        reasons = [reason for setup in board.setups if (reason := EFFECTS[name].refusal(board, setup))]
-        if len(reasons) == len(board.setups):
-            faults.append(Fault(place, f"a board on which {name} can act", reasons[0]))
+        reasons = [effect.refusal(board, setup) for setup in board.setups]
+        places = [
+            f"{file} [setup]" if len(board.setups) == 1 else f'{file} [[setup]] {number} "{setup.name}"'
+            for number, setup in enumerate(board.setups, start=1)
+        ]
+        wanting = [
+            Fault(place, f"a setup in which {name} can act", reason)
+            for place, reason, setup in zip(places, reasons, board.setups, strict=True)
+            if reason and effect.is_wanted(setup)
+        ]
+        if wanting:
+            faults += wanting
+        elif all(reasons):
+            wanted = f"a board on which {name} can act"
+            faults.append(Fault(f"{file} effects", wanted, reasons[0], f"leave {name} out of the effects"))
     return faults

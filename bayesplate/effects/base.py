@@ -51,10 +51,10 @@ class EffectParameter:
 
     @property
     def nominal(self) -> float:
-        """A representative size: the median of a log-normal prior, one standard deviation above a normal one."""
+        """A representative size: the median of a log-normal prior, one sd above a normal one if its bounds allow."""
         if self.prior.is_exact or self.prior.kind == "log-normal":
             return self.prior.median
-        return float(self.prior.value(1.0))
+        return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,8 @@ class Effect(ABC):
     theory: ClassVar[Theory] = "thin"
     releases: ClassVar[Release] = ""
     turns_grain: ClassVar[bool] = False
+    refines: ClassVar[float] = 1.0
+    """Factor on the elements a side of a thin plate, for what its mesh would show."""
 
     @classmethod
     @abstractmethod
@@ -89,6 +91,11 @@ class Effect(ABC):
     @classmethod
     def is_implied(cls, board: Board) -> bool:
         """Whether the card declares the effect by what it states: a mass, the air, readings with places."""
+        return False
+
+    @classmethod
+    def is_wanted(cls, setup: Setup) -> bool:
+        """Whether the setup itself states the effect, so that it is a fault if the effect cannot act there."""
         return False
 
     @classmethod

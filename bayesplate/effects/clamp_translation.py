@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Release, Scope
-from bayesplate.effects.clamps import ClampedEnds, clamped_ends, compliance_refusal, spring_weights
+from bayesplate.effects.base import EffectParameter, Floats, Release
+from bayesplate.effects.clamps import CompliantClamp, spring_weights
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import Term
-from bayesplate.plate.board import Board, Values
+from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -24,33 +24,16 @@ _SOURCE = (
 
 
 @dataclass(frozen=True)
-class ClampTranslation(Effect):
+class ClampTranslation(CompliantClamp):
     """Springs against deflection in place of the deflection that clamped edges hold; all of one stiffness k_T.
 
     The slope stays held. The parameter is the compliance D / (k_T L^3), 0 for an ideal clamp, with D and L along x
     where an edge across x is clamped, otherwise along y. The other edges' compliance follows from the same k_T.
-
-    Attributes
-    ----------
-    clamped : ClampedEnds
     """
 
-    clamped: ClampedEnds = ((False, False), (False, False))
-
     name: ClassVar[str] = "clamp_translation"
-    scope: ClassVar[Scope] = "setup"
     sentence: ClassVar[str] = "The clamp gives way across the board, most of all in its higher modes."
     releases: ClassVar[Release] = "value"
-
-    @classmethod
-    def of(cls, board: Board, setup: Setup) -> ClampTranslation:
-        """The effect on all clamped edges of the setup."""
-        return cls(setup.name, clamped_ends(setup))
-
-    @classmethod
-    def refusal(cls, board: Board, setup: Setup) -> str:
-        """Refused where no edge is clamped."""
-        return compliance_refusal(setup)
 
     def parameters(self) -> tuple[EffectParameter, ...]:
         """The compliance D / (k_T L^3)."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
 import numpy as np
 
-from bayesplate.effects.base import Floats
-from bayesplate.plate.board import Values, density, vibrating_lengths
+from bayesplate.effects.base import Effect, Floats, Scope
+from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.setup import Setup
 
 ClampedEnds = tuple[tuple[bool, bool], tuple[bool, bool]]
@@ -18,9 +21,28 @@ def clamped_ends(setup: Setup) -> ClampedEnds:
     return (x0 == "clamped", x1 == "clamped"), (y0 == "clamped", y1 == "clamped")
 
 
-def compliance_refusal(setup: Setup) -> str:
-    """Why no clamp can give way in a setup."""
-    return "" if any(any(at) for at in clamped_ends(setup)) else "no edge is clamped"
+@dataclass(frozen=True)
+class CompliantClamp(Effect):
+    """Springs of one stiffness in place of what all clamped edges of a setup hold.
+
+    Attributes
+    ----------
+    clamped : ClampedEnds
+    """
+
+    clamped: ClampedEnds = ((False, False), (False, False))
+
+    scope: ClassVar[Scope] = "setup"
+
+    @classmethod
+    def of(cls, board: Board, setup: Setup) -> Self:
+        """The effect on all clamped edges of the setup."""
+        return cls(setup.name, clamped_ends(setup))
+
+    @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """Refused where no edge is clamped."""
+        return "" if any(any(at) for at in clamped_ends(setup)) else "no edge is clamped"
 
 
 def spring_weights(

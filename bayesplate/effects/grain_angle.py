@@ -14,9 +14,9 @@ from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 DEGREE = np.pi / 180.0
-DEFAULT_ANGLE = Quantity.from_mean(0.0, 2.0 * DEGREE, "normal", lower=0.0, upper=6.0 * DEGREE)
+DEFAULT_ANGLE = Quantity.from_mean(0.0, 3.0 * DEGREE, "normal", lower=0.0, upper=6.0 * DEGREE)
 _SOURCE = (
-    "half-normal of 2 degrees up to 6: boards are sawn along the grain by eye; a rectangle rings alike for either sign"
+    "half-normal of 3 degrees up to 6: boards are sawn along the grain by eye; a rectangle rings alike for either sign"
 )
 
 

@@ -32,6 +32,13 @@ class SupportStiffness(Effect):
         """The effect under the whole board."""
         return cls(setup.name)
 
+    @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """Refused where an edge is held: such a board lies on nothing."""
+        if {*setup.ends_x, *setup.ends_y} != {"free"}:
+            return "an edge is held, so the board does not lie or hang on anything else"
+        return ""
+
     def parameters(self) -> tuple[EffectParameter, ...]:
         """Stiffness per area."""
         return (EffectParameter("stiffness", "N/m^3", _PRIOR, _SOURCE),)

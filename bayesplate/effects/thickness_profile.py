@@ -18,7 +18,7 @@ from bayesplate.plate.board import Board, Values, density
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
-DEFAULT_TAPER = Quantity.from_mean(0.0, 0.03, "normal")
+DEFAULT_TAPER = Quantity.from_mean(0.0, 0.05, "normal")
 _SOURCE = "normal: hand-planed and belt-sanded boards of 3-5 mm differ by 0.1-0.2 mm from end to end, either way"
 _POWERS: dict[Group, int] = {"bending": 3, "shear": 1, "mass": 1, "rotary": 3}
 """How each group of terms goes with the thickness."""

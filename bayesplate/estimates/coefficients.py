@@ -57,7 +57,12 @@ class CoefficientRows:
 
 
 def coefficient_rows(
-    board_name: str, model: SetupModel, values: Values, source: CoefficientSource | None = None
+    board_name: str,
+    model: SetupModel,
+    values: Values,
+    source: CoefficientSource | None = None,
+    *,
+    compared: bool = True,
 ) -> CoefficientRows:
     """Coefficients of a setup's readings.
 
@@ -71,6 +76,9 @@ def coefficient_rows(
         Where the modes' own coefficients are taken, and the middle of a training without a printed one.
     source : "sensitivity", "training" or "published", optional
         By default the published table where the setup names one, else the sensitivity of one solve.
+    compared : bool
+        Whether to solve plates of both theories to say which a published table is of; half a second where it has many
+        modes.
 
     Returns
     -------
@@ -89,7 +97,7 @@ def coefficient_rows(
         return _by_sensitivity(model, values)
     if source == "training":
         return _by_training(model, values)
-    return _published(board_name, model, values)
+    return _published(board_name, model, values, compared)
 
 
 def _by_sensitivity(model: SetupModel, values: Values) -> CoefficientRows:
@@ -145,11 +153,11 @@ def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
     return TrainingConstants(t.E_x_gpa * _GPA, t.E_y_gpa * _GPA, t.G_xy_gpa * _GPA, t.nu_xy, G_xz, G_yz)
 
 
-def _published(board_name: str, model: SetupModel, values: Values) -> CoefficientRows:
+def _published(board_name: str, model: SetupModel, values: Values, compared: bool) -> CoefficientRows:
     setup = model.setup
     card = fitting_table(board_name, setup, aspect_ratio_of(values, setup))
     rows = np.array([card.table[label] for label in setup.labels])
-    distances = _distances(card, setup, rows, _thickness_ratio(values, setup))
+    distances = _distances(card, setup, rows, _thickness_ratio(values, setup)) if compared else {}
     theory = min(distances.items(), key=lambda item: item[1])[0] if distances else "not stated"
     sentence = f"printed table {card.name}: {card.title}"
     if distances:

@@ -67,7 +67,9 @@ class PaperSystem:
         return float(np.linalg.cond(self.coefficients))
 
 
-def paper_system(board: Board, estimate: Estimate, source: CoefficientSource | None = None) -> PaperSystem:
+def paper_system(
+    board: Board, estimate: Estimate, source: CoefficientSource | None = None, *, compared: bool = True
+) -> PaperSystem:
     """The paper's linear system of a board.
 
     Parameters
@@ -77,6 +79,8 @@ def paper_system(board: Board, estimate: Estimate, source: CoefficientSource | N
         Where the modes' own coefficients are taken.
     source : "sensitivity", "training" or "published", optional
         By default the published table where a setup names one, else the modes' own coefficients.
+    compared : bool
+        Whether the origins say how far a published table lies from solved plates; see `coefficient_rows`.
 
     Returns
     -------
@@ -88,7 +92,9 @@ def paper_system(board: Board, estimate: Estimate, source: CoefficientSource | N
         If a named table does not hold a label of the setup, or is of other edges or another aspect ratio.
     """
     values = board.nominal()
-    origins = tuple(coefficient_rows(board.name, model, estimate.values, source) for model in estimate.models)
+    origins = tuple(
+        coefficient_rows(board.name, model, estimate.values, source, compared=compared) for model in estimate.models
+    )
     psi = [
         (2.0 * np.pi * setup.measured) ** 2 * inverse_lambda(values, setup) - origin.rest
         for setup, origin in zip(board.setups, origins, strict=True)

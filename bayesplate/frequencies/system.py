@@ -47,7 +47,8 @@ class System:
         values : dict of float
             D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
         """
-        per_side = SHEAR_ELEMENTS_PER_SIDE if self.theory == "shear-flexible" else ELEMENTS_PER_SIDE
+        finest = max((effect.refines for effect in self.effects), default=1.0)
+        per_side = SHEAR_ELEMENTS_PER_SIDE if self.theory == "shear-flexible" else round(ELEMENTS_PER_SIDE * finest)
         elements = mesh(term_weights(values, self.setup).at(0), per_side)
         return _plate(self.setup.ends_x, self.setup.ends_y, self.theory, self.effects, *elements)
 

@@ -7,13 +7,14 @@ it has not seen when it is built.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.naming import Place
+from bayesplate.modes.pencils import condensed_eigenvalues, pencil_eigenvalues, pencil_modes
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 from bayesplate.modes.solve import ClassModes, solve_class
 
@@ -21,6 +22,12 @@ _SPARE = 2
 _LOWEST_SHARE = 1e-6
 _ACCEPTED_CENTS = 0.1
 _STEADY = 0.05
+_WHOLE = 40
+"""Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
+_BEYOND = 6
+"""Modes above the wanted ones that are kept from it."""
+_BATCH = 64
+"""Draws whose large matrices are held at once: all draws of a posterior would need gigabytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +45,9 @@ class ReducedBlock:
         Rigid motions in the basis: the lowest eigenvalues, which are left out.
     shift : float, s^-2
         Keeps the stiffness of rigid motions above zero where several masses ask for a pencil.
+    n_kept : int
+        Where it is not 0, the basis is the block's modes at the centre in the order of their frequencies, and all above
+        so many are condensed for each draw (`bayesplate.modes.pencils`).
     """
 
     parity: Parity
@@ -45,33 +55,44 @@ class ReducedBlock:
     masses: NDArray[np.float64]
     n_rigid: int = 0
     shift: float = 1.0
+    n_kept: int = 0
 
     def eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
-        """Elastic eigenvalues of many draws, increasing: (n_draws, r - n_rigid) array, s^-2."""
+        """Elastic eigenvalues of many draws, increasing: (n_draws, n) array, s^-2.
+
+        All r - n_rigid of them, or n_kept - n_rigid where the others are condensed.
+        """
+        if self.n_kept and len(weights.stiffness) > _BATCH:
+            starts = range(0, len(weights.stiffness), _BATCH)
+            parts = [Weights(*(w[start : start + _BATCH] for w in weights)) for start in starts]
+            return np.concatenate([self.eigenvalues(part) for part in parts])
         stiffness = _weighted(weights.stiffness, self.stiffness)
-        if not len(self.masses):
-            return np.asarray(np.linalg.eigvalsh(stiffness) / weights.mass[:, :1])[:, self.n_rigid :]
-        mass = _weighted(weights.mass, self.masses)
-        try:
-            values = _pencil(stiffness, mass, self.shift)
-        except np.linalg.LinAlgError:
-            values = np.concatenate([_pencil_or_nan(k, m, self.shift) for k, m in zip(stiffness, mass, strict=True)])
-        return np.asarray(values[:, self.n_rigid :])
+        mass = _weighted(weights.mass, self.masses) if len(self.masses) else None
+        if self.n_kept:
+            values = condensed_eigenvalues(stiffness, mass, self.n_kept, self.n_rigid)
+        elif mass is None:
+            values = np.asarray(np.linalg.eigvalsh(stiffness), dtype=np.float64)
+        else:
+            values = pencil_eigenvalues(stiffness, mass, self.shift)
+        values = values[:, self.n_rigid :]
+        return np.asarray(values / weights.mass[:, :1] if mass is None else values)
 
+    def modes(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest elastic modes of many draws: (n_draws, n) eigenvalues, s^-2, and (n_draws, r, n) vectors.
 
-def _pencil(stiffness: NDArray[np.float64], mass: NDArray[np.float64], shift: float) -> NDArray[np.float64]:
-    """Eigenvalues of (n, r, r) pencils, increasing; the stiffness is factorised, for shear strains have no mass."""
-    inverse = np.linalg.inv(np.linalg.cholesky(stiffness + shift * mass))
-    values = 1.0 / np.linalg.eigvalsh(inverse @ mass @ np.swapaxes(inverse, -1, -2)) - shift
-    return np.asarray(values[:, ::-1])
+        The vectors are combinations of the basis, normalised in the draw's mass.
+        """
+        n_wanted = min(n_modes + self.n_rigid, self.stiffness.shape[-1])
+        values, vectors = pencil_modes(
+            _weighted(weights.stiffness, self.stiffness), self.mass(weights), self.shift, n_wanted
+        )
+        return values[:, self.n_rigid :], vectors[:, :, self.n_rigid :]
 
-
-def _pencil_or_nan(stiffness: NDArray[np.float64], mass: NDArray[np.float64], shift: float) -> NDArray[np.float64]:
-    """The same of one pencil; not a number where the weights are those of no material."""
-    try:
-        return _pencil(stiffness[None], mass[None], shift)
-    except np.linalg.LinAlgError:
-        return np.full((1, len(stiffness)), np.nan)
+    def mass(self, weights: Weights) -> NDArray[np.float64]:
+        """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
+        if len(self.masses):
+            return _weighted(weights.mass, self.masses)
+        return weights.mass[:, :1, None] * np.eye(self.stiffness.shape[-1])
 
 
 def _weighted(weights: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -159,13 +180,13 @@ def _reduce(
     together = Weights(*(np.stack(w) for w in zip(*held_out, strict=True)))
     for n_joined in range(0, len(held_out) // 2 + 1, max(1, len(held_out) // 4)):
         joined = [solution.vectors for solution in solutions[:n_joined]]
-        reduced = _project(
-            block, rigid, np.concatenate([*vectors, *joined], axis=1), trained[0], training[0], is_steady
-        )
-        ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
-        worst = 600.0 * float(np.abs(np.log2(ratios)).max())
-        if worst <= _ACCEPTED_CENTS:
-            break
+        elastic = np.concatenate([*vectors, *joined], axis=1)
+        whole = _project(block, rigid, elastic, trained[0], training[0], is_steady)
+        for reduced in _cheapest_first(whole, training[0], n_modes):
+            ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
+            worst = 600.0 * float(np.abs(np.log2(ratios)).max())
+            if worst <= _ACCEPTED_CENTS:
+                return reduced, worst
     return reduced, worst
 
 
@@ -193,6 +214,20 @@ def _project(
         masses = masses[:0]
     stiffness = block.project(block.terms, basis)
     return ReducedBlock(block.parity, stiffness, masses, rigid.shape[1], float(centre.eigenvalues[0]))
+
+
+def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Iterator[ReducedBlock]:
+    """Where the basis is large, the same space with all but its lowest modes at the centre condensed; then as it is."""
+    from scipy.linalg import eigh
+
+    n_kept = whole.n_rigid + n_modes + _BEYOND
+    if whole.stiffness.shape[-1] > max(_WHOLE, 2 * n_kept):
+        stiffness = np.tensordot(centre.stiffness, whole.stiffness, axes=1)
+        mass = np.tensordot(centre.mass, whole.masses, axes=1) if len(whole.masses) else None
+        modes = eigh(stiffness, mass)[1]
+        turned = [modes.T @ terms @ modes for terms in (whole.stiffness, whole.masses)]
+        yield replace(whole, stiffness=turned[0], masses=turned[1], n_kept=n_kept)
+    yield whole
 
 
 def _is_steady(points: Sequence[Weights]) -> bool:

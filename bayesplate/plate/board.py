@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,8 @@ class Board:
         Name of the prior card.
     effects : tuple of str
         Declared effects.
+    chosen : tuple
+        Effects (`bayesplate.effects.Effect`) in another form than the card itself would give them.
     shear_xz, shear_yz : Quantity or None, Pa
     notes : tuple of str
         What was assumed because the card does not say it.
@@ -45,6 +48,7 @@ class Board:
     title: str = ""
     source: str = ""
     effects: tuple[str, ...] = ()
+    chosen: tuple[Any, ...] = ()
     shear_xz: Quantity | None = None
     shear_yz: Quantity | None = None
     notes: tuple[str, ...] = ()

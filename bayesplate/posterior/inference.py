@@ -167,7 +167,9 @@ def infer(
     Inference
         Its chains are theta, the columns of `Parameters`, and the log posterior density of theta.
     """
-    coordinates = TailCoordinates.around(problem.centre, problem.covariance, N_RIGIDITIES)
+    coordinates = TailCoordinates.around(
+        problem.centre, problem.covariance, range(N_RIGIDITIES), problem.parameters.effect_columns
+    )
     chains, convergence = sample(
         coordinates.density(problem.posterior),
         coordinates.start,

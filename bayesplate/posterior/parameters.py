@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.effects import is_effect_parameter
 from bayesplate.estimates.refit import Bounds
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
@@ -53,6 +54,11 @@ class Parameters:
     def fitted_columns(self) -> NDArray[np.intp]:
         """Columns that frequencies depend on: all but the noise."""
         return np.r_[:N_RIGIDITIES, N_RIGIDITIES + self.n_setups : self.n_dim]
+
+    @property
+    def effect_columns(self) -> list[int]:
+        """Columns of the parameters of effects."""
+        return [i for i, n in enumerate(self.inputs, start=N_RIGIDITIES + self.n_setups) if is_effect_parameter(n)]
 
     @property
     def fitted_bounds(self) -> Bounds:

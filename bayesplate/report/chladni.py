@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.report.style import drawable
 from bayesplate.results.sheet import CombinedMode, Sheet, SheetMode, points
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def chladni_sheet(sheet: Sheet) -> Figure:
 
     figure = Figure(figsize=A4)
     plan = layout(len(sheet.modes), sheet.aspect_ratio, has_combined=bool(sheet.combined))
-    heading = f"Chladni figures: {sheet.title}"
+    heading = f"Chladni figures: {drawable(sheet.title)}"
     size = min(14.0, 14.0 * _LONGEST_HEADING / len(heading))
     _text(figure, A4[0] / 2, A4[1] - 0.45, heading, fontsize=size, weight="bold")
     held = f"setup: {sheet.setup}; {sheet.theory} plate; Hz {sheet.basis}"
@@ -96,7 +97,7 @@ def chladni_sheet(sheet: Sheet) -> Figure:
         row, column = divmod(i, plan.n_columns)
         in_row = min(plan.n_columns, len(sheet.modes) - row * plan.n_columns)
         panel = _panel(figure, plan, _left(plan, column, in_row), top - row * plan.cell[1], sheet)
-        _draw_sand(panel, mode.shape)
+        draw_sand(panel, mode.shape)
         _caption(panel, *_mode_caption(mode))
     if sheet.combined:
         _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
@@ -131,11 +132,11 @@ def _panel(figure: Figure, plan: Layout, left: float, top: float, sheet: Sheet) 
     panel.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
     panel.spines[:].set_visible(False)
     for name, word in sheet.edges.items():
-        _draw_edge(panel, name, word, _BAND / width if name[0] == "x" else _BAND / height)
+        draw_edge(panel, name, word, _BAND / width if name[0] == "x" else _BAND / height)
     return panel
 
 
-def _draw_edge(panel: Axes, name: str, word: str, depth: float) -> None:
+def draw_edge(panel: Axes, name: str, word: str, depth: float) -> None:
     """One edge: clamped hatched, supported dashed, free thin; `depth` of the hatching as a fraction of the side."""
     from matplotlib.patches import Rectangle
 
@@ -150,9 +151,9 @@ def _draw_edge(panel: Axes, name: str, word: str, depth: float) -> None:
         panel.add_patch(hatched)
 
 
-def _draw_sand(panel: Axes, shape: NDArray[np.float64]) -> None:
+def draw_sand(panel: Axes, shape: NDArray[np.float64]) -> None:
     """Nodal lines in black; the parts that move down while the others move up are grey."""
-    grid = points()
+    grid = points(len(shape))
     panel.contourf(grid, grid, shape.T, levels=[-np.inf, 0.0, np.inf], colors=[_LOW, "white"])
     panel.contour(grid, grid, shape.T, levels=[0.0], colors=_SAND, linewidths=1.8)
 
@@ -198,7 +199,8 @@ def _legend(figure: Figure, sheet: Sheet) -> None:
         "A name counts the lines crossed on the way along the grain, then on the way across it; "
         f"here the counts begin at {sheet.first_label}.",
     )
-    for i, line in enumerate(lines):
+    told = (f"Likely: two times in three, {sheet.likely}.",) if sheet.likely else ()
+    for i, line in enumerate((*lines, *told)):
         _text(figure, A4[0] / 2, 0.64 - 0.17 * i, line, fontsize=8)
 
 

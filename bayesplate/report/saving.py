@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from bayesplate.report.style import Picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_DOTS_PER_INCH = 200
+DOTS_PER_INCH = 200
+ENDINGS = ("png", "svg")
+_PACKING = 3
+"""Of PNG, 0 to 9: beyond this it takes long and saves little."""
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -20,14 +28,58 @@ def save_figure(figure: Figure, path: Path) -> None:
     figure : matplotlib.figure.Figure
     path : Path
     """
+    with _salted():
+        write_bytes(path, _bytes_of(figure, path.suffix.removeprefix("."), {}))
+
+
+def save_pictures(pictures: Iterable[Picture], folder: Path) -> dict[str, bytes]:
+    """Write pictures as PNG and SVG, title and alternative text in both.
+
+    Parameters
+    ----------
+    pictures : iterable of Picture
+    folder : Path
+        Must be there.
+
+    Returns
+    -------
+    dict of bytes
+        The SVG of each picture, by its name.
+    """
+    vector = {}
+    with _salted():
+        for picture in pictures:
+            told = {"Title": picture.title, "Description": picture.alt}
+            content = {ending: _bytes_of(picture.figure, ending, told) for ending in ENDINGS}
+            for ending, data in content.items():
+                write_bytes(folder / f"{picture.name}.{ending}", data)
+            vector[picture.name] = content["svg"]
+    return vector
+
+
+@contextmanager
+def _salted() -> Iterator[None]:
+    """Names inside an SVG follow from its content; entered once for many figures, because entering takes its time."""
     from matplotlib import rc_context
 
-    ending = path.suffix.removeprefix(".")
-    metadata = {"Date": None} if ending == "svg" else {}
+    with rc_context({"svg.hashsalt": "bayesplate"}):
+        yield
+
+
+def _bytes_of(figure: Figure, ending: str, told: Mapping[str, str]) -> bytes:
+    """A figure as PNG or SVG without a time stamp."""
+    metadata: dict[str, str | None] = {**told, **({"Date": None} if ending == "svg" else {})}
+    packing: Any = {"pil_kwargs": {"compress_level": _PACKING}} if ending == "png" else {}
+    stream = BytesIO()
+    figure.savefig(stream, format=ending, dpi=DOTS_PER_INCH, metadata=metadata, **packing)
+    return stream.getvalue()
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file completely or not at all."""
     partial = path.with_name(path.name + ".partial")
     try:
-        with rc_context({"svg.hashsalt": "bayesplate"}):
-            figure.savefig(partial, format=ending, dpi=_DOTS_PER_INCH, metadata=metadata)
+        partial.write_bytes(data)
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)

@@ -84,7 +84,7 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     log_noise = problem.parameters.log_noise(flat)
     by_setup = posterior.log_frequencies(flat)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
-    predictive = []
+    predictive, log_likelihood = [], []
     for i, (setup, readings, predicted) in enumerate(
         zip(problem.board.setups, posterior.readings, by_setup, strict=True)
     ):
@@ -93,6 +93,7 @@ def named_draws(inference: Inference, seed: int) -> Draws:
         if setup.resolution:
             simulated[:, rounded] = np.round(simulated[:, rounded] / setup.resolution) * setup.resolution
         predictive.append(simulated)
+        log_likelihood.append(readings.log_likelihood(predicted, log_noise[:, i]))
 
     def shaped(array: Floats) -> Floats:
         return np.broadcast_to(array, flat.shape[:1] + array.shape[1:]).reshape(*shape, *array.shape[1:])
@@ -107,7 +108,7 @@ def named_draws(inference: Inference, seed: int) -> Draws:
         noise=shaped(np.exp(log_noise)),
         derived={name: Derived(shaped(item.values), item.unit) for name, item in derived.items()},
         log_frequency=shaped(np.concatenate(by_setup, axis=1)),
-        log_likelihood=shaped(posterior.log_likelihood(flat)),
+        log_likelihood=shaped(np.concatenate(log_likelihood, axis=1)),
         predictive=shaped(np.concatenate(predictive, axis=1)),
     )
 
@@ -182,10 +183,15 @@ def linearisation(inference: Inference, draws: Draws) -> Floats:
     return linearisation_errors(inference.problem.board, inference.problem.posterior.models, some)
 
 
-def linear_is_enough(inference: Inference, draws: Draws) -> bool:
-    """Whether the linear law's error over the posterior stays below its share of the posterior's own noise."""
+def linear_is_enough(inference: Inference, draws: Draws, errors: Floats | None = None) -> bool:
+    """Whether the linear law's error over the posterior stays below its share of the posterior's own noise.
+
+    `errors` are those of `linearisation`, where they are known already.
+    """
     noise = np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0)
-    return linear_suffices(inference.problem.board, linearisation(inference, draws), list(noise))
+    return linear_suffices(
+        inference.problem.board, linearisation(inference, draws) if errors is None else errors, list(noise)
+    )
 
 
 def finite(value: float) -> float | None:

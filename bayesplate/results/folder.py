@@ -13,7 +13,16 @@ from bayesplate.errors import CheckpointError, Fault, InputError
 
 SUMMARY = "summary.json"
 ARCHIVE = "posterior.nc"
+DIAGNOSIS = "diagnosis.json"
 CHECKPOINT = "checkpoint"
+BEFORE = "before"
+"""Subfolder of the fit that a diagnosis questioned, where it was fitted again."""
+PAGE = "report.html"
+FIGURES = "figures"
+CONSTANTS = ("constants.csv", "constants.tex")
+BEFORE_AFTER = ("before-after.csv", "before-after.tex")
+RESULTS = (SUMMARY, ARCHIVE, DIAGNOSIS, PAGE, *CONSTANTS, *BEFORE_AFTER)
+"""What a run leaves besides its figures, and the next one in the same folder replaces."""
 BESIDE = ("compare.json", "modes.png", "modes.svg")
 """Files of commands that share the folder with a fit: they do not make it a used one."""
 
@@ -77,13 +86,23 @@ class OutputFolder:
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             if not resume:
-                for name in (SUMMARY, ARCHIVE):
-                    (self.path / name).unlink(missing_ok=True)
+                for path in self._earlier_results():
+                    path.unlink(missing_ok=True)
+                before = self.path / BEFORE
+                if before.is_dir() and not any(before.iterdir()):
+                    before.rmdir()
                 if self.checkpoint.is_dir():
                     shutil.rmtree(self.checkpoint)
         except OSError as error:
             fault = Fault(f"--out {self.path}", "a folder that can be written", error.strerror or str(error))
             raise InputError(fault) from error
+
+    def _earlier_results(self) -> list[Path]:
+        """Results and figures of an earlier run, not what else somebody keeps in the folder."""
+        figures = self.path / FIGURES
+        drawn = [path for path in figures.iterdir() if path.suffix in (".png", ".svg")] if figures.is_dir() else []
+        before = (self.path / BEFORE / name for name in (SUMMARY, ARCHIVE))
+        return [*(self.path / name for name in RESULTS), *before, *drawn]
 
     def close(self) -> None:
         """Remove the checkpoint of a run that is done; chunks found damaged stay for whoever wants to look."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,17 @@ from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import Errors, prediction_errors
 from bayesplate.frequencies.laws import cents
-from bayesplate.frequencies.spectrum import spectrum
+from bayesplate.frequencies.spectrum import NamedMode, spectrum
+from bayesplate.modes.solve import Modes
 from bayesplate.posterior.inference import Inference, Problem
 from bayesplate.posterior.region import predictor
 from bayesplate.results.draws import Draws, finite
 
-_MOST_MODES = 96
+Spectrum = tuple[Modes, tuple[NamedMode, ...]]
+
+_FEWEST_MODES, _MOST_MODES = 12, 96
+_SPARE = 1.5
+"""Modes solved for each measured peak: some peaks are missed on the bench."""
 
 
 def mode_errors(inference: Inference, draws: Draws) -> Errors:
@@ -66,19 +72,38 @@ def mode_entries(inference: Inference, draws: Draws, errors: Errors) -> list[dic
     ]
 
 
-def unlabelled_entries(problem: Problem, draws: Draws) -> list[dict[str, Any]]:
+def spectra(problem: Problem, draws: Draws) -> dict[str, Spectrum]:
+    """Spectrum at the posterior mean of every setup with a peak or a sign to compare it with; each solved once.
+
+    Parameters
+    ----------
+    problem : Problem
+    draws : Draws
+
+    Returns
+    -------
+    dict of (Modes, tuple of NamedMode)
+        By setup; up to above its highest peak, and at least two modes a reading.
+    """
+    values = posterior_mean_values(problem, draws)
+    found = {}
+    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
+        if not setup.unlabelled and setup.hammer is None:
+            continue
+        n_modes = max(_FEWEST_MODES, 2 * len(setup.readings), round(_SPARE * len(setup.readings + setup.unlabelled)))
+        found[setup.name] = spectrum(model.system, values, n_modes)
+        while found[setup.name][1][-1].frequency < max(setup.unlabelled, default=0.0) and n_modes < _MOST_MODES:
+            n_modes *= 2
+            found[setup.name] = spectrum(model.system, values, n_modes)
+    return found
+
+
+def unlabelled_entries(problem: Problem, found: Mapping[str, Spectrum]) -> list[dict[str, Any]]:
     """Each unlabelled peak beside the predicted mode nearest to it; they are shown, not fitted."""
     entries = []
-    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
-        if not setup.unlabelled:
-            continue
-        n_modes = 12
-        values = posterior_mean_values(problem, draws)
-        _, named = spectrum(model.system, values, n_modes)
-        while named[-1].frequency < max(setup.unlabelled) and n_modes < _MOST_MODES:
-            n_modes *= 2
-            _, named = spectrum(model.system, values, n_modes)
+    for setup in problem.board.setups:
         for peak in setup.unlabelled:
+            _, named = found[setup.name]
             nearest = min(named, key=lambda mode, peak=peak: abs(np.log(mode.frequency / peak)))  # type: ignore[misc]
             entries.append(
                 {

@@ -18,8 +18,8 @@ PAPER = (
 ELEMENT = (
     "F. K. Bogner, R. L. Fox, L. A. Schmit: The generation of inter-element-compatible stiffness and "
     "mass matrices by the "
-    "use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB (1965). "
-    "[the plate's finite elements]"
+    "use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB, 397-443 "
+    "(1965). [the plate's finite elements]"
 )
 THEORIES = {
     "thin": (
@@ -30,7 +30,7 @@ THEORIES = {
         "A69-A77 (1945). [the plate theory]",
         "R. D. Mindlin: Influence of rotatory inertia and shear on flexural motions of isotropic, elastic "
         "plates. J. Appl. "
-        "Mech. 18, 31-38 (1951). [the plate theory]",
+        "Mech. 18, 31-38 (1951), doi:10.1115/1.4010217. [the plate theory]",
         "M. Endo, N. Kimura: An alternative formulation of the boundary value problem for the Timoshenko "
         "beam and Mindlin "
         "plate. J. Sound Vib. 301, 355-373 (2007). [shear strains as unknowns]",
@@ -38,13 +38,16 @@ THEORIES = {
 }  # fmt: skip
 EFFECTS_FROM = {
     "grain_angle": (
-        "N. T. Mascia, F. A. R. Lahr: Remarks on orthotropic elastic models applied to wood. Materials "
-        "Research 9 (2006). "
-        "[the turned grain]",
+        "N. T. Mascia, F. A. R. Lahr: Remarks on orthotropic elastic models applied to wood. Materials Research 9, "
+        "301-310 (2006), doi:10.1590/S1516-14392006000300010. [the turned grain]",
     ),
 }
 """Of effects whose formulas are taken from print; the others are derived in their own files."""
 COMPUTATION = (
+    "C. R. Harris et al.: Array programming with NumPy. Nature 585, 357-362 (2020), doi:10.1038/s41586-020-2649-2. "
+    "[arrays, small eigenvalue problems]",
+    "P. Virtanen et al.: SciPy 1.0: fundamental algorithms for scientific computing in Python. Nature Methods 17, "
+    "261-272 (2020), doi:10.1038/s41592-019-0686-2. [sparse eigenvalue problems, special functions]",
     "D. Foreman-Mackey, D. W. Hogg, D. Lang, J. Goodman: emcee: The MCMC hammer. PASP 125, 306-312 (2013), "
     "doi:10.1086/670067. [sampling]",
     "J. Goodman, J. Weare: Ensemble samplers with affine invariance. Comm. Appl. Math. Comp. Sci. 5, 65-80 (2010), "

@@ -23,6 +23,10 @@ LOWEST_COMBINED = 12
 """Modes that are combined where too few were measured: the lowest six of a long board hardly bend one way."""
 
 _GRID = 121
+_TWO_THIRDS = 0.967
+"""Standard deviations of a normal distribution on either side of its middle that hold two thirds of it."""
+_BY_PRIOR = "by the prior alone"
+_BY_MODES = "by what the measured modes tell"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +40,7 @@ class SheetMode:
     hertz : float
     measured_hz : float or None
     band_hz : tuple of float or None
-        Where the prior alone expects it, two times in three.
+        Where it is expected two times in three: by the prior alone, or by the modes measured so far.
     shares : (4,) array
         Share of D_x, D_y, D_s and of effects in its energy.
     coefficients : (3,) array
@@ -89,6 +93,8 @@ class Sheet:
         In the order of frequency.
     combined : tuple of CombinedMode
         Empty where the modes do not tell the constants apart.
+    likely : str
+        What the bands come from; empty where there are none.
     """
 
     title: str
@@ -100,15 +106,51 @@ class Sheet:
     basis: str
     modes: tuple[SheetMode, ...]
     combined: tuple[CombinedMode, ...]
+    likely: str = ""
 
 
-def points() -> NDArray[np.float64]:
+@dataclass(frozen=True, eq=False)
+class Precision:
+    """What the modes measured so far foretell of the others.
+
+    Attributes
+    ----------
+    covariance : (3, 3) array
+        Of ln D_x, ln D_y, ln D_s.
+    noise : dict of float
+        Relative, by setup.
+    """
+
+    covariance: NDArray[np.float64]
+    noise: Mapping[str, float]
+
+    def band(self, frequency: float, shares: NDArray[np.float64], setup: str) -> tuple[float, float]:
+        """Where a reading is expected two times in three, to first order: Hz.
+
+        Parameters
+        ----------
+        frequency : float, Hz
+        shares : (3,) array
+            Of D_x, D_y, D_s in the mode's energy: twice the sensitivities of ln f.
+        setup : str
+        """
+        variance = 0.25 * shares @ self.covariance @ shares + self.noise[setup] ** 2
+        factor = float(np.exp(_TWO_THIRDS * np.sqrt(variance)))
+        return frequency / factor, frequency * factor
+
+
+def points(n: int = _GRID) -> NDArray[np.float64]:
     """Where shapes are sampled along each side, as fractions of it, a hair within the edges: (n,) array."""
-    return np.linspace(1e-3, 1.0 - 1e-3, _GRID)
+    return np.linspace(1e-3, 1.0 - 1e-3, n)
 
 
 def sheet(
-    board: Board, system: System, values: Values, basis: str, bands: Mapping[str, tuple[float, float]] | None = None
+    board: Board,
+    system: System,
+    values: Values,
+    basis: str,
+    bands: Mapping[str, tuple[float, float]] | None = None,
+    precision: Precision | None = None,
 ) -> Sheet:
     """Solve a setup and gather what its sheet shows.
 
@@ -122,6 +164,8 @@ def sheet(
         One clause: at which constants.
     bands : dict, optional
         Factors on a frequency between which the prior expects it, by label.
+    precision : Precision, optional
+        Of the estimate at which the modes are computed; it gives the bands of the modes that were not measured.
 
     Returns
     -------
@@ -143,7 +187,11 @@ def sheet(
             name=mode.name,
             hertz=mode.frequency,
             measured_hz=measured.get(mode.name),
-            band_hz=_band(mode, bands),
+            band_hz=(
+                precision.band(mode.frequency, shares[i, :len(RIGIDITIES)], setup.name)
+                if precision is not None and mode.label is not None and mode.name not in measured
+                else _band(mode, bands)
+            ),
             shares=shares[i],
             coefficients=found.coefficients[i],
             shape=shapes[i],
@@ -153,7 +201,8 @@ def sheet(
     title = board.title or board.name
     ratio = float(length_x / length_y)
     first = str(setup.first_label)
-    return Sheet(title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, _combined(rows))
+    likely = "" if all(row.band_hz is None for row in rows) else _BY_MODES if precision is not None else _BY_PRIOR
+    return Sheet(title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, _combined(rows), likely)
 
 
 def _band(mode: NamedMode, bands: Mapping[str, tuple[float, float]] | None) -> tuple[float, float] | None:

@@ -13,7 +13,7 @@ from bayesplate.estimates.identifiability import remarks
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.spectrum import sign_conflicts, spectrum
+from bayesplate.frequencies.spectrum import sign_conflicts
 from bayesplate.modes.naming import CERTAIN
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.convergence import Convergence
@@ -22,7 +22,14 @@ from bayesplate.posterior.region import worst_cents
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks
 from bayesplate.results.draws import Draws, finite, linear_is_enough, linearisation, means_under, spread
-from bayesplate.results.modes import mode_entries, mode_errors, posterior_mean_values, unlabelled_entries
+from bayesplate.results.modes import (
+    Spectrum,
+    mode_entries,
+    mode_errors,
+    posterior_mean_values,
+    spectra,
+    unlabelled_entries,
+)
 
 FORMAT = 1
 FEWEST_WEIGHTED_DRAWS = 200
@@ -81,8 +88,10 @@ def summarise(inference: Inference, draws: Draws, seed: int, versions: Mapping[s
     """
     problem = inference.problem
     board = problem.board
-    system = paper_system(board, problem.estimate)
+    system = paper_system(board, problem.estimate, compared=False)
     errors = mode_errors(inference, draws)
+    found = spectra(problem, draws)
+    linear_errors = linearisation(inference, draws)
     means = {law: _means(inference, draws, law) for law in ("linear", "exact")}
     return {
         **header(problem, seed, versions, card_sha256),
@@ -103,16 +112,16 @@ def summarise(inference: Inference, draws: Draws, seed: int, versions: Mapping[s
         "linear_means": means["linear"],
         "exact_means": means["exact"],
         "modes": mode_entries(inference, draws, errors),
-        "unlabelled": unlabelled_entries(problem, draws),
+        "unlabelled": unlabelled_entries(problem, found),
         "error": {
             "in_sample_rms_cents": _rms(cents(errors.in_sample)),
             "leave_one_out_rms_cents": _rms(cents(errors.left_out)),
-            "linearisation_rms_cents": _rms(linearisation(inference, draws)),
+            "linearisation_rms_cents": _rms(linear_errors),
             "exact_law_worst_cents": worst_cents(problem.posterior.models),
         },
         "sampler": sampler_health(inference.chains, inference.convergence),
         "identifiability": [*remarks(board, problem.identifiability), *input_remarks(draws)],
-        "warnings": _warnings(inference, draws),
+        "warnings": _warnings(inference, draws, found, linear_errors),
     }
 
 
@@ -194,7 +203,9 @@ def _percentile(system: PaperSystem) -> Summary | None:
     }
 
 
-def _warnings(inference: Inference, draws: Draws) -> list[str]:
+def _warnings(
+    inference: Inference, draws: Draws, found: Mapping[str, Spectrum], linear_errors: NDArray[np.float64]
+) -> list[str]:
     problem = inference.problem
     sentences = list(problem.board.notes)
     if not problem.estimate.converged:
@@ -206,12 +217,11 @@ def _warnings(inference: Inference, draws: Draws) -> list[str]:
                     f"setup {setup.name}: the shape of mode {label} fits its label only to {place.correlation:.2f}; "
                     "it may be its neighbour at a veering"
                 )
-    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
-        values = posterior_mean_values(problem, draws)
+    values = posterior_mean_values(problem, draws)
+    for setup in problem.board.setups:
         if setup.hammer is not None:
-            modes, named = spectrum(model.system, values, max(12, 2 * len(setup.readings)))
-            sentences += sign_conflicts(setup, modes, named, values)
-    if problem.posterior.law == "linear" and not linear_is_enough(inference, draws):
+            sentences += sign_conflicts(setup, *found[setup.name], values)
+    if problem.posterior.law == "linear" and not linear_is_enough(inference, draws, linear_errors):
         sentences.append(
             "the linear law is off by more than a quarter of the noise over the posterior: its constants may be "
             "shifted, use the exact law"

@@ -118,20 +118,23 @@ def check_tables(report: Mapping[str, Any]) -> tuple[Table, ...]:
 
 
 def signatures_table(report: Mapping[str, Any]) -> Table:
-    """What effects that are not declared would do: in all, to be seen, and to the constants if ignored."""
+    """What effects that are not declared would do: in all, to be seen, and to the constants if ignored.
+
+    No name of an effect may be cut off on a terminal of 80 columns, so look-alikes stand below each other.
+    """
     rows = tuple(
         (
             one["effect"],
             f"{one['raw_rms_cents']:.1f}",
-            f"{one['visible_rms_cents']:.1f}" + (" (lost in noise)" if one["below_sight"] else ""),
-            " / ".join(f"{one['bias_percent'][name]:+.1f}" for name in _WORDS),
-            ", ".join(one["look_alikes"]) or "-",
+            f"{one['visible_rms_cents']:.1f}" + (" *" if one["below_sight"] else "  "),
+            "/".join(f"{one['bias_percent'][name]:+.1f}" for name in _WORDS),
+            "\n".join(one["look_alikes"]) or "-",
         )
         for one in report["signatures"]
     )
     return Table(
-        "Effects not declared, at a usual size: rms over the modes, cents",
-        ("effect", "shift", "visible in a fit", "E_x/E_y/G_xy off by, %", "looks like"),
+        "Effects not declared, at a usual size: cents rms (*: lost in noise)",
+        ("effect", "shift", "visible", "E_x/E_y/G_xy\noff by, %", "looks like"),
         rows,
     )
 

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.frequencies.laws import LawName
-from bayesplate.posterior.checkpoint import Checkpoint
-from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.draws import Draws, linear_is_enough, named_draws
+from bayesplate.results.draws import Draws
 from bayesplate.results.folder import ARCHIVE, SUMMARY, OutputFolder, json_text, write_text
 from bayesplate.results.store import write_posterior
-from bayesplate.results.summary import Summary, summarise, unconverged_summary
+from bayesplate.results.summary import Summary, unconverged_summary
 from bayesplate.results.versions import versions
+from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed
 from bayesplate.workflow.prepare import Prepared, prepare
 
 
@@ -47,6 +46,7 @@ def fit(
     *,
     out: str | os.PathLike[str] | None = None,
     write: bool = True,
+    report: bool = True,
     seed: int = 1,
     effects: Sequence[str] | None = None,
     law: LawName | None = None,
@@ -65,6 +65,8 @@ def fit(
         Output folder; by default results/NAME.
     write : bool
         False writes nothing: no files, no checkpoints.
+    report : bool
+        Whether to write report.html, its figures and tables beside the numbers.
     seed : int
         Everything random follows from it.
     effects : sequence of str, optional
@@ -97,64 +99,54 @@ def fit(
     folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
     if folder is not None:
         folder.require_usable(force=force, resume=resume)
-    problem = pose(prepared.board, prepared.prior, law=law, robust=robust)
-    settings = SamplerSettings(seed=seed)
-    settings.walkers(problem.parameters.n_dim)
-
-    def checkpoint_of(under: Problem) -> Checkpoint | None:
-        if folder is None:
-            return None
-        return Checkpoint(folder.checkpoint / under.posterior.law, fingerprint(prepared, under))
-
+    request = Request(seed, law, robust)
+    problem = posed(prepared, request)
+    SamplerSettings(seed=seed).walkers(problem.parameters.n_dim)
     if folder is not None:
-        saved = checkpoint_of(problem)
-        if resume and saved is not None and not saved.exists():
+        if resume and not checkpoint_in(folder.checkpoint, prepared, problem).exists():
             wanted = f"a saved run under the {problem.posterior.law} law"
             raise CheckpointError(f"{folder.path}: wanted {wanted}, got none to resume (--force runs it anew)")
         folder.open(resume=resume)
+        if report:
+            from bayesplate.report.page import load_libraries
 
-    def sampled(under: Problem) -> tuple[Inference, Draws]:
-        inference = infer(under, settings, checkpoint=checkpoint_of(under), progress=progress)
-        if not inference.convergence.passed:
-            _refuse(inference, seed, prepared, folder)
-        return inference, named_draws(inference, seed)
+            load_libraries()  # while nobody waits for the page yet
 
-    inference, draws = sampled(problem)
-    if law is None and problem.posterior.law == "linear" and not linear_is_enough(inference, draws):
-        # The choice was made on a normal approximation; the draws know better.
-        inference, draws = sampled(problem.under("exact"))
-    summary = summarise(inference, draws, seed, versions(), prepared.card.sha256)
+    def refuse(inference: Inference) -> None:
+        refuse_unconverged(inference, seed, prepared, None if folder is None else folder.path)
+
+    checkpoints = None if folder is None else folder.checkpoint
+    result = fitted(prepared, problem, request, checkpoints, refuse, progress)
     if folder is not None:
-        write_posterior(folder.path / ARCHIVE, inference, draws, summary, prepared.card_text)
-        write_text(folder.path / SUMMARY, json_text(summary))
+        write_fit(folder.path, result)
+        if report:
+            write_page(folder.path, result)
         folder.close()
-    return FitResult(None if folder is None else folder.path, summary, inference, draws)
+    return FitResult(None if folder is None else folder.path, result.summary, result.inference, result.draws)
 
 
-def fingerprint(prepared: Prepared, problem: Problem) -> str:
-    """Hash of everything besides the sampler's settings that decides the draws."""
-    prior = {name: repr(density) for name, density in problem.prior.densities.items()}
-    identity = {
-        "card": prepared.card.sha256,
-        "prior": prior,
-        "noise": [repr(setup.noise) for setup in problem.board.setups],
-        "inputs": {name: repr(quantity) for name, quantity in problem.board.inputs.items()},
-        "effects": list(problem.board.effects),
-        "law": problem.posterior.law,
-        "robust": problem.posterior.robust,
-        "versions": versions(),
-    }
-    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+def write_fit(folder: Path, result: Fitted) -> None:
+    """Write summary and archive of a fit into a folder that is there."""
+    write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, result.prepared.card_text)
+    write_text(folder / SUMMARY, json_text(result.summary))
 
 
-def _refuse(inference: Inference, seed: int, prepared: Prepared, folder: OutputFolder | None) -> None:
+def write_page(folder: Path, result: Fitted, diagnosis: Mapping[str, Any] | None = None) -> Path:
+    """Write report.html, its figures and tables; with a diagnosis (as in diagnosis.json) its verdict too."""
+    from bayesplate.report.page import write_report
+
+    card = result.prepared.card
+    return write_report(folder, card, result.inference, result.draws, result.summary, diagnosis)
+
+
+def refuse_unconverged(inference: Inference, seed: int, prepared: Prepared, folder: Path | None) -> None:
     """Write the diagnostics of a run that failed the gate, and say so."""
     convergence = inference.convergence
     if folder is not None:
         summary = unconverged_summary(
             inference.problem, inference.chains, convergence, seed, versions(), prepared.card.sha256
         )
-        write_text(folder.path / SUMMARY, json_text(summary))
+        write_text(folder / SUMMARY, json_text(summary))
     raise NotConvergedError(
         "the sampler did not converge, so no constants are given:\n" + "\n".join(convergence.reasons)
     )

@@ -16,9 +16,10 @@ from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
+from bayesplate.posterior.region import noise_widenings
 from bayesplate.results.folder import make_folder, require_new
 from bayesplate.results.prior_bands import prior_bands, prior_medians
-from bayesplate.results.sheet import NUMBERS_OF_MODES, Sheet, sheet
+from bayesplate.results.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
 from bayesplate.workflow.prepare import Prepared, prepare
 
 _AT_ESTIMATE = "at the weighted least-squares estimate"
@@ -49,7 +50,8 @@ def modes(
     ----------
     card : str or path
         Name of a shipped board card, or a path. It may be without frequencies: then the modes are those of the prior's
-        median, with the range in which the prior expects each.
+        median, with the range in which the prior expects each. Modes that were not measured have the range that the
+        measured ones foretell.
     out : path, optional
         Folder of modes.png and modes.svg (modes-SETUP.png where there are several setups); by default results/NAME.
     write : bool
@@ -76,8 +78,9 @@ def modes(
     stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
     names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
     files = require_new(folder, names, force=force) if write else ()
-    values, basis, why = _constants(prepared)
-    sheets = tuple(_sheets(prepared, values, basis, np.random.default_rng(seed)))
+    values, precision, why = _constants(prepared)
+    basis = _AT_PRIOR if precision is None else _AT_ESTIMATE
+    sheets = tuple(_sheets(prepared, values, precision, np.random.default_rng(seed)))
     if write:
         _draw(sheets, folder, files)
     report = {
@@ -91,32 +94,38 @@ def modes(
     return ModesResult(report, sheets, files)
 
 
-def _constants(prepared: Prepared) -> tuple[Values, str, list[str]]:
-    """Where to compute the modes, in one clause, and why if not at the board's own estimate."""
+def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]:
+    """Where to compute the modes, how well that is known, and why if not at the board's own estimate."""
     board = prepared.board
     try:
         require_labels(board)
         estimate = weighted_least_squares(board)
         require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales))
     except NotIdentifiableError as error:
-        return prior_medians(board, prepared.prior), _AT_PRIOR, [str(error)] if _has_labels(board) else []
-    return estimate.values, _AT_ESTIMATE, []
+        return prior_medians(board, prepared.prior), None, [str(error)] if _has_labels(board) else []
+    widenings = noise_widenings(board, estimate)
+    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
+    noise = {setup.name: setup.noise.median * w for setup, w in zip(board.setups, widenings.tolist(), strict=True)}
+    return estimate.values, Precision(identifiability(estimate.sensitivities, scales).covariance, noise), []
 
 
 def _has_labels(board: Board) -> bool:
     return any(setup.readings for setup in board.setups)
 
 
-def _sheets(prepared: Prepared, values: Values, basis: str, rng: np.random.Generator) -> list[Sheet]:
+def _sheets(
+    prepared: Prepared, values: Values, precision: Precision | None, rng: np.random.Generator
+) -> list[Sheet]:
     board, made = prepared.board, []
+    basis = _AT_PRIOR if precision is None else _AT_ESTIMATE
     for setup in board.setups:
         system = system_of(board, setup)
         bands = None
-        if basis == _AT_PRIOR:
+        if precision is None:
             _, named = spectrum(system, values, NUMBERS_OF_MODES[-1])
             labels = [mode.label for mode in named if mode.label is not None]
             bands = prior_bands(board, prepared.prior, setup, labels, rng)
-        made.append(sheet(board, system, values, basis, bands))
+        made.append(sheet(board, system, values, basis, bands, precision))
     return made
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from bayesplate.cards import BoardCard, PriorCard, load_board, load_prior, physical_faults
 from bayesplate.effects import declare, effect_faults, implied_effects
+from bayesplate.effects.attached_mass import ROUGH_ROVING, heaviest_roving
 from bayesplate.errors import InputError
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board, board_from_card
@@ -61,7 +62,8 @@ def prepare(
     faults += [*label_faults(board), *effect_faults(board)]
     if faults:
         raise InputError(faults)
-    return Prepared(read, prior, declare(replace(board, notes=(*board.notes, *_unused_profiles(board)))))
+    notes = (*board.notes, *_unused_profiles(board), *_roving(board))
+    return Prepared(read, prior, declare(replace(board, notes=notes)))
 
 
 def _unused_profiles(board: Board) -> list[str]:
@@ -71,6 +73,18 @@ def _unused_profiles(board: Board) -> list[str]:
         f"the {name} was read at several places: its mean is used, the {effect} is not part of this model"
         for name, effect in profiled.items()
         if board.inputs[name].has_profile and effect not in board.effects
+    ]
+
+
+def _roving(board: Board) -> list[str]:
+    """Things that roved and are heavy enough for the mean over their places to be rough."""
+    if "attached_mass" not in board.effects:
+        return []
+    return [
+        f"what roved in setup '{setup.name}' weighs {100.0 * share:.1f} % of the board: the mean over its places is "
+        f"right to first order in the mass only and may err by some cents; a setup for each place is exact"
+        for setup in board.setups
+        if (share := heaviest_roving(board, setup)) > ROUGH_ROVING
     ]
 
 

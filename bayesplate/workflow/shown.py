@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from bayesplate.diagnosis.told import candidates_table, errors_table, shift_table, verdict_sentence
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.comparison_tables import METHODS_REMARK, forward_table, methods_table, sheet_table
 from bayesplate.results.folder import json_text
@@ -19,6 +20,7 @@ __all__ = [
     "progress_text",
     "show_check",
     "show_compare",
+    "show_diagnosis",
     "show_fit",
     "show_modes",
 ]
@@ -68,6 +70,16 @@ def show_compare(comparison: Mapping[str, Any]) -> Shown:
             told.setdefault(origin["sentence"], []).append(one["theory"] + setup)
     remarks = [f"coefficients of paper and percentile ({', '.join(where)}): {text}" for text, where in told.items()]
     return Shown(tuple(tables), (*remarks, METHODS_REMARK), (), comparison["verdict"]["sentence"])
+
+
+def show_diagnosis(diagnosis: Mapping[str, Any]) -> Shown:
+    """The result of `bayesplate.workflow.diagnose.diagnose` for a person."""
+    return Shown(
+        (errors_table(diagnosis), shift_table(diagnosis), candidates_table(diagnosis)),
+        (*diagnosis["sentences"], diagnosis["recommendation"]),
+        tuple(diagnosis["notes"]),
+        verdict_sentence(diagnosis),
+    )
 
 
 def show_modes(report: Mapping[str, Any]) -> Shown:

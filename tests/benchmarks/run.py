@@ -57,6 +57,8 @@ def measure(repeats: int) -> Iterator[Row]:
         for batch in BATCHES:
             rate = batch / timing.likelihood(problems[name], batch)
             yield Row(f"likelihood, {name} law, {batch} draws at once", rate, "1/s", aim, larger_is_better=True)
+    for board in (LINEAR_BOARD, EXACT_BOARD):
+        yield Row(f"{board}: sampling's end to report", timing.after_sampling(board, repeats), "s", 2.0)
     yield Row(f"fit {LINEAR_BOARD} (linear law)", timing.whole_fit(LINEAR_BOARD, repeats), "s", 6.0)
     yield Row(f"fit {EXACT_BOARD} (exact law)", timing.whole_fit(EXACT_BOARD, repeats), "s", 10.0)
 

@@ -111,6 +111,37 @@ def command(*arguments: str, repeats: int = 1) -> float:
     return best(lambda: subprocess.run(program, check=True, capture_output=True, env=environment), repeats)
 
 
+_AFTER_SAMPLING = """
+import sys, time
+from bayesplate.workflow import fitting
+from bayesplate.workflow.fit import fit
+
+infer = fitting.infer
+
+def timed(*arguments, **options):
+    global ended
+    inference = infer(*arguments, **options)
+    ended = time.perf_counter()
+    return inference
+
+fitting.infer = timed
+fit(sys.argv[1], out=sys.argv[2])
+print(time.perf_counter() - ended)
+"""
+
+
+def after_sampling(board: str, repeats: int = 1) -> float:
+    """From the sampler's last step to the last file of `fit`: summary, archive, report with its figures, tables."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    times = []
+    for _ in range(repeats):
+        with tempfile.TemporaryDirectory() as folder:
+            program = [sys.executable, "-c", _AFTER_SAMPLING, board, str(Path(folder) / "out")]
+            done = subprocess.run(program, check=True, capture_output=True, text=True, env=environment)
+        times.append(float(done.stdout))
+    return min(times)
+
+
 def whole_fit(board: str, repeats: int = 1) -> float:
     """`bayesplate fit` of a shipped board, cold."""
     with tempfile.TemporaryDirectory() as folder:

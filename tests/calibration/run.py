@@ -7,11 +7,9 @@ that was interrupted goes on where it stopped if it is given the same file.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -19,48 +17,26 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from calibration.records import add_to, read_done
 from calibration.sbc import Design, identity, simulate_one
 from calibration.table import family_p_value, is_calibrated, is_caught, rows, text
 
 FEWEST_FOR_MUTANTS = 40
 
 
-def read_done(path: Path, design: Design) -> list[dict[str, Any]]:
-    """Records of a file of the same design; a last line that was cut off is forgotten."""
-    if not path.exists() or not path.read_text().strip():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(identity(design)) + "\n")
-        return []
-    lines = path.read_text().splitlines(keepends=True)
-    if json.loads(lines[0]) != identity(design):
-        raise SystemExit(f"{path}: made with another design, wanted {json.dumps(identity(design))}")
-    whole = [line for line in lines if line.endswith("\n")]
-    if len(whole) < len(lines):
-        path.write_text("".join(whole))
-    return [json.loads(line) for line in whole[1:]]
-
-
 def run(
     design: Design, n_simulations: int, n_mutants: int, workers: int, out: Path, *, quiet: bool = False
 ) -> list[dict[str, Any]]:
     """Do what is not done yet, and return the records of all simulations asked for, in their order."""
-    records = read_done(out, design)
+    records = read_done(out, identity(design))
     done = {(r["simulation"], "noise fixed at half" in r.get("ranks", {})) for r in records}
     open_ones = [
         (i, i < n_mutants)
         for i in range(n_simulations)
         if (i, True) not in done and ((i, False) not in done or i < n_mutants)
     ]
-    started = time.perf_counter()
-    with ProcessPoolExecutor(workers) as pool, out.open("a") as file:
-        futures = [pool.submit(simulate_one, design, i, mutant) for i, mutant in open_ones]
-        for count, future in enumerate(as_completed(futures), start=1):
-            records.append(future.result())
-            file.write(json.dumps(records[-1]) + "\n")
-            file.flush()
-            if not quiet and (count % 10 == 0 or count == len(futures)):
-                left = (time.perf_counter() - started) / count * (len(futures) - count)
-                print(f"{count} of {len(futures)} done, {left / 60:.1f} minutes left", file=sys.stderr, flush=True)
+    jobs = [(design, i, mutant) for i, mutant in open_ones]
+    records += add_to(out, simulate_one, jobs, workers, quiet=quiet)
     latest = {record["simulation"]: record for record in records if record["simulation"] < n_simulations}
     return [latest[i] for i in sorted(latest)]
 

@@ -6,7 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from calibration.run import judge, read_done, run
+from calibration.records import read_done
+from calibration.run import judge, run
 from calibration.sbc import N_DRAWS, Design, identity, simulate_one
 from calibration.table import family_p_value, is_calibrated, is_caught, rows
 
@@ -65,9 +66,9 @@ def test_an_interrupted_run_goes_on(small, tmp_path):
 
 def test_a_file_of_another_design_is_refused(tmp_path):
     out = tmp_path / "ranks.jsonl"
-    read_done(out, SMALL)
+    read_done(out, identity(SMALL))
     with pytest.raises(SystemExit, match="made with another design"):
-        read_done(out, Design())
+        read_done(out, identity(Design()))
 
 
 def test_simulations_without_draws_are_not_passed_over():

@@ -11,8 +11,6 @@ from bayesplate.cards import load_board, physical_faults, read_board_text
 from bayesplate.errors import Fault
 
 Spoil = Callable[..., str]
-FREE_EDGES = 'edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }\n'
-HELD_EDGES = 'edges = { x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }\nclamped_mm = { x0 = 30 }\n'
 ON_BOARD = "a place on the free part of the board, x 30 to 253 mm, y 0 to 114 mm"
 CORNER = "from the corner of x0 and y0 of the whole board"
 
@@ -59,18 +57,6 @@ def test_one_fault(spoiled: Spoil, old: str, new: str, place: str, wanted: str, 
     expected = Fault(f"my-board.toml {place}", wanted, got, remedy)
 
     assert expected in faults_of(spoiled(old, new))
-
-
-@pytest.mark.parametrize("effect", ["clamp_rotation", "clamp_translation", "support_mass"])
-def test_springs_need_an_edge_to_stand_at(spoiled: Spoil, effect: str) -> None:
-    declared = spoiled("transverse_shear", effect)
-
-    assert faults_of(declared) == []
-    (fault,) = faults_of(spoiled(HELD_EDGES, FREE_EDGES, declared))
-    assert fault.place == "my-board.toml effects"
-    assert fault.wanted.startswith("a setup with a clamped")
-    assert fault.wanted.endswith(f"edge for {effect}")
-    assert fault.got == "edges that are all free"
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import generator.effects
-import numpy as np
 import pytest
 from effect_plates import SETUP, hertz_apart, modes_of
 from generator.known_boards import FIEMME, FINNISH, FREE
 
 from bayesplate.effects.support_stiffness import SupportStiffness
+from bayesplate.plate.setup import DEFAULT_NOISE, Setup
 
 STIFFNESS = "support_stiffness.stiffness"
 EFFECT = SupportStiffness(SETUP)
@@ -32,6 +32,7 @@ def test_against_the_generator(plate, stiffness, is_sheared):
     assert apart == pytest.approx(0.0, abs=0.5)
 
 
-def test_acts_on_any_edges():
-    assert np.isfinite(EFFECT.parameters()[0].prior.median)
-    assert SupportStiffness.refusal(None, None) == ""
+def test_a_board_that_is_held_lies_on_nothing():
+    free, held = ("free", "free"), ("clamped", "free")
+    assert SupportStiffness.refusal(None, Setup(SETUP, free, free, (), DEFAULT_NOISE)) == ""
+    assert "an edge is held" in SupportStiffness.refusal(None, Setup(SETUP, held, free, (), DEFAULT_NOISE))

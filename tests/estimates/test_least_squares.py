@@ -10,7 +10,7 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
 from scipy.optimize import least_squares
 
-from bayesplate.estimates.least_squares import log_measured, reading_scales, weighted_least_squares
+from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
 from bayesplate.plate.material import moduli
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -68,3 +68,31 @@ def test_a_reading_s_own_uncertainty_weighs_it():
     assert errors[1] < 0.005 < errors[0]
     # a weight of (0.003 / 0.05)^2 leaves that share of the bias
     assert errors[1] < 0.05 * errors[0] + 1e-3
+
+
+@pytest.mark.parametrize(
+    ("step", "previous", "settled"),
+    [
+        (1e-10, 1e-4, True),
+        (1e-6, 4e-7, True),
+        (1e-6, 1.5e-6, False),  # shrinking slowly
+        (1e-6, 1e-5, False),
+        (1e-3, 1e-3, False),  # two solutions that swap
+        (1e-6, np.inf, False),
+    ],
+)
+def test_steps_end_where_they_do_not_count_or_are_rounding(step, previous, settled):
+    assert has_settled(step, previous) is settled
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["spruce-free-1R", "spruce-free-3L"])
+def test_boards_with_profiles_and_shear_settle_where_no_direction_lowers_the_misfit(name):
+    """Their eigen-solves carry half the digits; a step of 1e-5 is a hundredth of a cent."""
+    board = prepare(name, ["transverse_shear", "thickness_profile", "outline_profile"]).board
+    estimate = weighted_least_squares(board)
+    assert estimate.converged
+    weighted, misfit = estimate.sensitivities / estimate.scales[:, None], estimate.residuals / estimate.scales
+    assert np.abs(np.linalg.lstsq(weighted, misfit, rcond=1e-8)[0]).max() < 1e-4
+    moved = misfit + weighted @ [1e-3, 0.0, 0.0]  # control: a thousandth of D_x would be seen
+    assert np.abs(np.linalg.lstsq(weighted, moved, rcond=1e-8)[0]).max() > 5e-4

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Counts = tuple[int, int]
+Term = tuple[float, int, int, int]
+"""A factor, a field, and the orders of its derivative along x and along y."""
 
 _POWER = {0: "free", 1: "supported", 2: "clamped"}
 """Names of `ritz.Side` for the powers of its boundary factors."""
@@ -146,15 +148,39 @@ class Basis:
     @cached_property
     def unit_matrices(self) -> tuple[dict[tuple[int, int], Floats], dict[tuple[int, int], Floats], list[Floats]]:
         """Matrices of uniform unit stiffnesses, bending and shear, and of the motions' unit masses."""
-        weights = self.points[2]
-        bent, sheared, motions = self.rows
-        return (
-            {(a, b): symmetric(bent[a], bent[b], weights) for a in range(3) for b in range(a, 3)},
-            {(a, b): symmetric(sheared[a], sheared[b], weights) for a in range(2) for b in range(a, 2)}
-            if self.shear
-            else {},
-            [symmetric(motion, motion, weights) for motion in motions],
-        )
+        w: list[Term] = [(1.0, 0, 0, 0)]
+        bent = [self._turned(0, 1, 0), self._turned(1, 0, 1), [*self._turned(0, 0, 1), *self._turned(1, 1, 0)]]
+        sheared, motions = [], [w]
+        if self.shear:
+            motions += [self._turned(0), self._turned(1)]
+            sheared = [[(1.0, 0, 1, 0), (-1.0, 1, 0, 0)], [(1.0, 0, 0, 1), (-1.0, 2, 0, 0)]]
+        pairs = [
+            {(a, b): self._integral(rows[a], rows[b]) for a in range(len(rows)) for b in range(a, len(rows))}
+            for rows in (bent, sheared)
+        ]
+        return pairs[0], pairs[1], [self._integral(motion, motion) for motion in motions]
+
+    def _turned(self, axis: int, i: int = 0, j: int = 0) -> list[Term]:
+        """A derivative of the rotation of the normal: its own field, or that of grad w if thin."""
+        return [(1.0, 1 + axis, i, j)] if self.shear else [(1.0, 0, i + (axis == 0), j + (axis == 1))]
+
+    def _integral(self, first: Sequence[Term], second: Sequence[Term]) -> Floats:
+        """The integral of a product over the rectangle, which separates into x and y; symmetric."""
+        matrix = np.zeros((self.size, self.size))
+        for factor, p, *orders in first:
+            for other, q, *others in second:
+                along_x, along_y = (self._gram(axis, p, orders[axis], q, others[axis]) for axis in (0, 1))
+                rows, columns = (slice(f * self.n_products, (f + 1) * self.n_products) for f in (p, q))
+                matrix[rows, columns] += factor * other * np.kron(along_x, along_y)
+        return 0.5 * (matrix + matrix.T)
+
+    def _gram(self, axis: int, p: int, order: int, q: int, other: int) -> Floats:
+        """Integrals along a side of products of derivatives of the functions of two fields."""
+        points, weights = gauss(self.n[axis])
+        length = (self.L_x, self.L_y)[axis]
+        at = 0.5 * length * (1.0 + points)
+        left, right = self._fields[p][axis].values(at, order), self._fields[q][axis].values(at, other)
+        return 0.5 * length * left.T @ (weights[:, None] * right)
 
 
 def gauss(n: int) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from generator.card import card_text
+from generator.card import NOISE_FACTOR, NOTHING, card_text
 from generator.designs import DESIGNS, MEDIANS, POISSON, Design
 from generator.naming import LEAST_CORRELATION, Label, frequencies
 from generator.recipes import KNOWN_SIZE, LIBRARY, RECIPES
@@ -62,6 +62,12 @@ class PlantedBoard:
         How many boards were drawn until every label was beyond doubt.
     places_known : bool
         Whether the card says where the attached mass sits.
+    prior : str
+        Prior card named in the card.
+    sensor : (float, float) or None, m
+        Place of a sensor that the card mentions, without its mass, whether or not it weighs anything.
+    noise_factor : float
+        Of the noise prior that the card states around the true noise.
     """
 
     name: str
@@ -72,18 +78,26 @@ class PlantedBoard:
     n_draws: int
     places_known: bool = True
     prior: str = ""
+    sensor: tuple[float, float] | None = None
+    noise_factor: float = NOISE_FACTOR
 
-    def card_text(self) -> str:
-        """The board card, which tells nothing of the truth but the noise and the place of an attached mass."""
+    def card_text(self, stated: Mapping[str, str] = NOTHING) -> str:
+        """The board card, which tells nothing of the truth but the noise and the place of an attached mass.
+
+        Unless it is told more: see `generator.card.card_text`.
+        """
         places = self.truth.effects.get("attached_mass", {}).get("places", ()) if self.places_known else ()
+        places = places if self.sensor is None else (self.sensor,)
         return card_text(
             self.name,
             self.design,
             self.readings,
             noise_cents=self.truth.noise_cents,
+            noise_factor=self.noise_factor,
             places=places,
             outline=self.truth.effects.get("outline_profile"),
             prior=self.prior,
+            stated=stated,
         )
 
     def shifts(self) -> dict[str, dict[Label, float]]:
@@ -107,6 +121,10 @@ def plant(
     n_places: int = 1,
     places_known: bool = True,
     prior: str = "",
+    fixed: Mapping[str, Mapping[str, Any]] | None = None,
+    sensor: tuple[float, float] | None = None,
+    noise_factor: float = NOISE_FACTOR,
+    constants: Mapping[str, float] | None = None,
 ) -> PlantedBoard:
     """Simulate a board.
 
@@ -132,6 +150,14 @@ def plant(
         Whether the card states the place of a planted mass.
     prior : str
         Prior card named in the card; empty: the package's default.
+    fixed : mapping, optional
+        Effect -> parameters that are not drawn, SI units.
+    sensor : (float, float), optional, m
+        Place on the whole board of a sensor that the card mentions in any case; a planted mass sits there.
+    noise_factor : float
+        Of the noise prior on the card, whose median is the true noise.
+    constants : mapping, optional
+        E_x, E_y, G_xy, Pa, if they are not to be drawn.
 
     Returns
     -------
@@ -148,18 +174,24 @@ def plant(
     planted = _choose(rng, design) if effects is None else tuple(effects)
     _refuse_wrong(planted, design)
     noise = _log_uniform(rng, 2.0, 17.0) if noise_cents is None else noise_cents
+    settled = {effect: dict(values) for effect, values in (fixed or {}).items()}
+    if sensor is not None:
+        settled.setdefault("attached_mass", {})["places"] = (sensor,)
     for n_draws in range(1, MOST_DRAWS + 1):
-        constants = _draw_constants(rng)
+        true = _draw_constants(rng) if constants is None else {**constants, "nu_xy": POISSON}
         sizes = {effect: _size(rng, effect, size, scale_known) for effect in planted}
         drawn = {effect: RECIPES[effect].draw(rng, design, sizes[effect]) for effect in planted}
         if n_places > 1 and "attached_mass" in drawn:
             more = [RECIPES["attached_mass"].draw(rng, design, 1.0)["places"][0] for _ in range(n_places - 1)]
             drawn["attached_mass"]["places"] += tuple(more)
-        exact, correlation = _frequencies(design, constants, drawn)
+        drawn = {effect: values | settled.get(effect, {}) for effect, values in drawn.items()}
+        exact, correlation = _frequencies(design, true, drawn)
         if correlation >= LEAST_CORRELATION:
-            truth = Truth(constants, drawn, sizes, noise)
+            truth = Truth(true, drawn, sizes, noise)
             readings = {setup: _read(rng, hertz, noise) for setup, hertz in exact.items()}
-            return PlantedBoard(name, design, truth, readings, exact, n_draws, places_known, prior)
+            return PlantedBoard(
+                name, design, truth, readings, exact, n_draws, places_known, prior, sensor, noise_factor
+            )
     raise RuntimeError(f"{design.name} with {', '.join(planted)}: wanted a board with clear labels, got none")
 
 

@@ -12,6 +12,10 @@ NOISE_FACTOR = 1.65
 LEAST_NOISE_CENTS = 0.1
 """A card must state some noise; less than this is stated as this."""
 
+NOTHING: Mapping[str, str] = {}
+ACCELEROMETER = '"accelerometer"'
+_OF_SETUPS = ("noise_percent", "air", "kind", "mass_g")
+
 
 def card_text(
     name: str,
@@ -19,9 +23,11 @@ def card_text(
     readings: Mapping[str, Mapping[Label, float]],
     *,
     noise_cents: float,
+    noise_factor: float = NOISE_FACTOR,
     places: Sequence[tuple[float, float]] = (),
     outline: Mapping[str, Any] | None = None,
     prior: str = "",
+    stated: Mapping[str, str] = NOTHING,
 ) -> str:
     """The card of a simulated board.
 
@@ -32,13 +38,19 @@ def card_text(
     readings : mapping
         Setup name -> laboratory's label -> Hz.
     noise_cents : float
-        Stated as the median of the noise prior, with the factor 1.65.
+        Stated as the median of the noise prior.
+    noise_factor : float
+        Of the noise prior: 1.65 says little about the noise.
     places : sequence of (float, float), m
         Of an accelerometer whose mass is not stated; several if it roved.
     outline : mapping, optional
         Stations and widths, m, of a board that is not a rectangle: they are measured, so the card has them.
     prior : str
         A prior card; empty: the package's default.
+    stated : mapping
+        Key of the card -> its value as TOML, in place of what stands there otherwise, or besides: length_y_mm,
+        thickness_mm, poisson_xy, shear_xz_gpa, shear_yz_gpa, effects; of every setup noise_percent, air, and the kind
+        and mass_g of what is attached.
 
     Returns
     -------
@@ -48,26 +60,29 @@ def card_text(
     if outline:
         width = f"{{ readings = {_list(outline['widths'])}, at_x_mm = {_list(outline['stations'])} }}"
     shear = {key: f"{{ mean = {mean / 1e9:.6g}, sd = {sd / 1e9:.6g} }}" for key, (mean, sd) in SHEAR_MEANS.items()}
+    noise = f"{{ median = {noise_percent(noise_cents):.6g}, factor = {noise_factor:g} }}"
+    of_setups = {"noise_percent": noise} | {key: stated[key] for key in _OF_SETUPS if key in stated}
     lines = [
         "format = 1",
         f'name = "{name}"',
         f'title = "A simulated board, {design.name}"',
         'source = "computed by tests/generator, an independent discretisation; noise added"',
+        *([f"effects = {stated['effects']}"] if "effects" in stated else []),
         "",
         "[plate]",
         f"length_x_mm = {_mm(design.L_x)}",
-        f"length_y_mm = {width}",
-        f"thickness_mm = {_mm(design.h)}",
+        f"length_y_mm = {stated.get('length_y_mm', width)}",
+        f"thickness_mm = {stated.get('thickness_mm', _mm(design.h))}",
         f"density_kg_m3 = {design.rho:.6g}",
         "",
         "[material]",
-        f"poisson_xy = {POISSON}",
-        f"shear_xz_gpa = {shear['G_xz']}",
-        f"shear_yz_gpa = {shear['G_yz']}",
+        f"poisson_xy = {stated.get('poisson_xy', POISSON)}",
+        f"shear_xz_gpa = {stated.get('shear_xz_gpa', shear['G_xz'])}",
+        f"shear_yz_gpa = {stated.get('shear_yz_gpa', shear['G_yz'])}",
         *([f'prior = "{prior}"'] if prior else []),
     ]
     for setup in design.setups:
-        lines += ["", *_setup_lines(setup, readings[setup.name], noise_cents, places)]
+        lines += ["", *_setup_lines(setup, readings[setup.name], places, of_setups)]
     return "\n".join(lines) + "\n"
 
 
@@ -77,7 +92,7 @@ def noise_percent(cents: float) -> float:
 
 
 def _setup_lines(
-    setup: Setup, hertz: Mapping[Label, float], noise_cents: float, places: Sequence[tuple[float, float]]
+    setup: Setup, hertz: Mapping[Label, float], places: Sequence[tuple[float, float]], stated: Mapping[str, str]
 ) -> list[str]:
     edges = ", ".join(f'{edge} = "{word}"' for edge, word in setup.edges.items())
     at = [f"[{_mm(x)}, {_mm(y)}]" for x, y in places]
@@ -87,11 +102,13 @@ def _setup_lines(
         f"edges = {{ {edges} }}",
         *([f"clamped_mm = {{ x0 = {_mm(setup.covered)} }}"] if setup.covered else []),
         f"first_label = [{setup.first_label[0]}, {setup.first_label[1]}]",
-        f"noise_percent = {{ median = {noise_percent(noise_cents):.6g}, factor = {NOISE_FACTOR} }}",
+        f"noise_percent = {stated['noise_percent']}",
+        *([f"air = {stated['air']}"] if "air" in stated else []),
         "",
         "[setup.frequencies_hz]",
         *(f'"({m},{n})" = {value:.9g}' for (m, n), value in sorted(hertz.items(), key=lambda item: item[1])),
-        *(["", "[[setup.attached]]", 'kind = "accelerometer"'] if at else []),
+        *(["", "[[setup.attached]]", f"kind = {stated.get('kind', ACCELEROMETER)}"] if at else []),
+        *([f"mass_g = {stated['mass_g']}"] if at and "mass_g" in stated else []),
         *([f"at_mm = {at[0] if len(at) == 1 else '[' + ', '.join(at) + ']'}"] if at else []),
     ]
 

@@ -23,7 +23,9 @@ EDGES = ("x0", "x1", "y0", "y1")
 SHEAR_FACTOR = 5.0 / 6.0
 N_POLYNOMIALS: Counts = (16, 14)
 N_POLYNOMIALS_SHEAR: Counts = (14, 20)
-"""Polynomials along x and along y."""
+FINE_SHEAR: Counts = (20, 22)
+"""Polynomials along x and along y. With shear, twist ends in a thin layer at free edges: there the first leave up to
+1.3 cents in modes that twist, the fine ones a tenth."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ def _varying(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
     local = rigidity[:, :, None] * thick**3  # (3, 3, n_points)
     if plate.stiffness_x:  # E_x alone varies; E_y, G_xy and nu_xy stay
         local = np.stack([_rigidities(replace(plate, E_x=plate.E_x * f))[0] for f in stiff], axis=-1) * thick**3
-    stiffness = sum(bent[a].T @ ((weights * local[a, b])[:, None] * bent[b]) for a in range(3) for b in range(3))
+    stiffness = sum(bent[a].T @ sum((weights * local[a, b])[:, None] * bent[b] for b in range(3)) for a in range(3))
     if basis.shear:
         weighted = weights * thick
         stiffness = stiffness + sum(
@@ -259,7 +261,7 @@ class Modes:
     @cached_property
     def deflections(self) -> Floats:
         """Deflection at the basis's Gauss points: (n_points, n_modes) array."""
-        return self.basis.rows[2][0] @ self.vectors
+        return self.basis.deflection(*self.basis.points[:2]) @ self.vectors
 
 
 def solve(plate: Plate, effects: Sequence[Effect] = (), n_modes: int = 24, n: Counts | None = None) -> Modes:

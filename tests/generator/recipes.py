@@ -12,6 +12,7 @@ from generator import effects, outside
 from generator.designs import POISSON, SHEAR_MEANS, Design, Setup
 from generator.effects import NoEffect
 
+STEEPEST_GRAIN = 5.0  # degrees
 Parameters = dict[str, Any]
 Draw = Callable[[np.random.Generator, Design, float], Parameters]
 
@@ -87,7 +88,9 @@ def _outline(rng: np.random.Generator, design: Design, size: float) -> Parameter
 
 
 def _grain(rng: np.random.Generator, design: Design, size: float) -> Parameters:
-    return {"angle": float(np.radians(size * design.nominal["grain_angle"] * _sign(rng)))}
+    """At most five degrees: nobody saws a board six degrees off the grain, and no range should end at the truth."""
+    degrees = min(size * design.nominal["grain_angle"], STEEPEST_GRAIN)
+    return {"angle": float(np.radians(degrees * _sign(rng)))}
 
 
 def _poisson(rng: np.random.Generator, design: Design, size: float) -> Parameters:

@@ -20,13 +20,13 @@ QUADRATURE = 1e-5
 @pytest.fixture
 def coordinates():
     """Two of three columns changed."""
-    return TailCoordinates.around(CENTRE, COVARIANCE, 2)
+    return TailCoordinates.around(CENTRE, COVARIANCE, [0, 1])
 
 
 @pytest.fixture
 def line():
     """One parameter, changed."""
-    return TailCoordinates.around(CENTRE[:1], COVARIANCE[:1, :1], 1)
+    return TailCoordinates.around(CENTRE[:1], COVARIANCE[:1, :1], [0])
 
 
 def heavy(theta):
@@ -60,7 +60,7 @@ def test_the_density_in_y_is_normalised_and_without_the_jacobian_it_would_not_be
     assert abs(share - 0.95) > 1e3 * QUADRATURE
 
 
-def test_only_the_first_columns_change(coordinates):
+def test_only_the_given_columns_change(coordinates):
     y = np.random.default_rng(0).normal(size=(4, 3, 3))
     theta = coordinates.theta(y)
     assert theta.shape == y.shape
@@ -80,6 +80,15 @@ def test_the_jacobian_is_the_determinant_of_the_map(coordinates):
 def test_the_starts_have_the_covariance_of_the_estimate(coordinates):
     inverse = np.diag([*(1.0 / coordinates.scale), 1.0])
     assert coordinates.start_covariance(COVARIANCE) == pytest.approx(inverse @ COVARIANCE @ inverse, rel=1e-14)
+
+
+def test_a_parameter_of_an_effect_starts_three_standard_deviations_wide():
+    """Three standard deviations of the starts in y are three of the estimate in theta, whatever the scale."""
+    coordinates = TailCoordinates.around(CENTRE, COVARIANCE, [0], [2])
+    y = coordinates.start
+    y[2] = 3.0 * np.sqrt(coordinates.start_covariance(COVARIANCE)[2, 2])
+    wanted = CENTRE[2] + 3.0 * np.sqrt(COVARIANCE[2, 2])
+    assert coordinates.theta(y) == pytest.approx([*CENTRE[:2], wanted], rel=1e-12)
 
 
 def test_beyond_every_prior_there_is_nothing_and_no_overflow(coordinates):

@@ -23,7 +23,7 @@ CLOSED_GATE = Gate(tau_count_min=1e9)
 STOPPED_AFTER = 200
 """Two chunks, no more than the shortest run that the real gate lets through."""
 
-SETTINGS = "bayesplate.workflow.fit.SamplerSettings"
+SETTINGS = "bayesplate.workflow.fitting.SamplerSettings"
 
 
 @pytest.fixture(scope="session")
@@ -48,14 +48,18 @@ def finnish(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
 @pytest.fixture(scope="session")
 def free(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
     """A free board with nine labelled and seven unlabelled peaks and uncertain sizes, printed as JSON."""
-    return runs.fit(tmp_path_factory.mktemp("free") / "out", "spruce-free-2R", "--json")
+    return runs.fit(tmp_path_factory.mktemp("free") / "out", "spruce-free-2R", "--json", "--no-report")
 
 
 @pytest.fixture
 def quick_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., runs.Run]:
-    """`bayesplate fit` with a gate that passes at once."""
+    """`bayesplate fit` with a gate that passes at once, and without a report."""
     monkeypatch.setattr(SETTINGS, partial(SamplerSettings, gate=LOOSE_GATE))
-    return partial(runs.fit, tmp_path / "out")
+
+    def run(*arguments: str) -> runs.Run:
+        return runs.fit(tmp_path / "out", *arguments, "--no-report")
+
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -264,9 +264,15 @@ def test_json_prints_the_summary_and_nothing_else(free):
     assert free.stderr == ""
 
 
-def test_only_the_two_files_are_left(fiemme_files, finnish, free):
-    for files in (fiemme_files, finnish.files, free.files):
-        assert set(files) == {"summary.json", "posterior.nc"}
+def test_only_the_results_are_left(fiemme_files, finnish, free):
+    """The numbers, the report with its figures and tables, and nothing of the checkpoint."""
+    numbers = {"summary.json", "posterior.nc"}
+    tables = {"constants.csv", "constants.tex"}
+    for files in (fiemme_files, finnish.files):
+        figures = {name for name in files if name.startswith("figures/")}
+        assert set(files) == {*numbers, "report.html", *tables, *figures}
+        assert len(figures) == 20
+    assert set(free.files) == numbers
 
 
 TRUTH = {"E_x": 11e9, "E_y": 0.9e9, "G_xy": 0.7e9}

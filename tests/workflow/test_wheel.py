@@ -62,7 +62,8 @@ def test_the_wheel_holds_the_package_its_cards_and_its_licence(wheel):
     modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / "bayesplate").rglob("*.py")}
 
     assert len(cards) >= 12
-    assert {f"bayesplate/{card}" for card in cards} | modules | {"bayesplate/py.typed"} <= names
+    templates = {f"bayesplate/report/templates/report.{ending}" for ending in ("html", "css")}
+    assert {f"bayesplate/{card}" for card in cards} | modules | templates | {"bayesplate/py.typed"} <= names
     assert any(name.endswith("dist-info/licenses/LICENSE") for name in names)
 
 

@@ -1,0 +1,164 @@
+"""The fit that is questioned: its residual, what its constants and inputs can absorb, and what counts as noise.
+
+Around the estimate the logarithms of the readings are
+
+    y = g + X (x - x_hat) + Z z + noise,
+
+with g the frequencies at the estimate, x the logarithms of D_x, D_y, D_s, and z the standard coordinates of the
+uncertain inputs. The constants are projected out, so that only n - 3 directions of a residual are left to be judged;
+the inputs have their priors and count as one more covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.least_squares import Estimate, log_measured
+from bayesplate.estimates.refit import design
+from bayesplate.frequencies.model import SetupModel
+from bayesplate.modes.naming import Place
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import RIGIDITIES
+from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.region import predictor
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A fit without the effect that is looked for, linear in constants and inputs.
+
+    Attributes
+    ----------
+    board : Board
+    values : dict of float
+        Rigidities and inputs at the estimate, SI.
+    log_rigidities : (3,) array
+        x_hat.
+    log_frequency : (n_modes,) array
+        g, ln f (Hz) at the estimate.
+    residual : (n_modes,) array
+        ln measured less g, corrected to inputs at the middle of their priors.
+    slopes : (n_modes, 3) array
+        X, d ln f / d ln D.
+    input_slopes : (n_modes, n_inputs) array
+        Z, d ln f / d z.
+    places : tuple of Place
+        Of the labelled modes, setup after setup.
+    symmetry : tuple of (bool, bool)
+        Whether each setup's two halves are alike along x and along y.
+    """
+
+    board: Board
+    values: Mapping[str, Floats]
+    log_rigidities: Floats
+    log_frequency: Floats
+    residual: Floats
+    slopes: Floats
+    input_slopes: Floats
+    places: tuple[Place, ...]
+    symmetry: tuple[tuple[bool, bool], ...]
+
+    @property
+    def n_modes(self) -> int:
+        """Number of readings."""
+        return int(self.residual.size)
+
+    @cached_property
+    def setup_index(self) -> NDArray[np.intp]:
+        """Which setup each reading belongs to: (n_modes,) array."""
+        return np.repeat(np.arange(len(self.board.setups)), [len(s.readings) for s in self.board.setups])
+
+    @cached_property
+    def own_variance(self) -> Floats:
+        """Variance of each reading apart from the noise: its own and that of its rounding, (n_modes,) array."""
+        return own_variance(self.board)
+
+    @cached_property
+    def scales(self) -> Floats:
+        """Relative uncertainty of each reading at the median noise: (n_modes,) array."""
+        noise = np.array([setup.noise.median for setup in self.board.setups])
+        return np.sqrt(noise[self.setup_index] ** 2 + self.own_variance)
+
+    @cached_property
+    def absorbing(self) -> Floats:
+        """The matrix that takes a shift of the frequencies to the constants that absorb it best: (3, n_modes) array."""
+        return np.asarray(np.linalg.pinv(self.slopes / self.scales[:, None]) / self.scales)
+
+    @cached_property
+    def evenly_absorbing(self) -> Floats:
+        """The same if all readings of a setup count alike, rounded or not: (3, n_modes) array."""
+        noise = np.array([setup.noise.median for setup in self.board.setups])[self.setup_index]
+        return np.asarray(np.linalg.pinv(self.slopes / noise[:, None]) / noise)
+
+    def whitened(self, shift: Floats) -> Floats:
+        """What constants leave of a shift, in units of each reading's uncertainty: (n_modes,) arrays."""
+        return np.asarray((shift - self.slopes @ (self.absorbing @ shift)) / self.scales)
+
+
+def baseline_of(problem: Problem) -> Baseline:
+    """The baseline of a problem that is ready to be sampled, at the centre of its posterior under the exact law."""
+    board, parameters = problem.board, problem.parameters
+    columns = parameters.fitted_columns
+    predict = predictor(board, problem.posterior.models, "exact", problem.centre)
+    at = problem.centre[columns]
+    slopes = design(predict, np.ones(_n_modes(board)), at)[: _n_modes(board)]
+    inputs = slopes[:, N_RIGIDITIES:]
+    predicted = predict(at[None, :])[0]
+    there = parameters.values(problem.centre[None, :])
+    return Baseline(
+        board=board,
+        values={name: np.asarray(np.ravel(value)[0]) for name, value in there.items()},
+        log_rigidities=at[:N_RIGIDITIES],
+        log_frequency=predicted,
+        residual=log_measured(board) - predicted + inputs @ at[N_RIGIDITIES:],
+        slopes=slopes[:, :N_RIGIDITIES],
+        input_slopes=inputs,
+        places=places_of(problem.posterior.models),
+        symmetry=symmetry_of(problem.posterior.models),
+    )
+
+
+def baseline_at(board: Board, estimate: Estimate) -> Baseline:
+    """The baseline of a board whose inputs are exact, at its least-squares estimate."""
+    if Parameters(board).inputs:
+        raise ValueError("wanted a board of exact inputs, got uncertain ones: pose the problem instead")
+    return Baseline(
+        board=board,
+        values=estimate.values,
+        log_rigidities=np.log([float(estimate.values[name]) for name in RIGIDITIES]),
+        log_frequency=log_measured(board) - estimate.residuals,
+        residual=estimate.residuals,
+        slopes=estimate.sensitivities,
+        input_slopes=np.zeros((estimate.residuals.size, 0)),
+        places=places_of(estimate.models),
+        symmetry=symmetry_of(estimate.models),
+    )
+
+
+def own_variance(board: Board) -> Floats:
+    """Relative variance of each reading apart from the noise: its own or that of its rounding, (n_modes,) array."""
+    own = np.concatenate([setup.relative_sd**2 for setup in board.setups])
+    rounding = np.concatenate([(s.resolution / s.measured) ** 2 / 12.0 for s in board.setups])
+    return np.where(own > 0, own, rounding)
+
+
+def places_of(models: Sequence[SetupModel]) -> tuple[Place, ...]:
+    """Places of all labelled modes, setup after setup."""
+    return tuple(place for model in models for place in model.places)
+
+
+def symmetry_of(models: Sequence[SetupModel]) -> tuple[tuple[bool, bool], ...]:
+    """Whether the two halves are alike along x and along y, setup after setup."""
+    return tuple((model.plate.line_x.is_symmetric, model.plate.line_y.is_symmetric) for model in models)
+
+
+def _n_modes(board: Board) -> int:
+    return sum(len(setup.readings) for setup in board.setups)

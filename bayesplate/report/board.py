@@ -1,0 +1,165 @@
+"""The figure of the board: its outline to scale, how each edge is held, the grain, hammer and sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bayesplate.plate.board import Board, Values, vibrating_lengths
+from bayesplate.plate.setup import EDGES, Setup
+from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH, WORDS, Picture, short
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_WIDEST, _TALLEST = 3.1, 3.6
+_LEFT, _ABOVE, _BELOW = 0.85, 0.42, 0.62
+_HATCH = 0.10
+_HEADING = 0.14
+_N_GRAIN = 13
+_LINES = {"clamped": ("-", 1.6), "supported": ((0, (4, 3)), 1.6), "free": ("-", 0.9)}
+_MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p"}
+
+
+def board_picture(board: Board) -> Picture:
+    """Draw a board in each of its setups, from above.
+
+    Parameters
+    ----------
+    board : Board
+
+    Returns
+    -------
+    Picture
+    """
+    from matplotlib.figure import Figure
+
+    values = board.nominal()
+    length, width = float(values["length_x"]), float(values["length_y"])
+    scale = min(_WIDEST / length, _TALLEST / width)
+    above = _ABOVE + (_HEADING if len(board.setups) > 1 else 0.0)
+    row = above + width * scale + _BELOW
+    has_legend = any(setup.hammer or setup.attached for setup in board.setups)
+    height = row * len(board.setups) + (0.3 if has_legend else 0.0)
+    figure = Figure(figsize=(WIDTH, height))
+    handles: dict[str, Any] = {}
+    for i, setup in enumerate(board.setups):
+        size = (length * scale, width * scale)
+        left = _LEFT + (WIDTH - _LEFT - 0.55 - size[0]) / 2
+        bottom = height - i * row - above - size[1]
+        panel = figure.add_axes((left / WIDTH, bottom / height, size[0] / WIDTH, size[1] / height))
+        panel.set(xlim=(0, length), ylim=(0, width))
+        panel.set_axis_off()
+        _draw_board(panel, setup, values, scale)
+        if len(board.setups) > 1:
+            heading = (length / 2, width + 0.3 / scale)
+            panel.text(*heading, short(setup.name, 44), ha="center", fontsize=WORDS, weight="bold", parse_math=False)
+        handles |= _draw_items(panel, setup)
+    if handles:
+        figure.legend(
+            handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL,
+            handletextpad=0.4,
+        )  # fmt: skip
+    return Picture("board", "The board, drawn to scale", _alt(board, values), _CAPTION, figure)
+
+
+_CAPTION = (
+    "Seen from above, drawn to scale. The fine lines run along the grain. Hatched: held by a clamp; dashed: resting on "
+    "a support; thin: free."
+)
+
+
+def _draw_board(panel: Axes, setup: Setup, values: Values, scale: float) -> None:
+    """Grain, edges and dimensions."""
+    length, width = float(values["length_x"]), float(values["length_y"])
+    for y in np.linspace(0, width, _N_GRAIN + 2)[1:-1]:
+        panel.plot([0, length], [y, y], color=LIGHT, lw=0.7, zorder=1)
+    covered = {edge: float(values[setup.input_name(edge)]) for edge in setup.clamped}
+    low_x, high_x = covered.get("x0", 0.0), length - covered.get("x1", 0.0)
+    low_y, high_y = covered.get("y0", 0.0), width - covered.get("y1", 0.0)
+    free = (low_x, high_x, low_y, high_y)
+    for edge in EDGES:
+        _draw_edge(panel, edge, setup.edges[edge], covered.get(edge, 0.0), free, values, scale)
+    panel.plot([0, length, length, 0, 0], [0, 0, width, width, 0], color=GREY, lw=0.7, clip_on=False, zorder=2)
+    across = 0.34 / scale
+    _dimension(panel, (0, -across), (length, -across), f"{length * 1e3:.4g} mm, along the grain", below=True)
+    _dimension(panel, (-across, 0), (-across, width), f"{width * 1e3:.4g} mm across", below=False)
+
+
+def _draw_edge(
+    panel: Axes,
+    edge: str,
+    word: str,
+    covered: float,
+    free: tuple[float, float, float, float],
+    values: Values,
+    scale: float,
+) -> None:
+    """The line where the vibrating part ends, hatching where a clamp holds it, and the word."""
+    from matplotlib.patches import Rectangle
+
+    length, width = float(values["length_x"]), float(values["length_y"])
+    low_x, high_x, low_y, high_y = free
+    at = {"x0": low_x, "x1": high_x, "y0": low_y, "y1": high_y}[edge]
+    line: Any = ([at, at], [low_y, high_y]) if edge[0] == "x" else ([low_x, high_x], [at, at])
+    style, thickness = _LINES[word]
+    panel.plot(*line, ls=style, lw=thickness, color="black", clip_on=False, zorder=4, label=f"edge {edge} {word}")
+    band = max(covered, _HATCH / scale)
+    start = at - band if edge[1] == "0" else at
+    if word == "clamped":
+        box: Any = ((start, 0.0), band, width) if edge[0] == "x" else ((0.0, start), length, band)
+        panel.add_patch(
+            Rectangle(*box, hatch="/////", facecolor="none", edgecolor=GREY, lw=0.0, clip_on=False, zorder=3)
+        )
+    beyond = 0.05 / scale + (0.0 if covered or word != "clamped" else band)
+    told = f"{word}, {covered * 1e3:.3g} mm" if covered else word
+    places = {
+        "x0": (-beyond, width / 2, 90, "right", "center"),
+        "x1": (length + beyond, width / 2, 90, "left", "center"),
+        "y0": (length / 2, -beyond, 0, "center", "top"),
+        "y1": (length / 2, width + beyond, 0, "center", "bottom"),
+    }
+    x, y, rotation, ha, va = places[edge]
+    panel.text(x, y, told, rotation=rotation, ha=ha, va=va, fontsize=SMALL, color=DARK, rotation_mode="default")
+
+
+def _dimension(panel: Axes, start: tuple[float, float], end: tuple[float, float], text: str, *, below: bool) -> None:
+    """A double arrow and its length."""
+    arrow: Any = {"arrowstyle": "<|-|>", "lw": 0.7, "color": DARK, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
+    panel.annotate("", start, end, arrowprops=arrow, annotation_clip=False)
+    middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
+    offset, rotation = ((0, -4), 0) if below else ((-4, 0), 90)
+    ha, va = ("center", "top") if below else ("right", "center")
+    panel.annotate(
+        text, middle, offset, textcoords="offset points", ha=ha, va=va, rotation=rotation, fontsize=WORDS,
+        annotation_clip=False,
+    )  # fmt: skip
+
+
+def _draw_items(panel: Axes, setup: Setup) -> dict[str, Any]:
+    """Hammer and attached items at their places; a handle for the legend by name."""
+    style: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
+    handles: dict[str, Any] = {}
+    for kind in dict.fromkeys(item.kind for item in setup.attached):
+        places = [place for item in setup.attached if item.kind == kind for place in item.places]
+        handles[kind] = _points(panel, places, _MARKERS[kind], kind, mfc=VERMILLION, **style)
+    if setup.hammer is not None:
+        handles["hammer"] = _points(panel, [setup.hammer], "X", "hammer", mfc="white", **style)
+    return handles
+
+
+def _points(panel: Axes, places: Sequence[tuple[float, float]], marker: str, label: str, **style: Any) -> Any:
+    x, y = zip(*places, strict=True)
+    return panel.plot(x, y, marker=marker, label=label, **style)[0]
+
+
+def _alt(board: Board, values: Values) -> str:
+    size = f"{float(values['length_x']) * 1e3:.4g} mm along the grain, {float(values['length_y']) * 1e3:.4g} mm across"
+    held = []
+    for setup in board.setups:
+        words = ", ".join(f"{edge} {word}" for edge, word in setup.edges.items())
+        free = " by ".join(f"{float(side) * 1e3:.4g}" for side in vibrating_lengths(values, setup))
+        held.append(f"setup {setup.name}: {words}; the part that vibrates is {free} mm")
+    return f"A rectangular board, {size}. " + ". ".join(held) + "."

@@ -1,0 +1,93 @@
+"""The figure of the fitted modes: where sand gathers at each, with the measured and the predicted frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.setup import Setup
+from bayesplate.report.chladni import draw_edge, draw_sand
+from bayesplate.report.style import DARK, SMALL, WIDTH, WORDS, Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SIDE, _GAP, _BAND = 0.22, 0.26, 0.05
+_CAPTION, _TALLEST = 0.56, 2.4
+_MARGIN = 0.14
+_N_COLUMNS = 3
+
+CAPTION = (
+    "Black lines stay at rest, so sand gathers there; white and grey parts move against each other. The grain runs "
+    "from left to right. The predicted frequency is the posterior mean."
+)
+
+
+def fitted_modes_picture(
+    setup: Setup,
+    modes: Sequence[Mapping[str, Any]],
+    shapes: Mapping[str, NDArray[np.float64]],
+    aspect_ratio: float,
+    name: str = "modes",
+) -> Picture:
+    """Draw the fitted modes of one setup in the order of frequency.
+
+    Parameters
+    ----------
+    setup : Setup
+    modes : sequence of dict
+        Its entries of summary.json's modes.
+    shapes : dict of (n_x, n_y) array
+        By label.
+    aspect_ratio : float
+        L_x / L_y of the part that vibrates.
+    name : str
+        Stem of the picture's files.
+
+    Returns
+    -------
+    Picture
+    """
+    from matplotlib.figure import Figure
+
+    cell = (WIDTH - 2 * _SIDE + _GAP) / _N_COLUMNS
+    side = min(cell - _GAP, _TALLEST * aspect_ratio)
+    size = (side, side / aspect_ratio)
+    n_rows = -(-len(modes) // _N_COLUMNS)
+    row = size[1] + _CAPTION
+    height = n_rows * row + _MARGIN
+    figure = Figure(figsize=(WIDTH, height))
+    ordered = sorted(modes, key=lambda mode: mode["measured_hz"])
+    for i, mode in enumerate(ordered):
+        at_row, column = divmod(i, _N_COLUMNS)
+        left = _SIDE + column * cell + (cell - _GAP - side) / 2
+        bottom = height - _MARGIN - at_row * row - size[1]
+        panel = figure.add_axes((left / WIDTH, bottom / height, size[0] / WIDTH, size[1] / height))
+        panel.set(xlim=(0, 1), ylim=(0, 1))
+        panel.set_axis_off()
+        for edge, word in setup.edges.items():
+            draw_edge(panel, edge, word, _BAND / size[0] if edge[0] == "x" else _BAND / size[1])
+        draw_sand(panel, shapes[mode["label"]])
+        _caption(panel, mode)
+    told = "; ".join(
+        f"{mode['label']} measured {mode['measured_hz']:.5g} Hz, predicted {mode['predicted_hz']['mean']:.5g} Hz"
+        for mode in ordered
+    )
+    title = f"Chladni figures of the fitted modes, setup {setup.name}"
+    return Picture(name, title, f"Nodal lines of {len(ordered)} modes: {told}.", CAPTION, figure)
+
+
+def _caption(panel: Axes, mode: Mapping[str, Any]) -> None:
+    """Name, measured and predicted frequency below a panel."""
+    common: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
+    panel.annotate(mode["label"], (0.5, 0.0), (0, -5), fontsize=WORDS, weight="bold", **common)
+    panel.annotate(f"measured {_hertz(mode['measured_hz'])}", (0.5, 0.0), (0, -16), fontsize=SMALL, **common)
+    predicted = f"predicted {_hertz(mode['predicted_hz']['mean'])}"
+    panel.annotate(predicted, (0.5, 0.0), (0, -26), fontsize=SMALL, color=DARK, **common)
+
+
+def _hertz(value: float) -> str:
+    return f"{value:.4g} Hz"

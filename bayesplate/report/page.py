@@ -1,0 +1,240 @@
+"""report.html: one page that holds everything a fit or a diagnosis found, its figures within, readable on a phone."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesplate.cards import BoardCard
+from bayesplate.estimates.paper import paper_system
+from bayesplate.estimates.percentile import percentile_estimate
+from bayesplate.plate.board import vibrating_lengths
+from bayesplate.posterior.inference import Inference
+from bayesplate.report import content
+from bayesplate.report.board import board_picture
+from bayesplate.report.constants import constants_picture
+from bayesplate.report.fitted_modes import fitted_modes_picture
+from bayesplate.report.health import health_picture
+from bayesplate.report.pairs import pairs_picture
+from bayesplate.report.percentiles import percentiles_picture
+from bayesplate.report.priors import priors_picture
+from bayesplate.report.residuals import predictive_picture, residuals_picture
+from bayesplate.report.saving import save_pictures
+from bayesplate.report.shares import shares_picture
+from bayesplate.report.signatures import before_after_picture, signatures_picture
+from bayesplate.report.style import Picture, visible
+from bayesplate.report.verdict import diagnosis_section
+from bayesplate.results.draws import Draws
+from bayesplate.results.exports import write_exports
+from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
+from bayesplate.results.references import references
+from bayesplate.results.shapes import fitted_shapes
+
+MOST_MODES_OF_PERCENTILES = 12
+"""4017 subsets; with more modes the estimates are too many to be drawn, and take seconds."""
+
+_PIXELS_AN_INCH = 96
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A picture as the page holds it: its words, its size in pixels, and its content as a data address."""
+
+    name: str
+    title: str
+    alt: str
+    caption: str
+    width: int
+    height: int
+    source: str
+
+
+def load_libraries() -> None:
+    """Import what draws and lays out, so that a page written later does not wait for it."""
+    import jinja2  # noqa: F401
+    from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
+    from matplotlib.figure import Figure  # noqa: F401
+
+
+def write_report(
+    folder: Path,
+    card: BoardCard,
+    inference: Inference,
+    draws: Draws,
+    summary: Mapping[str, Any],
+    diagnosis: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write report.html, its figures as PNG and SVG, and the tables for other programs.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there; what it holds of an earlier report is replaced.
+    card : BoardCard
+    inference : Inference
+        Of a run that passed the gate.
+    draws : Draws
+    summary : dict
+        As in summary.json.
+    diagnosis : dict, optional
+        As in diagnosis.json; then `inference`, `draws` and `summary` are those of the refitted model.
+
+    Returns
+    -------
+    Path
+        Of report.html, which is written last.
+    """
+    make_folder(folder / FIGURES)
+    groups = pictures(inference, draws, summary, diagnosis)
+    vector = save_pictures((one for found in groups.values() for one in found), folder / FIGURES)
+    shown = {place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}
+    write_exports(folder, summary, inference.problem.board.title or summary["name"], diagnosis)
+    page = folder / PAGE
+    write_text(page, render(card, inference, draws, summary, shown, diagnosis))
+    return page
+
+
+def pictures(
+    inference: Inference, draws: Draws, summary: Mapping[str, Any], diagnosis: Mapping[str, Any] | None = None
+) -> dict[str, list[Picture]]:
+    """Every figure of the page, by the place where it stands."""
+    problem = inference.problem
+    board = problem.board
+    first, more = _of_diagnosis(diagnosis)
+    return {
+        "diagnosis_first": first,
+        "diagnosis_more": more,
+        "constants": [constants_picture(summary, draws.moduli)],
+        "percentiles": _percentiles(inference, draws),
+        "weak": [shares_picture(summary, problem.identifiability)],
+        "board": [board_picture(board)],
+        "modes": _modes(inference, draws, summary),
+        "errors": [residuals_picture(board, summary)],
+        "folded": [
+            predictive_picture(board, summary, draws.predictive),
+            priors_picture(problem, draws),
+            pairs_picture(problem, draws),
+            health_picture(inference),
+        ],
+    }
+
+
+def _of_diagnosis(diagnosis: Mapping[str, Any] | None) -> tuple[list[Picture], list[Picture]]:
+    if diagnosis is None:
+        return [], []
+    before_after = before_after_picture(diagnosis)
+    signatures = signatures_picture(diagnosis)
+    return [before_after] if before_after else [], [signatures] if signatures else []
+
+
+def _percentiles(inference: Inference, draws: Draws) -> list[Picture]:
+    problem = inference.problem
+    n_modes = sum(len(setup.readings) for setup in problem.board.setups)
+    if n_modes > MOST_MODES_OF_PERCENTILES:
+        return []
+    found = percentile_estimate(paper_system(problem.board, problem.estimate, compared=False))
+    if found is None or not np.isfinite(list(found.mean.values())).all():
+        return []
+    return [percentiles_picture(found, n_modes, draws.moduli)]
+
+
+def _modes(inference: Inference, draws: Draws, summary: Mapping[str, Any]) -> list[Picture]:
+    """One picture a setup."""
+    board = inference.problem.board
+    shapes = fitted_shapes(inference.problem, draws)
+    values = board.nominal()
+    found = []
+    for setup in board.setups:
+        length_x, length_y = vibrating_lengths(values, setup)
+        own = [mode for mode in summary["modes"] if mode["setup"] == setup.name]
+        name = "modes" if len(board.setups) == 1 else f"modes-{setup.name}"
+        found.append(fitted_modes_picture(setup, own, shapes[setup.name], float(length_x / length_y), name))
+    return found
+
+
+def _shown(picture: Picture, svg: bytes) -> Shown:
+    from markupsafe import Markup
+
+    width, height = (round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
+    source = Markup(f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}")  # nothing in it to escape
+    return Shown(picture.name, picture.title, picture.alt, picture.caption, width, height, source)
+
+
+def render(
+    card: BoardCard,
+    inference: Inference,
+    draws: Draws,
+    summary: Mapping[str, Any],
+    shown: Mapping[str, Sequence[Shown]],
+    diagnosis: Mapping[str, Any] | None = None,
+) -> str:
+    """The page as text; parameters as of `write_report`, `shown` the pictures by their place."""
+    from markupsafe import Markup
+
+    problem = inference.problem
+    board, prior = problem.board, problem.prior
+    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
+    return _template().render(
+        policy=policy(css),
+        css=Markup(css),  # our own file; the policy lets in nothing else
+        title=board.title or board.name,
+        name=board.name,
+        sentences=content.summary_sentences(summary),
+        warnings=summary["warnings"],
+        weak=summary["identifiability"],
+        effects=content.effect_sentences(summary),
+        diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
+        pictures=_with_all_places(shown),
+        tables={
+            "constants": content.constants_table(summary),
+            "effects": content.effects_table(summary),
+            "makers": content.makers_table(summary),
+            "ratios": content.ratios_table(summary),
+            "laws": content.laws_table(summary),
+            "budget": content.budget_table(inference, draws, summary),
+            "inputs": content.inputs_table(board, summary),
+            "setups": content.setups_table(board),
+            "modes": content.modes_tables(summary),
+            "priors": content.priors_table(prior),
+        },
+        model=content.model_rows(summary),
+        sampler=content.sampler_rows(summary),
+        run=content.run_rows(summary),
+        source=board.source.strip(),
+        references=references(card, prior, board),
+    )
+
+
+PLACES = ("diagnosis_first", "diagnosis_more", "constants", "percentiles", "weak", "board", "modes", "errors", "folded")
+"""Where pictures stand on the page."""
+
+
+def _with_all_places(shown: Mapping[str, Sequence[Shown]]) -> dict[str, Sequence[Shown]]:
+    return {place: shown.get(place, ()) for place in PLACES}
+
+
+def policy(css: str) -> str:
+    """What a browser may do with the page: show its own pictures in its own style, and nothing else whatever."""
+    digest = b64encode(sha256(css.encode("utf-8")).digest()).decode("ascii")
+    return f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
+
+
+def _template() -> Any:
+    """The template, every value cleaned of what steers the way text runs, then escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    def cleaned(value: Any) -> Any:
+        return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+    loader = PackageLoader("bayesplate.report", "templates")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=cleaned)
+    return environment.get_template("report.html")
+

@@ -1,0 +1,79 @@
+"""The figure of what each mode tells: its energy by constant, and how much the fit leans on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bayesplate.estimates.identifiability import Identifiability
+from bayesplate.report.style import BLUE, DARK, GREEN, GREY, ORANGE, SMALL, WORDS, Picture, legend_below, short, stacked
+
+_STYLES = {
+    "E_x": (BLUE, "", "bending along the grain, E_x"),
+    "E_y": (ORANGE, "////", "bending across it, E_y"),
+    "G_xy": (GREEN, "..", "twisting, G_xy"),
+    "effects": (GREY, "xx", "effects"),
+}
+_ROW = 0.27
+
+
+def shares_picture(summary: Mapping[str, Any], found: Identifiability) -> Picture:
+    """Draw the energy of each mode.
+
+    Parameters
+    ----------
+    summary : dict
+        As in summary.json.
+    found : Identifiability
+        Its shares belong to the summary's modes.
+
+    Returns
+    -------
+    Picture
+    """
+    modes = summary["modes"]
+    several = len({mode["setup"] for mode in modes}) > 1
+    names = [f"{mode['label']} {short(mode['setup'], 14)}" if several else mode["label"] for mode in modes]
+    left = 0.62 if not several else min(1.6, 0.3 + 0.075 * max(len(name) for name in names))
+    shares = np.column_stack([found.shares, 1.0 - found.shares.sum(axis=1)])
+    if np.abs(shares[:, 3]).max() < 0.005:
+        shares = shares[:, :3]
+    figure, (panel,) = stacked([_ROW * len(modes) + 0.05], left=left, right=0.75, top=0.28, bottom=0.98)
+    rows = np.arange(len(modes))
+    start = np.zeros(len(modes))
+    for share, (colour, hatch, label) in zip(shares.T, _STYLES.values(), strict=False):
+        wide = np.maximum(share, 0.0)
+        panel.barh(
+            rows, 100 * wide, left=100 * start, height=0.72, color=colour, hatch=hatch, edgecolor="white", lw=0.6,
+            label=label,
+        )  # fmt: skip
+        start = start + wide
+    for row, mode in zip(rows, modes, strict=True):
+        panel.text(
+            102, float(row), f"{mode['leverage']:.2f}", fontsize=SMALL, va="center", color=DARK, clip_on=False,
+        )  # fmt: skip
+    panel.text(102, -0.85, "leverage", fontsize=SMALL, va="center", color=DARK, clip_on=False)
+    panel.set(xlim=(0, 100), ylim=(len(modes) - 0.5, -0.5))
+    panel.set_yticks(rows, names, fontsize=WORDS)
+    panel.tick_params(axis="y", length=0)
+    panel.spines["left"].set_visible(False)
+    panel.set_xlabel("energy of the mode, %", fontsize=SMALL)
+    legend_below(figure, panel.get_legend_handles_labels()[0], 2)
+    return Picture("shares", "What each mode tells", _alt(names, found), _CAPTION, figure)
+
+
+_CAPTION = (
+    "A constant is well known if some mode has most of its energy in it. Leverage says how much of a mode's own "
+    "reading stands in its prediction: near 1, nothing checks that reading."
+)
+
+
+def _alt(names: list[str], found: Identifiability) -> str:
+    """The best witness of each constant."""
+    told = []
+    for constant, column in zip(("E_x", "E_y", "G_xy"), found.shares.T, strict=True):
+        best = int(np.argmax(column))
+        told.append(f"{constant}: most in mode {names[best]} with {min(100 * column[best], 100):.0f} %")
+    return "Share of each constant in the energy of each mode. " + "; ".join(told) + "."

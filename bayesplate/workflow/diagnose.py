@@ -1,0 +1,184 @@
+"""`diagnose`: residual, search, verdict, refit, and the error before and after."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bayesplate.diagnosis.advice import recommendation
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.findings import Case, Diagnosis, Side, diagnosis
+from bayesplate.diagnosis.folds import nested
+from bayesplate.diagnosis.null_control import N_SETS, NullControl, null_control
+from bayesplate.diagnosis.refits import excludes_zero, likely_forms, refit_board
+from bayesplate.diagnosis.search import Found, prepare_search, search
+from bayesplate.diagnosis.verdict import Answer, Verdict, alternatives, answers, decide
+from bayesplate.errors import CheckpointError, NotConvergedError, NotIdentifiableError
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.sampling import Progress
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
+from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
+from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed, with_board
+from bayesplate.workflow.prepare import Prepared, prepare
+
+_NULL_LINE = 7
+_MOST_ASKED = 4
+_MOST_FINALISTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnoseResult:
+    """What a diagnosis leaves.
+
+    Attributes
+    ----------
+    folder : Path or None
+        Where its files are; None if none were asked for.
+    diagnosis : dict
+        As in diagnosis.json.
+    before, after : Fitted
+        The same where nothing was added.
+    """
+
+    folder: Path | None
+    diagnosis: Diagnosis
+    before: Fitted
+    after: Fitted
+
+
+def diagnose(
+    card: str | os.PathLike[str],
+    *,
+    out: str | os.PathLike[str] | None = None,
+    write: bool = True,
+    report: bool = True,
+    seed: int = 1,
+    effects: Sequence[str] | None = None,
+    force: bool = False,
+    resume: bool = False,
+    n_null: int = N_SETS,
+    progress: Callable[[Progress], None] | None = None,
+) -> DiagnoseResult:
+    """Trace the residual of a fit to an effect that the model lacks, add it, and report the error before and after.
+
+    Parameters
+    ----------
+    card : str or path
+        Name of a shipped board card, or a path.
+    out : path, optional
+        Output folder; by default results/NAME.
+    write : bool
+        False writes nothing: no files, no checkpoints.
+    report : bool
+        Whether to write report.html, its figures and tables beside the numbers.
+    seed : int
+        Everything random follows from it.
+    effects : sequence of str, optional
+        Declared effects in place of the card's; they are part of the model before the search.
+    force, resume : bool
+        Replace the results in the folder, or continue an interrupted run.
+    n_null : int
+        Data sets of the null control.
+    progress : callable, optional
+        Told after every chunk of sampling.
+
+    Returns
+    -------
+    DiagnoseResult
+
+    Raises
+    ------
+    InputError, NotIdentifiableError, NotConvergedError, CheckpointError
+        As `bayesplate.workflow.fit.fit`, of the fit without further effects.
+    """
+    prepared = prepare(card, effects)
+    folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
+    if folder is not None:
+        folder.require_usable(force=force, resume=resume)
+    request = Request(seed)
+    problem = posed(prepared, request)
+    if folder is not None:
+        if resume and not checkpoint_in(folder.checkpoint / BEFORE, prepared, problem).exists():
+            raise CheckpointError(f"{folder.path}: wanted a saved diagnosis, got none to resume (--force runs it anew)")
+        folder.open(resume=resume)
+
+    def run(under: Prepared, name: str) -> Fitted:
+        def refuse(inference: Inference) -> None:
+            where = folder.path if folder is not None and name == BEFORE else None
+            refuse_unconverged(inference, seed, under, where)
+
+        posed_again = problem if under is prepared else posed(under, request)
+        checkpoints = None if folder is None else folder.checkpoint / name
+        return fitted(under, posed_again, request, checkpoints, refuse, progress)
+
+    before = run(prepared, BEFORE)
+    found = search(prepare_search(baseline_of(before.inference.problem)))
+    verdict = decide(found)
+    control = null_control(found, np.random.default_rng([seed, _NULL_LINE]), n_null)
+    refits: dict[int, Fitted] = {}
+    notes = []
+    for answer in finalists(found, verdict):
+        try:
+            name = "-".join((*answer.members, str(answer.index)))
+            refits[answer.index] = run(with_board(prepared, refit_board(found, answer.index)), name)
+        except (NotIdentifiableError, NotConvergedError) as error:
+            notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+    case = _case(found, verdict, control, before, refits, tuple(notes))
+    content, after = diagnosis(case), refits.get(verdict.index, before)
+    if folder is not None:
+        if after is not before:
+            make_folder(folder.path / BEFORE)
+            write_fit(folder.path / BEFORE, before)
+        write_fit(folder.path, after)
+        write_text(folder.path / DIAGNOSIS, json_text(content))
+        if report:
+            write_page(folder.path, after, content)
+        folder.close()
+    return DiagnoseResult(None if folder is None else folder.path, content, before, after)
+
+
+def finalists(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
+    """Explanations to fit again by the sampler: the one that is named, or the first few alternatives of a group."""
+    if not verdict.index:
+        return ()
+    return alternatives(found, answers(found))[: _MOST_FINALISTS if verdict.word != "named" else 1]
+
+
+def _case(
+    found: Found,
+    verdict: Verdict,
+    control: NullControl,
+    before: Fitted,
+    refits: Mapping[int, Fitted],
+    notes: tuple[str, ...],
+) -> Case:
+    after = refits.get(verdict.index, before)
+    is_refitted = after is not before
+    clear = is_refitted and excludes_zero(after.prepared.board, likely_forms(found, verdict.index), after.draws)
+    return Case(
+        found=found,
+        verdict=verdict,
+        control=control,
+        folded=nested(found.ground, found.residual[None, :]),
+        before=Side(0, before.summary, before.draws),
+        after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
+        is_clear_of_zero=clear,
+        recommendation=recommendation(found, asked_about(found, verdict)),
+        finalists=[(one, refits[one.index].summary) for one in finalists(found, verdict) if one.index in refits],
+        notes=notes,
+    )
+
+
+def asked_about(found: Found, verdict: Verdict) -> tuple[str, ...]:
+    """Effects that the next measurement should tell apart: the alternatives, or what is most probable so far."""
+    ranked = answers(found)
+    if verdict.word in ("named", "indistinguishable group"):
+        near = alternatives(found, ranked) if verdict.word != "named" else ranked[:2]
+    else:
+        near = ranked[:3]
+    names = dict.fromkeys(name for one in near for name in one.members if name in found.ground.candidates)
+    return tuple(names)[:_MOST_ASKED]

@@ -1,0 +1,43 @@
+"""What the pages compute: functions that return Markdown, by the name under which a page asks for them."""
+
+from __future__ import annotations
+
+from computations.library import (
+    default_noise,
+    effects_listed,
+    exit_codes,
+    gate,
+    long_checks,
+    reference,
+    references,
+    symbols,
+    verdict_limits,
+)
+from computations.plates import convergence, paper_table
+from computations.runs import both_laws, exact_law, files_of, provenance, sheet_of, thickness_part
+from computations.sight import cosines, designs, leverages, rounding, visible_parts
+
+__all__ = [
+    "both_laws",
+    "convergence",
+    "cosines",
+    "default_noise",
+    "designs",
+    "effects_listed",
+    "exact_law",
+    "exit_codes",
+    "files_of",
+    "gate",
+    "leverages",
+    "long_checks",
+    "paper_table",
+    "provenance",
+    "reference",
+    "references",
+    "rounding",
+    "sheet_of",
+    "symbols",
+    "thickness_part",
+    "verdict_limits",
+    "visible_parts",
+]

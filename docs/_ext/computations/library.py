@@ -1,0 +1,191 @@
+"""What the package itself knows: effects, symbols, references, boards, exit codes, defaults, limits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import bayesplate
+from bayesplate import errors
+from bayesplate.cards.shelf import card_names
+from bayesplate.diagnosis.folds import NEEDED
+from bayesplate.diagnosis.gate import PASSES
+from bayesplate.diagnosis.hypotheses import NONE, ONE, TWO
+from bayesplate.diagnosis.null_control import CLAIM_QUANTILE, N_SETS
+from bayesplate.diagnosis.signatures import LOOK_ALIKE
+from bayesplate.diagnosis.verdict import AT_LIMIT, CLEARLY, WITHIN
+from bayesplate.effects import EFFECTS
+from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
+from bayesplate.posterior.convergence import Gate
+from bayesplate.results import references as cited
+from bayesplate.workflow.prepare import prepare
+from computations.markdown import plain, table, words_table
+from computations.runs import SOURCE
+
+RESULTS = SOURCE / "validation"
+CHECKS = (
+    (
+        "closing-the-loop",
+        "python examples/closing_the_loop.py --out docs/validation",
+        "Shipped boards through `diagnose`: the verdict, whether an improvement is claimed, errors in cents before and "
+        "after, and the shift of each constant in standard deviations.",
+    ),
+    (
+        "calibration",
+        "make calibration",
+        "Boards are drawn from the prior, measured with noise and fitted; if the inference is right, the truth falls "
+        "everywhere in the posterior alike. Broken variants must be caught.",
+    ),
+    (
+        "coverage",
+        "python tests/calibration/coverage.py",
+        "How often a 90 % interval holds the truth when an effect was planted and declared.",
+    ),
+    (
+        "trial",
+        "make trial",
+        "The diagnosis on trial: boards planted by an independent generator, with one effect, two, none, or one that "
+        "the library does not know, judged blindly and counted.",
+    ),
+    ("benchmarks", "make benchmarks", "Times of the parts and of whole fits."),
+)
+"""Long checks: the stem of their page or printed output, the command that makes it, and what it shows."""
+
+
+def _boards() -> list[str]:
+    return list(card_names("boards"))
+
+
+def effects_listed(folder: Path) -> str:
+    """Every effect: what it says, what it belongs to, and the priors of what a card does not state."""
+    entries = []
+    for name, effect in EFFECTS.items():
+        parameters = list(_parameters(name))
+        priors = f"Parameters: {'; '.join(parameters)}." if parameters else "It has no parameter: it is as measured."
+        entries.append(f"`{name}`\n: {effect.sentence} Belongs to the {effect.scope}.\n\n  {priors}\n")
+    return "\n".join(entries)
+
+
+def _parameters(name: str) -> Iterator[str]:
+    """Parameters of an effect on the first shipped board that it can act on, as if the card stated none of them."""
+    for card in _boards():
+        board = replace(prepare(card, []).board, shear_xz=None, shear_yz=None)
+        for setup in board.setups:
+            forms = EFFECTS[name].candidates(board, setup)
+            if forms:
+                by_source: dict[str, list[str]] = {}
+                for parameter in forms[0].parameters():
+                    unit = "" if parameter.unit == "1" else f" in {parameter.unit}"
+                    by_source.setdefault(parameter.source, []).append(f"`{parameter.name}`{unit}")
+                yield from (f"{', '.join(names)} ({source})" for source, names in by_source.items())
+                return
+
+
+def symbols(folder: Path) -> str:
+    """The glossary of symbols, from the docstring of the package."""
+    text = (bayesplate.__doc__ or "").partition("Glossary of symbols")[2]
+    rows = []
+    for line in text.splitlines():
+        match = re.match(r"^(\S.*?)\s{2,}(\S.*)$", line)
+        if match:
+            rows.append((f"`{match[1]}`", match[2].replace("|", "\\|").replace("^", "\\^").replace("_", "\\_")))
+    return words_table(("symbol", "meaning"), rows)
+
+
+def reference(folder: Path, name: str) -> str:
+    """One reference by the name it has in `bayesplate.results.references`."""
+    return f"> {_unquoted(getattr(cited, name))}\n"
+
+
+def references(folder: Path) -> str:
+    """Every reference that a fit may give."""
+    entries = [cited.PAPER, cited.ELEMENT]
+    for group in (*cited.THEORIES.values(), *cited.EFFECTS_FROM.values(), cited.COMPUTATION):
+        entries += group
+    return "\n".join(f"- {_unquoted(entry)}" for entry in dict.fromkeys(entries)) + "\n"
+
+
+def _unquoted(entry: str) -> str:
+    """A reference with its DOI as a link and its use in italics."""
+    linked = re.sub(r"doi:(10\.\S+?)(?=[.,;]?(?:\s|$))", r"[doi:\1](https://doi.org/\1)", entry)
+    return re.sub(r"\[([^\[\]]+)\]$", r"*\1*", linked)
+
+
+def exit_codes(folder: Path) -> str:
+    """Exit codes, from the tree of errors."""
+    rows = [("0", "done, whatever the verdict"), ("2", "wrong use of the command line")]
+    for name in ("InputError", "NotIdentifiableError", "NotConvergedError", "CheckpointError", "BatchError"):
+        error = getattr(errors, name)
+        rows.append((str(error.exit_code), (error.__doc__ or "").splitlines()[0].rstrip(".")))
+    rows += [(str(errors.BayesplateError.exit_code), "internal error"), ("130", "interrupted, after a checkpoint")]
+    return words_table(("code", "meaning"), rows)
+
+
+def default_noise(folder: Path) -> str:
+    """The default priors of the noise."""
+    rows = [
+        (words, f"{100 * noise.median:.1f}", f"{np.exp(noise.log_sd):.2f}")
+        for words, noise in (("no edge clamped", DEFAULT_NOISE), ("an edge clamped", CLAMPED_NOISE))
+    ]
+    return table(("setup", "median, %", "factor"), rows)
+
+
+def gate(folder: Path) -> str:
+    """The limits of the convergence gate."""
+    limits = Gate()
+    rows = [
+        ("split R-hat of the ensembles", f"at most {limits.rhat_max:g}"),
+        ("length of each ensemble, in its autocorrelation times", f"at least {limits.tau_count_min:g}"),
+        ("effective sample size", f"at least {limits.ess_min:g}"),
+        ("mean acceptance", f"{limits.acceptance_min:g} to {limits.acceptance_max:g}"),
+        ("acceptance of every walker", f"at least {limits.walker_acceptance_min:g}"),
+    ]
+    return words_table(("number", "limit"), rows)
+
+
+def verdict_limits(folder: Path) -> str:
+    """The numbers in the rules of the verdict."""
+    rows = [
+        ("probability of no effect from which on none is added", f"{NEEDED:g}"),
+        ("named: more probable than the next by a factor of", f"{CLEARLY:g}"),
+        ("group: within a factor of the best", f"{WITHIN:g}"),
+        ("a pair counts if it beats its better member by a factor of", f"{CLEARLY:g}"),
+        ("gate: probability of so large a misfit, at least", f"{PASSES:g}"),
+        ("limit of a range: prior probability beyond the size, below", f"{AT_LIMIT:g}"),
+        ("look-alikes: cosine of the visible parts above", f"{LOOK_ALIKE:g}"),
+        ("prior probability of no effect, one, two", f"{NONE:g}, {ONE:g}, {TWO:g}"),
+        ("simulated boards of the null control", f"{N_SETS}"),
+        ("a claim: chance alone would do as well in fewer than", f"{100 * CLAIM_QUANTILE:g} of 100"),
+    ]
+    return words_table(("rule", "number"), rows)
+
+
+def long_checks(folder: Path) -> str:
+    """Published results of the long checks: a page is linked, a table or what was printed is shown."""
+    parts, pages = [], []
+    known = {stem: f"{shows} Made by `{command}`." for stem, command, shows in CHECKS}
+    others = {path.stem: "" for path in sorted(RESULTS.glob("*.md")) if path.stem not in known}
+    for stem, shows in {**known, **others}.items():
+        page, output = RESULTS / f"{stem}.md", RESULTS / f"{stem}.txt"
+        said = f"**{plain(stem).capitalize()}.** {shows}"
+        if page.exists() and is_page(page):
+            pages.append(f"{RESULTS.name}/{stem}")
+            parts.append(f"{said} {{doc}}`What came out <{pages[-1]}>`.\n")
+        elif page.exists():
+            parts.append(f"{said}\n\n{page.read_text(encoding='utf-8').rstrip()}\n")
+        elif output.exists():
+            parts.append(f"{said}\n\n```text\n{output.read_text(encoding='utf-8').rstrip()}\n```\n")
+        else:
+            parts.append(f"{said} No result of it is published with this version.\n")
+    if pages:
+        parts.append("```{toctree}\n:hidden:\n\n" + "\n".join(pages) + "\n```\n")
+    return "\n".join(parts)
+
+
+def is_page(path: Path) -> bool:
+    """Whether a file of results has a title of its own; a table alone is shown where it is spoken of."""
+    return path.read_text(encoding="utf-8").startswith("# ")

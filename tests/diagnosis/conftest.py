@@ -1,0 +1,61 @@
+"""Search grounds of measured boards that the tests share: each is prepared once a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import pytest
+
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.search import Ground, prepare_search
+from bayesplate.posterior.inference import Problem
+from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
+from bayesplate.workflow.fitting import Request, posed
+from bayesplate.workflow.prepare import prepare
+
+N_NULL = 100
+"""Data sets of the null control: enough for its files and rules, fewer than a diagnosis that is to be published."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grounded:
+    """A board's problem and the ground of its search."""
+
+    problem: Problem
+    ground: Ground
+
+
+def grounded(name: str) -> Grounded:
+    problem = posed(prepare(name), Request())
+    return Grounded(problem, prepare_search(baseline_of(problem)))
+
+
+@pytest.fixture(scope="session")
+def finnish() -> Grounded:
+    """The paper's cantilever board: rounded readings, exact inputs, one candidate pair."""
+    return grounded("finnish-spruce-cantilever")
+
+
+@pytest.fixture(scope="session")
+def simulated() -> Grounded:
+    """The paper's simulation of that board: hardly any noise, so that everything can be seen."""
+    return grounded("paper-cantilever-fe")
+
+
+@pytest.fixture(scope="session")
+def fiemme() -> Grounded:
+    """The paper's clamped board."""
+    return grounded("fiemme-spruce-clamped")
+
+
+@pytest.fixture(scope="session")
+def diagnosed() -> Callable[[str], DiagnoseResult]:
+    """The whole of `diagnose` on a shipped board, once each, without files."""
+
+    @cache
+    def run(name: str) -> DiagnoseResult:
+        return diagnose(name, write=False, n_null=N_NULL)
+
+    return run

@@ -1,0 +1,80 @@
+"""The example of an uncertainty budget: its parts against powers worked out by hand and a fit with exact inputs."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "uncertainty_report.py"
+
+
+@pytest.fixture(scope="module")
+def example():
+    return runpy.run_path(str(EXAMPLE))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("uncertainty")
+
+
+@pytest.fixture(scope="module")
+def numbers(example, folder):
+    return example["run"](folder)
+
+
+@pytest.fixture(scope="module")
+def error(numbers):
+    """Four relative standard errors of a standard deviation from so many draws."""
+    return 4 / np.sqrt(2 * numbers["effective_draws"])
+
+
+@pytest.mark.parametrize("name", ["E_x", "E_y", "G_xy"])
+def test_parts_of_the_thickness_and_the_mass_are_those_worked_out_by_hand(numbers, error, name):
+    """Cubed and to the first power; squared, as if the density were given, is the control that must fail."""
+    row = numbers["budget"][name]
+
+    slope = 4 * row["parts"]["frequencies"] / np.sqrt(numbers["effective_draws"])  # of a regression on so many draws
+    for known in ("thickness", "mass"):
+        by_hand = row["by_hand"][known]
+        assert row["parts"][known] == pytest.approx(by_hand, abs=np.hypot(error * by_hand, slope))
+    squared = 2 / 3 * row["by_hand"]["thickness"]
+    assert row["parts"]["thickness"] != pytest.approx(squared, abs=np.hypot(error * squared, slope))
+
+
+@pytest.mark.parametrize("name", ["E_x", "E_y", "G_xy"])
+def test_what_is_left_is_the_spread_of_a_fit_with_exact_inputs(numbers, error, name):
+    """Two fits, each with its error; with exact inputs the Poisson ratio is fixed too, which hardly matters here."""
+    row = numbers["budget"][name]
+
+    assert row["parts"]["frequencies"] == pytest.approx(row["exact_inputs_percent"], rel=2 * error)
+    assert row["sd_percent"] ** 2 == pytest.approx(sum(part**2 for part in row["parts"].values()), rel=2 * error)
+
+
+def test_the_frequencies_teach_the_constants_and_not_the_sizes(numbers, error):
+    widths = numbers["widths"]
+
+    for name in ("E_x", "E_y", "G_xy"):
+        assert widths[name]["after"] < widths[name]["before"] / 50
+    for name in ("thickness", "mass", "length_x", "length_y"):
+        assert widths[name]["after"] == pytest.approx(widths[name]["before"], rel=error)
+    assert widths["poisson_xy"]["after"] < (1 - error) * widths["poisson_xy"]["before"]
+
+
+def test_parts_of_a_made_up_constant(example):
+    """ln c = 3 a - b + noise: parts 3 sd(a), sd(b), sd(noise)."""
+    rng = np.random.default_rng(3)
+    n, sds = 20_000, np.array([0.02, 0.01, 0.005])
+    a, b, noise = sds[:, None] * rng.standard_normal((3, n))
+    parts = example["parts_of"](np.exp(3 * a - b + noise), {"a": np.exp(a), "b": np.exp(b)})
+
+    for name, wanted in {"a": 6.0, "b": 1.0, "frequencies": 0.5}.items():
+        assert parts[name] == pytest.approx(wanted, rel=4 / np.sqrt(2 * n))
+
+
+def test_the_results_and_the_figure_are_written_where_told(numbers, folder):
+    assert (folder / "uncertainty.png").read_bytes().startswith(b"\x89PNG")
+    assert {"summary.json", "posterior.nc"} <= {path.name for path in folder.iterdir()}

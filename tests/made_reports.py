@@ -1,0 +1,54 @@
+"""Quick fits whose reports tests look at, and their pages with any texts in place of the card's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bayesplate.cards import BoardCard
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.report.page import render, write_report
+from bayesplate.results.draws import Draws
+from bayesplate.workflow.fit import fit
+from bayesplate.workflow.prepare import prepare
+
+LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
+"""Passes at its first judgement: these are tests of a page, not of constants."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fit and its card."""
+
+    card: BoardCard
+    inference: Inference
+    draws: Draws
+    summary: Mapping[str, Any]
+
+    def write(self, folder: Path, diagnosis: Mapping[str, Any] | None = None) -> Path:
+        """Its report in a folder."""
+        return write_report(folder, self.card, self.inference, self.draws, self.summary, diagnosis)
+
+    def page(self, title: str = "", source: str = "", diagnosis: Mapping[str, Any] | None = None) -> str:
+        """Its page without figures, with another title and source."""
+        problem = self.inference.problem
+        board = replace(problem.board, title=title, source=source)
+        inference = replace(self.inference, problem=replace(problem, board=board))
+        card = self.card.model_copy(update={"title": title, "source": source})
+        return render(card, inference, self.draws, self.summary, {}, diagnosis)
+
+
+def fitted(card: str) -> Fit:
+    """Fit a board as far as the loose gate lets it, in memory."""
+    with pytest.MonkeyPatch.context() as patched:
+        for where in ("fit", "fitting"):
+            patched.setattr(f"bayesplate.workflow.{where}.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+        result = fit(card, write=False)
+    return Fit(prepare(card).card, result.inference, result.draws, result.summary)

@@ -1,0 +1,151 @@
+"""Searches made by hand: baselines of random slopes and tables of random shifts, without any plate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from made_boards import setup_of
+
+from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.forms import Form, Free
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.laws import FormLaw
+from bayesplate.diagnosis.noise_grid import NoiseGrid
+from bayesplate.diagnosis.search import Candidate, Ground
+from bayesplate.diagnosis.tables import Table, nothing
+from bayesplate.labels import Label
+from bayesplate.modes.naming import Place
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Reading, Setup
+from bayesplate.quantities import Quantity
+
+FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
+NOISE = 0.005
+
+
+def baseline(
+    rng: np.random.Generator,
+    n_modes: int = 6,
+    *,
+    resolution: float = 0.0,
+    n_inputs: int = 0,
+    noise: Sequence[float] = (NOISE,),
+    parities: Sequence[tuple[int, int]] = (),
+    spacing: float = 0.3,
+) -> Baseline:
+    """Random slopes whose rows sum to one half, as a bare plate's do; as many setups as noises."""
+    hertz = 60.0 * np.exp(spacing * np.arange(n_modes))
+    parts = np.array_split(np.arange(n_modes), len(noise))
+    setups = tuple(
+        setup_of(
+            FREE,
+            {(int(i), 0): float(hertz[i]) for i in part},
+            name=f"setup-{k}",
+            resolution=resolution,
+            noise=Quantity.from_median(level, np.exp(0.5)),
+        )
+        for k, (part, level) in enumerate(zip(parts, noise, strict=True))
+    )
+    shares = rng.dirichlet(np.full(3, 0.7), size=n_modes)
+    inputs = {"thickness": Quantity.exact(3e-3), "poisson_xy": Quantity.exact(0.4)}
+    return Baseline(
+        board=Board("made", inputs, setups),
+        values={name: np.asarray(v) for name, v in {"D_x": 30.0, "D_y": 2.0, "D_s": 5.0}.items()}
+        | {name: np.asarray(q.mean) for name, q in inputs.items()},
+        log_rigidities=np.log([30.0, 2.0, 5.0]),
+        log_frequency=np.log(hertz),
+        residual=np.zeros(n_modes),
+        slopes=0.5 * shares,
+        input_slopes=0.01 * rng.standard_normal((n_modes, n_inputs)),
+        places=tuple(Place(parity, 0, 1.0) for parity in parities or [(0, 0)] * n_modes),
+        symmetry=tuple((True, True) for _ in noise),
+    )
+
+
+def table(
+    rng: np.random.Generator,
+    n_modes: int = 6,
+    n_cells: int = 3,
+    n_tangents: int = 1,
+    *,
+    size: float = 0.01,
+    name: str = "first",
+) -> Table:
+    """Cells with random shifts and tangents."""
+    weights = rng.dirichlet(np.full(n_cells, 3.0))
+    return Table(
+        members=(name,),
+        weights=weights,
+        shift=size * rng.standard_normal((n_cells, n_modes)),
+        slopes=0.5 * size * rng.standard_normal((n_cells, n_modes, n_tangents)),
+        moved=size * rng.standard_normal((n_cells, 3)),
+        moved_slopes=0.5 * size * rng.standard_normal((n_cells, 3, n_tangents)),
+        form=np.zeros(n_cells, dtype=np.intp),
+        z=np.zeros((n_cells, max(n_tangents, 1))),
+    )
+
+
+def one_level(base: Baseline, noise: float = NOISE) -> NoiseGrid:
+    """A noise that is known."""
+    return NoiseGrid(np.full((1, len(base.board.setups)), noise), np.ones(1))
+
+
+def ground_of(base: Baseline, *found: Hypothesis, candidates: Mapping[str, Candidate] | None = None) -> Ground:
+    """A search ground of given hypotheses."""
+    return Ground(base, candidates or {}, found)
+
+
+def bare(base: Baseline, noise: NoiseGrid, prior: float = 0.5) -> Hypothesis:
+    """The hypothesis that nothing is lacking."""
+    return Hypothesis((), prior, nothing(base.n_modes), noise)
+
+
+HALF_NORMAL = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0)
+
+
+def candidate(
+    base: Baseline,
+    name: str,
+    direction: np.ndarray,
+    prior: Quantity = HALF_NORMAL,
+    n_cells: int = 33,
+    n_coarse: int = 9,
+) -> Candidate:
+    """An effect whose shift is a direction times its size, one parameter with a given prior."""
+    free = Free("size", "1", prior, (f"{name}.size",), prior.value(1.0))
+    law = FormLaw(Form(name, "", base.board, (free,)), ())
+    fine, coarse = (_along(base, name, direction, prior, n) for n in (n_cells, n_coarse))
+    shift = direction * float(prior.value(1.0))
+    visible = shift - base.slopes @ (base.absorbing @ shift)
+    return Candidate(name, (law,), fine, coarse, shift, visible, -base.absorbing @ shift)
+
+
+def _along(base: Baseline, name: str, direction: np.ndarray, prior: Quantity, n: int) -> Table:
+    low, high = (float(np.clip(prior.standard(bound), -3.0, 3.0)) for bound in (prior.lower, prior.upper))
+    width = (high - low) / n
+    z = low + width * (np.arange(n) + 0.5)
+    weights = np.exp(prior.log_prior(z))
+    moved = -np.outer(prior.value(z), base.absorbing @ direction)
+    slope = prior.value(z + 0.25 * width) - prior.value(z - 0.25 * width)
+    return Table(
+        members=(name,),
+        weights=weights / weights.sum(),
+        shift=np.outer(prior.value(z), direction) + moved @ base.slopes.T,
+        slopes=(slope[:, None] * (direction - base.slopes @ (base.absorbing @ direction)))[:, :, None],
+        moved=moved,
+        moved_slopes=-(slope[:, None] * (base.absorbing @ direction))[:, :, None],
+        form=np.zeros(n, dtype=np.intp),
+        z=z[:, None],
+    )
+
+
+def with_readings(base: Baseline, *, labels: Sequence[tuple[int, int]]) -> Baseline:
+    """The same baseline with other labels in its only setup."""
+    (setup,) = base.board.setups
+    readings: tuple[Reading, ...] = tuple(
+        replace(one, label=Label(*label)) for one, label in zip(setup.readings, labels, strict=True)
+    )
+    changed: Setup = replace(setup, readings=readings)
+    return replace(base, board=replace(base.board, setups=(changed,)))

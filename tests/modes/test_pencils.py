@@ -1,0 +1,80 @@
+"""Small pencils: against scipy one by one, what condensation leaves out, bounds, homogeneity, no material."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from bayesplate.modes.pencils import condensed_eigenvalues, pencil_eigenvalues
+
+N_DRAWS, R, N_KEPT, N_WANTED, N_RIGID = 5, 40, 14, 8, 2
+EIGENVALUES = np.concatenate([np.zeros(N_RIGID), np.arange(1.0, R - N_RIGID + 1.0) ** 2])
+"""At the centre, where stiffness and mass are diagonal."""
+
+
+def coupled(size, seed, with_mass=True):
+    """Pencils at that distance from the centre: relative changes of energy; rigid motions have none."""
+    rng = np.random.default_rng(seed)
+    scale = np.sqrt(EIGENVALUES)
+    changes = [(c + np.swapaxes(c, 1, 2)) / np.sqrt(8 * R) for c in rng.standard_normal((2, N_DRAWS, R, R))]
+    stiffness = np.diag(EIGENVALUES) + size * scale[:, None] * changes[0] * scale
+    return stiffness, np.eye(R) + size * changes[1] if with_mass else None
+
+
+def exact(stiffness, mass):
+    masses = [None] * N_DRAWS if mass is None else mass
+    return np.stack([eigh(k, m, eigvals_only=True) for k, m in zip(stiffness, masses, strict=True)])
+
+
+def errors(size, with_mass=True, seed=0):
+    """Relative errors of the wanted eigenvalues, condensed."""
+    stiffness, mass = coupled(size, seed, with_mass)
+    wanted = slice(N_RIGID, N_RIGID + N_WANTED)
+    found = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)[:, wanted]
+    return found / exact(stiffness, mass)[:, wanted] - 1.0
+
+
+def test_all_eigenvalues_are_those_of_scipy():
+    pencils = coupled(0.2, 3)
+    np.testing.assert_allclose(pencil_eigenvalues(*pencils, 1.0), exact(*pencils), rtol=1e-10, atol=1e-9)
+
+
+@pytest.mark.parametrize("with_mass", [True, False])
+def test_condensed_eigenvalues_are_exact_at_the_centre_and_never_below(with_mass):
+    assert np.abs(errors(0.0, with_mass)).max() < 1e-12
+    assert errors(0.2, with_mass).min() > -1e-10
+
+
+@pytest.mark.parametrize("with_mass", [True, False])
+def test_condensation_leaves_the_inertia_of_the_others_alone(with_mass):
+    """Cut off, the others err by their share; condensed, by that times the square of the ratio to the first of them.
+
+    To lowest order: what follows is the square of the share, and half as much again is allowed. The negative control is
+    the cut itself.
+    """
+    stiffness, mass = coupled(0.1, 0, with_mass)
+    wanted, kept = slice(N_RIGID, N_RIGID + N_WANTED), slice(N_KEPT)
+    cut = exact(stiffness[:, kept, kept], None if mass is None else mass[:, kept, kept])[:, wanted]
+    shares = (cut / exact(stiffness, mass)[:, wanted] - 1.0).max(axis=0)
+    bound = 1.5 * ((EIGENVALUES[wanted] / EIGENVALUES[N_KEPT]) ** 2 + shares) * shares
+
+    assert np.all(errors(0.1, with_mass).max(axis=0) < bound)
+    assert np.all(shares > bound)
+
+
+@pytest.mark.parametrize("with_mass", [True, False])
+def test_condensed_eigenvalues_are_homogeneous_in_the_stiffness(with_mass):
+    stiffness, mass = coupled(0.2, 1, with_mass)
+    once = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)[:, N_RIGID:]
+    np.testing.assert_allclose(condensed_eigenvalues(2.7 * stiffness, mass, N_KEPT, N_RIGID)[:, N_RIGID:], 2.7 * once)
+
+
+@pytest.mark.parametrize("with_mass", [True, False])
+def test_no_material_is_no_number_and_the_other_draws_stay(with_mass):
+    stiffness, mass = coupled(0.1, 2, with_mass)
+    expected = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)
+    stiffness[1] *= -1.0
+    found = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)
+    assert np.isnan(found[1]).all()
+    np.testing.assert_allclose(found[[0, 2, 3, 4]], expected[[0, 2, 3, 4]], rtol=1e-12, atol=1e-9)

@@ -1,0 +1,211 @@
+"""The figures of the report by what is drawn in them: numbers where they belong, nothing cut off, no mathematics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from diagnoses import DIAGNOSES
+from made_reports import fitted
+from payloads import PAYLOADS
+
+from bayesplate.report.page import pictures
+from bayesplate.report.percentiles import percentiles_figure
+from bayesplate.report.priors import Compared, compared
+from bayesplate.report.residuals import rounding_cents
+from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
+
+LONG_NAME = "a-cantilever-with-a-very-long-setup-name-beyond-all-reason"
+TWO_SETUPS = f"""\
+format = 1
+name = "two-ways"
+title = "Held in two ways"
+effects = ["transverse_shear", "clamp_rotation"]
+[plate]
+length_x_mm = 300
+length_y_mm = 120
+thickness_mm = {{ mean = 3.0, sd = 0.05 }}
+density_kg_m3 = 430
+[material]
+poisson_xy = 0.4
+[[setup]]
+name = "{LONG_NAME}"
+edges = {{ x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }}
+clamped_mm = {{ x0 = 30 }}
+first_label = [1, 0]
+resolution_hz = 0.1
+[setup.frequencies_hz]
+"(1,0)" = 33.8
+"(1,1)" = 79.4
+"(2,0)" = 211.2
+"(1,2)" = 341.7
+[[setup]]
+name = "free"
+edges = {{ x0 = "free", x1 = "free", y0 = "free", y1 = "free" }}
+resolution_hz = 0.1
+[setup.frequencies_hz]
+"(1,1)" = 112.2
+"(2,0)" = 173.3
+"(2,1)" = 286.0
+"(0,2)" = 311.7
+"""
+"""Frequencies of a thin plate of 11, 0.9 and 0.7 GPa, held in two ways, to 0.1 Hz."""
+
+
+@pytest.fixture(scope="module")
+def drawn(clamped):
+    groups = pictures(clamped.inference, clamped.draws, clamped.summary, DIAGNOSES["named"])
+    return {one.name: one for found in groups.values() for one in found}
+
+
+def words(figure):
+    """Every text that is seen: of ticks only those within their panel."""
+    found = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
+    for panel in figure.axes:
+        found += [*panel.texts, panel.title, panel._left_title, panel.xaxis.label, panel.yaxis.label]
+        for axis, (low, high) in ((panel.xaxis, sorted(panel.get_xlim())), (panel.yaxis, sorted(panel.get_ylim()))):
+            if panel.axison:
+                found += [tick.label1 for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+    return [text for text in found if text.get_text().strip()]
+
+
+def test_rounding_by_hand(clamped):
+    """57 Hz read to 1 Hz: between 56.5 and 57.5 Hz, 15.26 cents below and 15.12 above."""
+    below, above = rounding_cents(clamped.inference.problem.board)
+
+    assert below[0] == pytest.approx(1200 * np.log2(56.5 / 57))
+    assert above[0] == pytest.approx(1200 * np.log2(57.5 / 57))
+    assert (below[0], above[0]) == pytest.approx((-15.26, 15.12), abs=0.01)
+
+
+def test_residuals_lie_where_the_summary_says(drawn, clamped):
+    (panel,) = drawn["residuals"].figure.axes
+    lines = {line.get_label(): line.get_xydata() for line in panel.lines}
+    modes = clamped.summary["modes"]
+
+    np.testing.assert_allclose(lines["error of the fit"][:, 0], [mode["residual_cents"] for mode in modes])
+    np.testing.assert_allclose(lines["error if left out of the fit"][:, 0], [mode["left_out_cents"] for mode in modes])
+    assert [tick.get_text() for tick in panel.get_yticklabels()] == [mode["label"] for mode in modes]
+    assert panel.get_ylim()[0] > panel.get_ylim()[1]  # the first on top
+
+
+def test_the_board_is_to_scale(drawn):
+    """600 mm by 412 mm: the panel has the board's proportions, its edges are all drawn as clamped."""
+    (panel,) = drawn["board"].figure.axes
+    width, height = panel.get_position().size * drawn["board"].figure.get_size_inches()
+
+    assert width / height == pytest.approx(600 / 412, rel=1e-6)
+    assert panel.get_xlim() == pytest.approx((0, 0.600))
+    assert sum(patch.get_hatch() is not None for patch in panel.patches) == 4
+    assert {"600 mm, along the grain", "412 mm across"} <= {text.get_text() for text in panel.texts}
+
+
+def test_the_bars_of_the_constants_hold_ninety_per_cent(drawn, clamped):
+    for panel, (name, entry) in zip(drawn["constants"].figure.axes, clamped.summary["elastic"].items(), strict=True):
+        bar = next(line for line in panel.lines if line.get_label() == "posterior, bar: 90 %")
+        low, high = np.array(bar.get_xdata()) * 1e9
+        draws = clamped.draws.moduli[name]
+
+        assert np.mean((draws >= low) & (draws <= high)) == pytest.approx(0.9, abs=0.001)
+        assert (low, high) == pytest.approx((entry["q05"], entry["q95"]))
+
+
+def test_shares_fill_each_mode(drawn):
+    (panel,) = drawn["shares"].figure.axes
+    ends: dict[float, float] = {}
+    for bar in panel.patches:
+        row = bar.get_y() + bar.get_height() / 2
+        ends[row] = max(ends.get(row, 0.0), bar.get_x() + bar.get_width())
+
+    assert len(ends) == 6
+    assert list(ends.values()) == pytest.approx([100.0] * 6, abs=0.5)
+
+
+def test_before_and_after_are_the_diagnosis_own(drawn):
+    errors, shifts = drawn["before-after"].figure.axes
+
+    assert [bar.get_width() for bar in errors.patches] == [21.25, 46.5, 46.5, 4.25, 9.5, 12.5]
+    np.testing.assert_array_equal(shifts.lines[0].get_xdata(), [2.5, -1.25, 0.0])
+
+
+def test_no_word_is_cut_off_or_too_small(drawn):
+    require_whole(drawn.values())
+
+
+@pytest.mark.slow
+def test_long_names_of_several_setups_and_effects_are_not_cut_off(tmp_path):
+    """Shortened where they are long; an uncertain thickness, two setups, parameters of two effects."""
+    path = tmp_path / "two-ways.toml"
+    path.write_text(TWO_SETUPS, encoding="utf-8")
+    two = fitted(str(path))
+    groups = pictures(two.inference, two.draws, two.summary, DIAGNOSES["named"])
+    names = [one.name for found in groups.values() for one in found]
+
+    assert len(names) == len(set(names)) == 13
+    assert {f"modes-{LONG_NAME}", "modes-free"} <= set(names)
+    require_whole(one for found in groups.values() for one in found)
+
+
+def require_whole(found):
+    for picture in found:
+        name = picture.name
+        figure = picture.figure
+        figure.draw_without_rendering()
+        width, height = figure.bbox.size
+        assert picture.alt, name
+        assert picture.caption, name
+        for text in words(figure):
+            box = text.get_window_extent()
+            assert text.get_fontsize() >= 6.5, (name, text.get_text())
+            assert box.x0 >= -1, (name, text.get_text())
+            assert box.x1 <= width + 1, (name, text.get_text())
+            assert box.y0 >= -1, (name, text.get_text())
+            assert box.y1 <= height + 1, (name, text.get_text())
+
+
+def test_colours_differ_in_grey():
+    """Luminance of neighbours in a figure, 0 to 1; where it is close, a hatching or a marker tells them apart too."""
+
+    def luminance(colour):
+        red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    for one, other in ((BLUE, ORANGE), (BLUE, SKY), (ORANGE, GREEN), (BLUE, GREEN)):
+        assert abs(luminance(one) - luminance(other)) > 0.08
+    assert luminance(VERMILLION) < luminance(ORANGE)
+
+
+@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
+def test_any_title_can_be_drawn(clamped, payload):
+    """No mathematics, no warning for a sign that the font lacks: a warning is an error here."""
+    from bayesplate.estimates.paper import paper_system
+    from bayesplate.estimates.percentile import percentile_estimate
+
+    problem = clamped.inference.problem
+    system = paper_system(problem.board, problem.estimate, compared=False)
+    figure = percentiles_figure(payload, percentile_estimate(system), 6, clamped.draws.moduli)
+    figure.draw_without_rendering()
+
+    assert figure.get_suptitle() == drawable(payload)
+
+
+def test_signs_that_the_font_lacks_are_shown_as_such():
+    assert drawable("violin \U0001f3bb") == f"violin {NO_GLYPH}"
+    assert drawable("Ø $x$ é") == "Ø $x$ é"
+
+
+def test_what_the_readings_made_of_each_prior(clamped):
+    """By hand: a normal log density of mean 1 and sd 0.5, against draws of known mean and spread."""
+
+    def told(mean, sd):
+        values = np.exp(mean + sd * np.array([-1.0, 1.0]))
+        return Compared("x", "", values, np.log, True, 1.0, 0.5, mean, sd).told
+
+    assert told(1.0, 0.005) == "100 times narrower"
+    assert told(1.0, 0.2) == "2.5 times narrower"
+    assert told(1.0, 0.5) == "as before: nothing was learned"
+    assert told(1.2, 0.5) == "moved, as wide as before"
+    found = {one.name: one for one in compared(clamped.inference.problem, clamped.draws)}
+    assert found["E_x"].prior_mean == pytest.approx(np.log(3))
+    mean = clamped.summary["elastic"]["E_x"]["mean"] / 1e9
+    assert found["E_x"].posterior_mean == pytest.approx(np.log(mean), rel=1e-3)
+    assert found["noise"].prior_mean == pytest.approx(np.log(0.8))

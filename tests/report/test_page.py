@@ -1,0 +1,235 @@
+"""report.html as a parser reads it: everything is there, nothing is asked for, and texts stay texts."""
+
+from __future__ import annotations
+
+import re
+from base64 import b64decode, b64encode
+from hashlib import sha256
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import runs
+from diagnoses import DIAGNOSES, NEXT, candidate
+from payloads import DIRECTION_MARKS, PAYLOADS, shown
+
+from bayesplate.report.style import visible
+
+ALLOWED = {
+    "html", "head", "meta", "title", "style", "body", "header", "main", "section", "footer", "h1", "h2", "h3", "p",
+    "bdi", "strong", "div", "table", "caption", "thead", "tbody", "tr", "th", "td", "figure", "figcaption", "img",
+    "details", "summary", "ul", "li",
+}  # fmt: skip
+"""Every element that the template holds; whatever a text could bring in besides is a fault."""
+NEVER = {"style", "href", "srcdoc"}
+OWN = "data:image/svg+xml;base64,"
+FIGURES = (
+    "board", "constants", "corner", "modes", "percentiles", "predictive", "priors", "residuals", "sampler", "shares",
+)  # fmt: skip
+LARGEST = 3_000_000
+
+
+class Read(HTMLParser):
+    """Elements with their attributes, and the text of the page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str]]] = []
+        self.text = ""
+        self.source = page
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, {name: value or "" for name, value in attrs}))
+
+    def handle_data(self, data):
+        self.text += data
+
+    def handle_comment(self, data):
+        raise AssertionError(f"a comment: {data}")
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@pytest.fixture(scope="module")
+def page(clamped_folder):
+    return Read((clamped_folder / "report.html").read_text(encoding="utf-8"))
+
+
+def faults(page: Read) -> list[str]:
+    """Everything that a page of ours never has."""
+    found = [f"element {tag}" for tag, _ in page.elements if tag not in ALLOWED]
+    for tag, attributes in page.elements:
+        found += [f"{tag} {name}" for name in attributes if name.startswith("on") or name in NEVER]
+        source = attributes.get("src", OWN)
+        found += [] if source.startswith(OWN) else [f"{tag} asks for {source[:40]}"]
+    found += ["two titles"] if len(page.all("title")) != 1 else []
+    return found
+
+
+def test_it_holds_every_figure_with_words_for_who_cannot_see_it(page, clamped_folder):
+    images = page.all("img")
+    names = [attributes["id"] for attributes in page.all("figure")]
+
+    assert sorted(names) == sorted(FIGURES)
+    assert {path.name for path in (clamped_folder / "figures").iterdir()} == {
+        f"{name}.{ending}" for name in FIGURES for ending in ("png", "svg")
+    }
+    assert len(images) == len(FIGURES)
+    for image in images:
+        assert len(image["alt"]) > 40
+        assert float(image["width"]) == pytest.approx(4.5 * 96)
+    for name, image in zip(names, images, strict=True):
+        assert b64decode(image["src"].partition(",")[2]) == (clamped_folder / "figures" / f"{name}.svg").read_bytes()
+
+
+def test_every_figure_is_a_picture_that_says_what_it_shows(clamped_folder):
+    for path in sorted((clamped_folder / "figures").glob("*.svg")):
+        tree = ElementTree.parse(path)
+        titles = [one.text for one in tree.iter("{http://www.w3.org/2000/svg}title")]
+        described = [one.text for one in tree.iter("{http://purl.org/dc/elements/1.1/}description")]
+        assert titles, path.name
+        assert all(titles), path.name
+        assert len(described[0] or "") > 40
+        assert path.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+        assert b"Description" in path.with_suffix(".png").read_bytes()
+
+
+def test_it_keeps_to_itself(page):
+    """No element but ours, no script, no address outside, and a policy that would stop one."""
+    (policy,) = [m["content"] for m in page.all("meta") if m.get("http-equiv") == "Content-Security-Policy"]
+    (style,) = re.findall(r"<style>(.*?)</style>", page.source, re.DOTALL)
+
+    assert faults(page) == []
+    digest = b64encode(sha256(style.encode()).digest()).decode()
+    allowed = f"img-src data:; style-src 'sha256-{digest}'"
+    assert policy == f"default-src 'none'; {allowed}; base-uri 'none'; form-action 'none'"
+    assert "url(" not in style
+    assert "@import" not in style
+
+
+def test_it_says_what_the_summary_says(page, clamped):
+    """The constants to two digits of their sd, every mode, the older methods, the seed, the versions."""
+    summary = clamped.summary
+    for name in ("E_x", "E_y", "G_xy"):
+        mean, sd = summary["elastic"][name]["mean"] / 1e9, summary["elastic"][name]["sd"] / 1e9
+        digits = 2 if sd >= 0.0995 else 3
+        assert f"{mean:.{digits}f} ± {sd:.{digits}f}" in page.text
+        assert f"{summary['least_squares'][name] / 1e9:.{digits}f}" in page.text
+    for mode in summary["modes"]:
+        assert f"{mode['residual_cents']:+.1f}" in page.text
+    for sentence in (*summary["identifiability"], *summary["warnings"]):
+        assert sentence in page.text
+    assert summary["card_sha256"] in page.text
+    assert all(f"{name} {version}" in page.text for name, version in summary["versions"].items())
+    for words in ("wave speed", "radiation ratio", "specific stiffness", "impedance", "E_x / E_y"):
+        assert words in page.text
+    assert "scikit-fem" in page.text
+    assert "Ducceschi" in page.text
+
+
+def test_derived_quantities_by_hand(page, clamped):
+    """c = sqrt(E / rho), c / rho, E / rho, c rho at 399 kg per cubic metre, from the mean modulus.
+
+    The mean of a root lies below the root of the mean by an eighth of the relative variance, here less than 0.02 %.
+    """
+    E, rho = clamped.summary["elastic"]["E_x"]["mean"], 399.0
+    by_hand = {
+        "wave_speed_x": np.sqrt(E / rho),
+        "radiation_ratio_x": np.sqrt(E / rho) / rho,
+        "specific_stiffness_x": E / rho,
+        "impedance_x": np.sqrt(E / rho) * rho,
+    }
+    for name, value in by_hand.items():
+        assert clamped.summary["derived"][name]["mean"] == pytest.approx(value, rel=5e-4), name
+
+
+def test_the_same_fit_gives_the_same_bytes(clamped, clamped_folder, tmp_path):
+    clamped.write(tmp_path / "again")
+
+    assert runs.files_in(tmp_path / "again") == runs.files_in(clamped_folder)
+
+
+def test_it_is_small(clamped_folder):
+    assert (clamped_folder / "report.html").stat().st_size < LARGEST
+
+
+@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
+def test_a_text_stays_a_text(clamped, payload):
+    """In the title, the source, and what a diagnosis says: literally, without marks that turn the writing around."""
+    found = DIAGNOSES["named"] | {
+        "recommendation": payload,
+        "candidates": [candidate(payload, payload, look_alikes=[payload], rejected_because=payload)],
+        "notes": [payload],
+    }
+    page = Read(clamped.page(payload, payload, found))
+    expected = " ".join(shown(payload).split())
+    text = " ".join(page.text.split())
+
+    assert faults(page) == []
+    assert text.count(expected) >= 6
+    assert not set(DIRECTION_MARKS) & set(page.source)
+
+
+def test_an_unescaped_text_would_be_noticed(clamped):
+    """The negative control of the test above: the same page with its escapes undone."""
+    page = clamped.page(PAYLOADS[4])
+
+    assert faults(Read(page)) == []
+    assert "element img" not in faults(Read(page))
+    broken = faults(Read(page.replace("&lt;", "<").replace("&gt;", ">").replace("&#34;", '"').replace("&#39;", "'")))
+    assert "img onerror" in broken
+
+
+@pytest.mark.parametrize("verdict", DIAGNOSES)
+def test_each_verdict_is_told_in_plain_words(clamped, verdict):
+    page = Read(clamped.page("A board", diagnosis=DIAGNOSES[verdict]))
+    text = " ".join(page.text.split())
+    told = {
+        "none needed": ("need no further effect", "no more than their noise"),
+        "named": ("An effect was found", "point to membrane tension.", "its low modes ring higher", "is reduced",
+                  "larger than on 99 % of simulated boards"),
+        "indistinguishable group": ("cannot tell which: membrane tension or air loading.", "No improvement is claimed"),
+        "unexplained": ("Something is missing that was not found", "Check the labels"),
+        "undetectable": ("These readings could not show it",),
+    }  # fmt: skip
+
+    for words in told[verdict]:
+        assert words in text
+    assert NEXT in text
+    is_refitted = verdict in ("named", "indistinguishable group")
+    assert ("Error before and after" in text) == is_refitted
+    assert ("Shift of the constants" in text) == is_refitted
+    assert ("46.5" in text, "9.5" in text, "+2.5" in text) == (True, is_refitted, is_refitted)
+    assert ("its visible part drowns in the noise" in text) == (verdict != "undetectable")
+    assert ("is reduced" in text) == (verdict == "named")
+
+
+def test_constants_averaged_over_the_effects_are_shown_where_they_are_given(clamped):
+    averaged = {"E_x": {"mean": 10.25e9, "sd": 0.5e9, "q05": 9.5e9, "q95": 11.0e9, "unit": "Pa"}}
+    text = Read(clamped.page("A board", diagnosis=DIAGNOSES["named"] | {"elastic_averaged": averaged})).text
+
+    assert "if any of the effects may be there" in text
+    assert "10.25 ± 0.50" in text
+    assert "9.50 to 11.00" in text
+
+
+def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path):
+    named = Read(clamped.write(tmp_path / "named", DIAGNOSES["named"]).read_text(encoding="utf-8"))
+    clamped.write(tmp_path / "none", DIAGNOSES["none needed"])
+    clamped.write(tmp_path / "hidden", DIAGNOSES["undetectable"])
+    added = {name: {path.stem for path in (tmp_path / name / "figures").iterdir()} - set(FIGURES)
+             for name in ("named", "none", "hidden")}  # fmt: skip
+
+    assert added == {"named": {"before-after", "signatures"}, "none": {"signatures"}, "hidden": set()}
+    assert len(named.all("img")) == len(FIGURES) + 2
+    assert (tmp_path / "named" / "before-after.csv").exists()
+
+
+def test_visible_keeps_joined_emoji_and_turns_breaks_into_spaces():
+    assert visible("a\nb\tc") == "a b c"
+    assert visible("\U0001f469\u200d\U0001f527") == "\U0001f469\u200d\U0001f527"
+    assert visible("\u202ex\u202c\x07\x1b[0m\ufeff") == "x[0m"

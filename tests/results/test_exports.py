@@ -1,0 +1,113 @@
+"""Tables for other programs: numbers at full precision, and no text that a program would run."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+from diagnoses import DIAGNOSES
+from payloads import PAYLOADS
+
+from bayesplate.results.exports import (
+    before_after_csv,
+    before_after_tex,
+    constants_csv,
+    constants_tex,
+    csv_text,
+    latex,
+    write_exports,
+)
+
+SPREAD = {"mean": 10.5, "sd": 0.25, "q05": 10.0, "q25": 10.25, "q50": 10.5, "q75": 10.75, "q95": 11.0}
+POINT = {"E_x": 10.25e9, "E_y": None, "G_xy": 0.5e9, "D_x": 10.0, "D_y": 1.0, "D_s": 2.0}
+SUMMARY = {
+    "seed": 1,
+    "modes": [{}] * 6,
+    "elastic": {
+        name: {**{key: value * 1e9 for key, value in SPREAD.items()}, "unit": "Pa"} for name in ("E_x", "E_y", "G_xy")
+    },
+    "rigidity": {name: {**SPREAD, "unit": "N m"} for name in ("D_x", "D_y", "D_s")},
+    "least_squares": POINT,
+    "weighted_least_squares": POINT,
+    "percentile": {
+        "E_x": {"mean": 10e9, "sd_percent": 2.0}, "E_y": {"mean": None, "sd_percent": None},
+        "G_xy": {"mean": 0.5e9, "sd_percent": None},
+    },
+}  # fmt: skip
+
+
+def read(text):
+    header, *rows = csv.reader(io.StringIO(text))
+    return {row[0]: dict(zip(header, row, strict=True)) for row in rows}
+
+
+def test_constants_keep_their_numbers():
+    rows = read(constants_csv(SUMMARY))
+
+    assert list(rows) == ["E_x", "E_y", "G_xy", "D_x", "D_y", "D_s"]
+    assert {key: float(rows["E_x"][key]) for key in SPREAD} == pytest.approx(SPREAD)
+    assert {key: float(rows["D_s"][key]) for key in SPREAD} == SPREAD
+    assert (rows["E_x"]["unit"], rows["D_x"]["unit"]) == ("GPa", "N m")
+    assert float(rows["E_x"]["least_squares"]) == pytest.approx(10.25)
+    assert float(rows["E_x"]["percentile_sd_percent"]) == 2.0
+    assert rows["E_y"]["least_squares"] == rows["E_y"]["percentile_mean"] == rows["D_x"]["percentile_mean"] == ""
+
+
+def test_no_percentile_leaves_its_cells_empty():
+    assert read(constants_csv(SUMMARY | {"percentile": None}))["E_x"]["percentile_mean"] == ""
+
+
+def test_before_and_after_in_one_table():
+    rows = read(before_after_csv(DIAGNOSES["named"]))
+
+    assert rows["error in the fit, rms cents"] | {"quantity": ""} == {
+        "quantity": "", "before": "21.25", "after": "4.25", "shift_in_sd": "",
+    }  # fmt: skip
+    assert float(rows["E_x, GPa"]["before"]) == pytest.approx(10.25)
+    assert float(rows["E_x, GPa"]["shift_in_sd"]) == 2.5
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1", *PAYLOADS])
+def test_no_text_becomes_a_formula(text):
+    written = csv_text([[text, -1.5, 2, None]])
+    (cells,) = csv.reader(io.StringIO(written, newline=""), strict=True)
+
+    assert not cells[0].lstrip(" ").startswith(("=", "+", "-", "@", "\t", "\r"))
+    assert cells[0].removeprefix("'" if not text.startswith("'") else "") == " ".join(text.split())
+    assert cells[1:] == ["-1.5", "2", ""]
+
+
+def test_latex_prints_what_stands_there():
+    """By hand: every character that means something to LaTeX."""
+    assert latex("50 % & #1 $x_1^2$ {a} ~b\\c") == (
+        r"50 \% \& \#1 \$x\_1\textasciicircum{}2\$ \{a\} \textasciitilde{}b\textbackslash{}c"
+    )
+    assert latex("one\ntwo") == "one two"
+
+
+@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
+def test_a_title_cannot_break_the_tables(payload):
+    """It stands in a comment of one line: below it the table begins, and nothing else."""
+    for table in (constants_tex(SUMMARY, payload), before_after_tex(DIAGNOSES["named"], payload)):
+        comment, begin, *_, last = table.splitlines()
+
+        assert comment.startswith("% ")
+        assert begin.startswith(r"\begin{tabular}")
+        assert last == r"\end{tabular}"
+        assert payload not in table or not set("\\{}$&#^_~%<>|\"") & set(payload)
+
+
+def test_tables_have_as_many_cells_as_columns():
+    for table in (constants_tex(SUMMARY, "x"), before_after_tex(DIAGNOSES["named"], "x")):
+        rows = [line for line in table.splitlines() if line.endswith(r"\\")]
+        columns = table.splitlines()[1].rpartition("{")[2].rstrip("}")
+
+        assert {row.count(" & ") + 1 for row in rows} == {len(columns)}
+    assert r"$E_{x}$ & $10.50 \pm 0.25$ & 10.00 to 11.00 & 10.25 & 10.25 \\" in constants_tex(SUMMARY, "x")
+
+
+def test_the_files(tmp_path):
+    assert [path.name for path in write_exports(tmp_path, SUMMARY, "x")] == ["constants.csv", "constants.tex"]
+    assert len(write_exports(tmp_path, SUMMARY, "x", DIAGNOSES["named"])) == 4
+    assert len(list(tmp_path.iterdir())) == 4

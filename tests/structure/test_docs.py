@@ -1,0 +1,87 @@
+"""What the documentation may say: commands and options that exist, cards that load, no output typed by hand."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from bayesplate.cli import main
+from bayesplate.errors import InputError
+from bayesplate.workflow.prepare import prepare
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted(
+    path for path in (ROOT / "docs").rglob("*.md") if not {"_build", "_generated"} & set(path.relative_to(ROOT).parts)
+)
+CARDS = sorted((ROOT / "docs" / "cards").glob("*.toml"))
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+COMMAND = re.compile(r"(?:\$ |`|\{command\} |^    )(?:bayesplate )([a-z]+)", re.MULTILINE)
+RUN = re.compile(r"\{command\} ([a-z]+)")
+OPTION = re.compile(r"`?(--[a-z][a-z-]*)")
+DRAWN = set("┏┃┡│└━")
+
+
+def known_options() -> set[str]:
+    """Every option of every command."""
+    return {word for command in main.commands.values() for parameter in command.params for word in parameter.opts}
+
+
+def faults_of(text: str) -> list[str]:
+    """What a page says that is not so."""
+    commands = [*COMMAND.findall(text), *RUN.findall(text)]
+    found = [f"no command {name}" for name in commands if name not in main.commands]
+    known = known_options() | {word for parameter in main.params for word in parameter.opts} | {"--help"}
+    found += [f"no option {name}" for name in OPTION.findall(text) if name not in known]
+    if DRAWN & set(text):
+        found.append("output typed by hand")
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_a_page_says_only_what_is(page):
+    assert faults_of(page.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("$ bayesplate fitt my-board.toml", "no command fitt"),
+        ("```{command} chek my-board.toml", "no command chek"),
+        ("try `--resumee`", "no option --resumee"),
+        ("│ E_x │ 13.3 │", "output typed by hand"),
+    ],
+)
+def test_what_is_not_so_is_found(text, fault):
+    """The negative control."""
+    assert faults_of(text) == [fault]
+
+
+@pytest.mark.parametrize("card", CARDS, ids=lambda path: path.stem)
+def test_a_card_of_the_documentation_loads_unless_its_name_says_otherwise(card):
+    if card.stem.endswith("with-faults"):
+        with pytest.raises(InputError, match="did you mean thickness_mm") as refused:
+            prepare(card)
+        assert len(refused.value.faults) == 5
+    else:
+        board = prepare(card, may_lack_frequencies=True).board
+        assert board.name == card.stem
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_can_be_shown_in_the_gallery_and_is_tested(example):
+    """A title in one line, how to run it, and a test of its own."""
+    docstring = ast.get_docstring(ast.parse(example.read_text(encoding="utf-8"))) or ""
+
+    assert docstring.splitlines()[1] == ""
+    assert f"\n\n    python examples/{example.name}" in docstring
+    assert (ROOT / "tests" / "examples" / f"test_{example.name}").exists()
+
+
+def test_there_is_something_to_read():
+    assert len(PAGES) > 10
+    assert len(CARDS) > 3
+    assert {path.stem for path in EXAMPLES} >= {"posterior_analysis", "percentile_comparison", "uncertainty_report"}

@@ -1,0 +1,243 @@
+"""`diagnose` from card to files: the contract of diagnosis.json, the two fits, and folders that are there already."""
+
+from __future__ import annotations
+
+import signal
+from functools import partial
+from pathlib import Path
+
+import pytest
+import runs
+from click.testing import CliRunner
+from runs import files_in, read_json
+
+from bayesplate.cli import main
+from bayesplate.diagnosis.search import prepare_search
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.sampling import SamplerSettings
+
+WITH_SHEAR = "paper-cantilever-fe"
+CALM = "fiemme-spruce-clamped"
+WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
+KEYS = {
+    "format", "verdict", "claim", "effects", "before", "after", "gain_null_percentile", "elastic_shift", "candidates",
+    "recommendation",
+}  # fmt: skip
+ERRORS = {
+    "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
+}  # fmt: skip
+CANDIDATE = {
+    "name", "setup", "raw_rms_cents", "visible_rms_cents", "bias_percent", "inclusion_probability", "amplitude",
+    "look_alikes", "rejected_because",
+}  # fmt: skip
+MODULI = {"E_x", "E_y", "G_xy"}
+FIT = {"summary.json", "posterior.nc"}
+TRIED = ("transverse_shear", "clamp_rotation")
+LOOSE_GATE = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
+
+
+def diagnose(folder: Path, *arguments: str) -> runs.Run:
+    result = CliRunner().invoke(main, ["diagnose", *arguments, "--out", str(folder)])
+    return runs.Run(result.exit_code, result.stdout, result.stderr, folder)
+
+
+def quickly(patch: pytest.MonkeyPatch) -> None:
+    """Two candidates, and a sampler whose first judgement passes."""
+    patch.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+    patch.setattr("bayesplate.workflow.diagnose.prepare_search", partial(prepare_search, tried=TRIED))
+    patch.setattr("bayesplate.workflow.diagnose.write_page", lambda *_: None)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    quickly(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def with_shear(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
+    """A board whose readings name shear, among two candidates."""
+    with pytest.MonkeyPatch.context() as patch:
+        quickly(patch)
+        return diagnose(tmp_path_factory.mktemp("named") / "out", WITH_SHEAR, "--json")
+
+
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
+    """A board that needs nothing, among two candidates."""
+    with pytest.MonkeyPatch.context() as patch:
+        quickly(patch)
+        return diagnose(tmp_path_factory.mktemp("calm") / "out", CALM)
+
+
+def told(run: runs.Run):
+    return read_json((run.folder / "diagnosis.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("which", ["with_shear", "calm"])
+def test_diagnosis_json_keeps_its_contract(which, request):
+    run = request.getfixturevalue(which)
+    assert run.exit_code == 0, run.stderr
+    found = told(run)
+    assert set(found) >= KEYS
+    assert found["format"] == 1
+    assert found["verdict"] in WORDS
+    assert isinstance(found["claim"], bool)
+    assert set(found["before"]) == ERRORS
+    assert set(found["after"]) == ERRORS
+    assert set(found["elastic_shift"]) == MODULI
+    assert all(set(one) >= {"before", "after", "shift_in_sd"} for one in found["elastic_shift"].values())
+    assert {one["name"] for one in found["candidates"]} >= set(TRIED)
+    for one in found["candidates"]:
+        assert set(one) >= CANDIDATE
+        assert 0.0 <= one["inclusion_probability"] <= 1.0
+        assert (one["rejected_because"] is None) == (one["name"] in found["effects"])
+        assert one["amplitude"] is None or set(one["amplitude"]) >= {"q05", "q50", "q95", "unit"}
+        assert one["bias_percent"] is None or set(one["bias_percent"]) == MODULI
+    assert 0.0 <= found["gain_null_percentile"] <= 100.0
+    assert found["recommendation"].endswith(".")
+
+
+def test_what_is_printed_as_json_is_what_is_written(with_shear):
+    assert read_json(with_shear.stdout) == told(with_shear)
+
+
+def test_after_a_refit_the_summary_is_of_the_refitted_model_and_before_holds_the_first(with_shear):
+    found = told(with_shear)
+    assert found["effects"] == ["transverse_shear"]
+    assert FIT | {"diagnosis.json"} == {name for name in with_shear.files if not name.startswith("before/")}
+    assert {f"before/{name}" for name in FIT} == {name for name in with_shear.files if name.startswith("before/")}
+    first = read_json((with_shear.folder / "before" / "summary.json").read_text(encoding="utf-8"))
+    after = with_shear.summary
+    assert first["model"]["effects"] == []
+    assert after["model"]["effects"] == ["transverse_shear"]
+    assert (first["model"]["theory"], after["model"]["theory"]) == ("thin", "shear-flexible")
+    for side, summary in (("before", first), ("after", after)):
+        assert found[side]["in_sample_rms_cents"] == summary["error"]["in_sample_rms_cents"]
+        for name in MODULI:
+            assert found["elastic_shift"][name][side] == summary["elastic"][name]["mean"]
+    assert after["error"]["in_sample_rms_cents"] < 0.5 * first["error"]["in_sample_rms_cents"]
+
+
+def test_without_a_refit_there_is_no_before_and_nothing_changes(calm):
+    found = told(calm)
+    assert found["effects"] == []
+    assert set(calm.files) == FIT | {"diagnosis.json"}
+    assert found["before"] == found["after"]
+    assert all(one["shift_in_sd"] == 0 for one in found["elastic_shift"].values())
+    assert found["claim"] is False
+    assert f"Verdict: {found['verdict']}." in calm.stdout
+    assert found["verdict"] in ("none needed", "undetectable")
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, quick, with_shear):
+    again = diagnose(tmp_path / "again", WITH_SHEAR, "--quiet")
+    other = diagnose(tmp_path / "other", WITH_SHEAR, "--quiet", "--seed", "2")
+    assert again.stdout == ""
+    assert again.files == with_shear.files
+    assert other.files["summary.json"] != with_shear.files["summary.json"]
+
+
+def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_path, quick, with_shear):
+    folder = tmp_path / "out"
+    for name, content in with_shear.files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    (folder / "notes.txt").write_bytes(b"mine")
+    refused = diagnose(folder, CALM)
+    assert refused.exit_code == 3
+    assert refused.files == {**with_shear.files, "notes.txt": b"mine"}
+
+    forced = diagnose(folder, CALM, "--force", "--quiet")
+    assert forced.exit_code == 0
+    assert set(forced.files) == FIT | {"diagnosis.json", "notes.txt"}
+    assert not (folder / "before").exists()
+
+
+def test_what_somebody_else_keeps_in_before_stays(tmp_path, quick):
+    folder = tmp_path / "out"
+    (folder / "before").mkdir(parents=True)
+    (folder / "before" / "notes.txt").write_bytes(b"mine")
+    assert diagnose(folder, CALM, "--force", "--quiet").files["before/notes.txt"] == b"mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [(("no-such-board",), 3), ((CALM, "--effects", "no_such_effect"), 3), ((CALM, "--force", "--resume"), 2)],
+)
+def test_refused_input_leaves_no_folder(tmp_path, arguments, code):
+    run = diagnose(tmp_path / "out", *arguments)
+    assert run.exit_code == code
+    assert not run.folder.exists()
+    assert "Traceback" not in run.stderr
+
+
+def test_too_few_readings_leave_no_folder(tmp_path):
+    lines = (Path(runs.__file__).parents[1] / "models/boards/fiemme-spruce-clamped.toml").read_text().splitlines()
+    card = tmp_path / "few.toml"
+    kept = [line for line in lines if not line.startswith(('"(0,1)', '"(1,0)', '"(1,1)', '"(1,2)'))]
+    card.write_text("\n".join(kept).replace(CALM, "few") + "\n", encoding="utf-8")
+    run = diagnose(tmp_path / "out", str(card))
+    assert run.exit_code == 4
+    assert not run.folder.exists()
+
+
+def test_there_is_nothing_to_resume(tmp_path):
+    folder = tmp_path / "out"
+    assert diagnose(folder, CALM, "--resume").exit_code == 6
+    (folder / "checkpoint" / "linear").mkdir(parents=True)
+    run = diagnose(folder, CALM, "--resume")
+    assert run.exit_code == 6
+    assert "none to resume" in run.stderr
+
+
+@pytest.mark.parametrize("place", ["prepare_search", "_case"])
+def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, monkeypatch, with_shear, place):
+    """Stopped after the first fit, and after both."""
+
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"bayesplate.workflow.diagnose.{place}", stop)
+        stopped = diagnose(tmp_path / "out", WITH_SHEAR)
+    assert stopped.exit_code == 130
+    assert "--resume continues" in stopped.stderr
+    assert not (FIT | {"diagnosis.json"}) & set(stopped.files)
+    assert any(name.startswith("checkpoint/before/") for name in stopped.files)
+
+    assert diagnose(tmp_path / "out", WITH_SHEAR, "--resume", "--seed", "2").exit_code == 6
+    resumed = diagnose(tmp_path / "out", WITH_SHEAR, "--resume", "--quiet")
+    assert resumed.exit_code == 0, resumed.stderr
+    assert resumed.files == with_shear.files
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_sampling_is_heeded_and_the_run_resumes(tmp_path, stop):
+    """The whole of it, all candidates, in a process of its own."""
+    import os
+    import subprocess
+    import sys
+    import time
+
+    def heed_interrupts() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    folder = tmp_path / "out"
+    program = [sys.executable, "-m", "bayesplate.cli", "diagnose", CALM, "--out", str(folder), "--quiet"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(program, **pipes, text=True, env=dict(os.environ), preexec_fn=heed_interrupts) as process:
+        chunk = folder / "checkpoint" / "before" / "linear" / "chunk-0000.npz"
+        deadline = time.monotonic() + 120
+        while not chunk.exists() and process.poll() is None:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.send_signal(stop)
+        _, stderr = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert stderr == "interrupted; --resume continues from the last checkpoint\n"
+    assert not (FIT | {"diagnosis.json"}) & set(files_in(folder))
+
+    assert diagnose(folder, CALM, "--resume", "--quiet").exit_code == 0
+    whole = diagnose(tmp_path / "whole", CALM, "--quiet")
+    assert files_in(folder) == whole.files
