@@ -4,7 +4,7 @@ PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: fit test docs calibration trial benchmarks
+.PHONY: fit test docs calibration coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force

@@ -1,9 +1,9 @@
 """Closing the loop: from a measured board's residual to an effect, and the error before and after.
 
 Eight boards go through the same steps: fit, find the residual, search for an effect that the plate lacks, add it
-where the readings name one, and compare the errors. Two columns of computed frequencies come from a shear-flexible finite
-element model of somebody else; the ideal plate that is fitted to them knows nothing of shear, and the search has to find
-it. The other boards are measured, and what their readings cannot tell is said as plainly as what they can.
+where the readings name one, and compare the errors. Two columns of computed frequencies come from a shear-flexible
+finite element model of somebody else; the ideal plate that is fitted to them knows nothing of shear, and the search has
+to find it. The other boards are measured, and what their readings cannot tell is said as plainly as what they can.
 
     python examples/closing_the_loop.py --out closing-the-loop
 

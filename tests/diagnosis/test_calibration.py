@@ -53,7 +53,7 @@ def found_in(ground, readings):
     return probabilities(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, readings))
 
 
-@pytest.mark.parametrize("board", ["finnish", "simulated"])
+@pytest.mark.parametrize("board", ["finnish", pytest.param("simulated", marks=pytest.mark.slow)])
 def test_probabilities_are_frequencies(board, request):
     ground = request.getfixturevalue(board).ground
     drawn, readings = simulated_sets(ground, np.random.default_rng(1), N_SETS)

@@ -53,13 +53,13 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         "exact 95 % bounds (Clopper and Pearson). A bar is met if the bound that could break it does not; one that is "
         "missed stays here as missed.",
         "",
-        "Two runs with other base seeds came first. After a pilot of 340 boards the grain was planted at most five "
-        "degrees off, for six is where its prior ends; the card of the clamped board calls its sensor a shaker; and the "
-        "bar on the constants is put on intervals averaged over all hypotheses, with those of the verdict alone beside "
-        "them. A run that was stopped after 1000 boards showed that modes must be followed by their shapes, not by their "
-        "ranks, where an effect breaks the symmetry (boards that veer ended as unexplained); that the planted sensor "
-        "lacked the rotary inertia which the card promises; and that a Poisson ratio leaves no visible trace on a board "
-        "clamped all round, where it is no longer planted.",
+        "Two runs with other base seeds came first. After a pilot of 340 boards the grain was planted at most "
+        "five degrees off, for six is where its prior ends; the card of the clamped board calls its sensor a "
+        "shaker; and the bar on the constants is put on intervals averaged over all hypotheses, with those of the "
+        "verdict alone beside them. A run that was stopped after 1000 boards showed that modes must be followed "
+        "by their shapes, not by their ranks, where an effect breaks the symmetry (boards that veer ended as "
+        "unexplained); that the planted sensor lacked the rotary inertia which the card promises; and that a "
+        "Poisson ratio leaves no visible trace on a board clamped all round, where it is no longer planted.",
         "",
         f"{boards['judged']} boards of {boards['wanted']} judged, {boards['failed']} gave no answer, base seed "
         f"{summary['base_seed']}.",

@@ -129,6 +129,7 @@ def test_without_a_refit_there_is_no_before_and_nothing_changes(calm):
     assert found["verdict"] in ("none needed", "undetectable")
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, quick, with_shear):
     again = diagnose(tmp_path / "again", WITH_SHEAR, "--quiet")
     other = diagnose(tmp_path / "other", WITH_SHEAR, "--quiet", "--seed", "2")
@@ -190,7 +191,7 @@ def test_there_is_nothing_to_resume(tmp_path):
     assert "none to resume" in run.stderr
 
 
-@pytest.mark.parametrize("place", ["prepare_search", "_case"])
+@pytest.mark.parametrize("place", [pytest.param("prepare_search", marks=pytest.mark.slow), "_case"])
 def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, monkeypatch, with_shear, place):
     """Stopped after the first fit, and after both."""
 
