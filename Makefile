@@ -18,13 +18,13 @@ docs: $(VENV)/tested-with
 	$(BIN)/python -m sphinx -W --keep-going -n -b html docs docs/_build/html
 
 calibration: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl
+	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl --publish docs/validation
 
 trial: $(VENV)/tested-with
 	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl
 
 coverage: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl
+	$(BIN)/python tests/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl --publish docs/validation
 
 benchmarks: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/run.py

@@ -1,25 +1,14 @@
-"""The command line: options in, tables and exit codes out; no logic of its own."""
+"""The command line: commands and their options; no logic of its own."""
 
 from __future__ import annotations
 
-import json
 import os
-import signal
-import sys
-import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import click
 
-from bayesplate.errors import BayesplateError
-
-if TYPE_CHECKING:
-    from bayesplate.workflow.shown import Progress, Shown
-
-INTERRUPTED = 130
-INTERNAL = 70
+from bayesplate.terminal import print_json, print_shown, progress_line, reporting
 
 
 class Commands(click.Group):
@@ -91,15 +80,15 @@ def main() -> None:
 @_options("effects", "json", "quiet", "debug")
 def check(card: str, effects: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
     """Every fault of CARD, or what would be fitted and what it can identify."""
-    with _reporting(as_json=as_json, debug=debug):
+    with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.check import check as run
         from bayesplate.workflow.shown import show_check
 
         report = run(card, effects=_names(effects))
         if as_json:
-            _print_json(report)
+            print_json(report)
         elif not quiet:
-            _print(show_check(report))
+            print_shown(show_check(report))
 
 
 @main.command()
@@ -122,8 +111,8 @@ def fit(
     """Posterior of the elastic constants of CARD: report.html, summary.json, posterior.nc."""
     if force and resume:
         raise click.UsageError("--force starts anew and --resume continues: give one of them.")
-    with _reporting(as_json=as_json, debug=debug, resumable=True):
-        with _progress(shown=not quiet and not as_json) as tell:
+    with reporting(as_json=as_json, debug=debug, resumable=True):
+        with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.fit import fit as run
 
             result = run(
@@ -139,11 +128,11 @@ def fit(
                 progress=tell,
             )
         if as_json:
-            _print_json(result.summary)
+            print_json(result.summary)
         elif not quiet:
             from bayesplate.workflow.shown import show_fit
 
-            _print(show_fit(result.summary))
+            print_shown(show_fit(result.summary))
             click.echo(f"written to {result.folder}")
 
 
@@ -154,15 +143,15 @@ def modes(
     card: str, out: str | None, seed: int, effects: str | None, force: bool, as_json: bool, quiet: bool, debug: bool
 ) -> None:
     """Table of the lowest modes of CARD, and a sheet of Chladni figures."""
-    with _reporting(as_json=as_json, debug=debug):
+    with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.modes import modes as run
         from bayesplate.workflow.shown import show_modes
 
         result = run(card, out=out, seed=seed, effects=_names(effects), force=force)
         if as_json:
-            _print_json(result.report)
+            print_json(result.report)
         elif not quiet:
-            _print(show_modes(result.report))
+            print_shown(show_modes(result.report))
 
 
 @main.command()
@@ -180,8 +169,8 @@ def compare(
     debug: bool,
 ) -> None:
     """Every method on CARD side by side, as a thin and as a shear-flexible plate."""
-    with _reporting(as_json=as_json, debug=debug):
-        with _progress(shown=not quiet and not as_json) as tell:
+    with reporting(as_json=as_json, debug=debug):
+        with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.compare import compare as run
 
             result = run(
@@ -194,11 +183,11 @@ def compare(
                 progress=tell,
             )
         if as_json:
-            _print_json(result)
+            print_json(result)
         elif not quiet:
             from bayesplate.workflow.shown import show_compare
 
-            _print(show_compare(result))
+            print_shown(show_compare(result))
 
 
 @main.command()
@@ -218,19 +207,17 @@ def diagnose(
     """Trace the residual of CARD to an effect, add it, and report the error before and after."""
     if force and resume:
         raise click.UsageError("--force starts anew and --resume continues: give one of them.")
-    with _reporting(as_json=as_json, debug=debug, resumable=True):
-        with _progress(shown=not quiet and not as_json) as tell:
+    with reporting(as_json=as_json, debug=debug, resumable=True):
+        with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.diagnose import diagnose as run
 
-            result = run(
-                card, out=out, seed=seed, effects=_names(effects), force=force, resume=resume, progress=tell
-            )
+            result = run(card, out=out, seed=seed, effects=_names(effects), force=force, resume=resume, progress=tell)
         if as_json:
-            _print_json(result.diagnosis)
+            print_json(result.diagnosis)
         elif not quiet:
             from bayesplate.workflow.shown import show_diagnosis
 
-            _print(show_diagnosis(result.diagnosis))
+            print_shown(show_diagnosis(result.diagnosis))
             click.echo(f"written to {result.folder}")
 
 
@@ -239,41 +226,15 @@ def diagnose(
 @_options("effects", "json", "quiet", "debug")
 def cite(card: str, effects: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
     """References of exactly what a fit of CARD uses."""
-    with _reporting(as_json=as_json, debug=debug):
+    with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.cite import cite as run
         from bayesplate.workflow.cite import cite_text
 
         sections = run(card, effects=_names(effects))
         if as_json:
-            _print_json({section.title.lower(): list(section.entries) for section in sections})
+            print_json({section.title.lower(): list(section.entries) for section in sections})
         elif not quiet:
             click.echo(cite_text(sections), nl=False)
-
-
-def _print(shown: Shown) -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(soft_wrap=False, highlight=False)
-    with console.capture() as printed:
-        for table in shown.tables:
-            laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
-            for i, column in enumerate(table.columns):
-                laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
-            for row in table.rows:
-                laid_out.add_row(*(Text(cell) for cell in row))
-            console.print(laid_out)
-        for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
-            console.print(Text(sentence))
-        console.print(Text(shown.closing))
-    click.echo(printed.get(), nl=False)  # rich itself would exit with 1 where a reader like `head` has closed the pipe
-
-
-def _print_json(content: Mapping[str, Any]) -> None:
-    from bayesplate.workflow.shown import json_text
-
-    click.echo(json_text(content), nl=False)
 
 
 def _names(effects: str | None) -> list[str] | None:
@@ -281,68 +242,6 @@ def _names(effects: str | None) -> list[str] | None:
     if effects is None:
         return None
     return [name.strip() for name in effects.split(",") if name.strip() not in ("", "none")]
-
-
-@contextmanager
-def _progress(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]:
-    """A status line on the standard error while sampling; a line now and then where that is no terminal."""
-    if not shown:
-        yield None
-        return
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    with console.status("reading the card and solving the plate") as status:
-
-        def tell(progress: Progress) -> None:
-            from bayesplate.workflow.shown import progress_text
-
-            text = progress_text(progress)
-            if console.is_terminal:
-                status.update(text)
-            elif progress.n_steps % 1000 == 0:
-                click.echo(text, err=True)
-
-        yield tell
-
-
-@contextmanager
-def _reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterator[None]:
-    """Turn errors into one message and an exit code, and signals to stop into an interruption."""
-
-    def interrupt(signum: int, frame: object) -> None:
-        signal.signal(signum, signal.SIG_IGN)  # a second one must not disturb the farewell of the first
-        raise KeyboardInterrupt
-
-    # A run in the background of a shell ignores interrupts, and goes on doing so.
-    heeded = [s for s in (signal.SIGTERM, signal.SIGINT) if signal.getsignal(s) != signal.SIG_IGN]
-    before = {s: signal.signal(s, interrupt) for s in heeded}
-    try:
-        yield
-    except BayesplateError as error:
-        if debug:
-            traceback.print_exc()
-        _fail(str(error), error.exit_code, as_json, [vars(fault) for fault in error.faults])
-    except KeyboardInterrupt:
-        remedy = "; --resume continues from the last checkpoint" if resumable else ""
-        _fail(f"interrupted{remedy}", INTERRUPTED, as_json)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
-    except Exception as error:
-        if debug:
-            traceback.print_exc()
-        _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", INTERNAL, as_json)
-    finally:
-        for heard, handler in before.items():
-            signal.signal(heard, handler)
-
-
-def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:
-    click.echo(message, err=True)
-    if as_json:
-        click.echo(json.dumps({"error": {"exit_code": code, "message": message, "faults": list(faults)}}, indent=2))
-    sys.exit(code)
 
 
 if __name__ == "__main__":

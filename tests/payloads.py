@@ -15,7 +15,7 @@ PAYLOADS = (
     "<meta http-equiv=refresh content='0;url=https://example.org/'>",
     "<base href='https://example.org/'>",
     "<details open ontoggle=\"document.title='owned'\">",
-    "\" onmouseover=\"document.title='owned'\" x=\"",
+    '" onmouseover="document.title=\'owned\'" x="',
     "' autofocus onfocus='document.title=1' x='",
     "<!-- a comment that does not end",
     "]]> <![CDATA[ owned",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.baseline import own_variance
 from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.search import Found
+from bayesplate.effects.words import effect_names
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
@@ -87,18 +88,14 @@ def recommendation(found: Found, effects: Sequence[str]) -> str:
         best = min(further, key=lambda option: option.likeness)
         if best.likeness < now.likeness:
             return (
-                f"{best.sentence}: the largest likeness among {_listed(effects[:_MOST_EFFECTS])} would fall from "
+                f"{best.sentence}: the largest likeness among {effect_names(effects[:_MOST_EFFECTS])} would fall from "
                 f"{now.likeness:.2f} to {best.likeness:.2f}."
             )
     best = max(further, key=lambda option: option.visibility)
     return (
-        f"{best.sentence}: the least visible of {_listed(effects[:_MOST_EFFECTS])} would show with "
+        f"{best.sentence}: the least visible of {effect_names(effects[:_MOST_EFFECTS])} would show with "
         f"{best.visibility:.1f} times the smallest trace that can be seen, {now.visibility:.1f} times now."
     )
-
-
-def _listed(effects: Sequence[str]) -> str:
-    return effects[0] if len(effects) == 1 else ", ".join(effects[:-1]) + " and " + effects[-1]
 
 
 def _boards(board: Board, values: Values) -> Iterator[tuple[str, Board]]:

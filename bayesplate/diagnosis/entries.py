@@ -14,8 +14,10 @@ from bayesplate.diagnosis.search import Candidate, Found
 from bayesplate.diagnosis.signatures import LOOK_ALIKE
 from bayesplate.diagnosis.verdict import Answer, Verdict, size_posterior
 from bayesplate.effects import EFFECTS
+from bayesplate.effects.words import effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.results.draws import finite
 
 Floats = NDArray[np.float64]
 Entry = dict[str, Any]
@@ -29,9 +31,9 @@ def candidate_entry(found: Found, verdict: Verdict, ranked: Sequence[Answer], on
     return {
         "name": one.name,
         "setup": _where(one),
-        "raw_rms_cents": rms(cents(one.raw)),
-        "visible_rms_cents": rms(cents(one.visible)),
-        "visible_cents": [float(value) for value in cents(one.visible)],
+        "raw_rms_cents": finite(rms(cents(one.raw))),
+        "visible_rms_cents": finite(rms(cents(one.visible))),
+        "visible_cents": [finite(float(value)) for value in cents(one.visible)],
         "below_sight": ground.is_below_sight(one.name),
         "bias_percent": _bias(found, one),
         "inclusion_probability": found.inclusion(one.name),
@@ -59,7 +61,7 @@ def relabelling_entries(found: Found, verdict: Verdict) -> list[Entry]:
             continue
         pair = [labels[one.swap.first], labels[one.swap.second]]
         setup = ground.baseline.board.setups[ground.baseline.setup_index[one.swap.first]]
-        accepted = i == verdict.index
+        accepted = i == verdict.index or RELABELLING in verdict.effects
         entries.append(
             {
                 "name": RELABELLING,
@@ -144,7 +146,7 @@ def _rejection(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: s
     if verdict.word == "unexplained" and verdict.best is not None and name in verdict.best.members:
         return verdict.reason
     best = ranked[0]
-    return f"less probable ({found.inclusion(name):.3f}) than {' and '.join(best.members)} ({best.support:.3f})"
+    return f"less probable ({found.inclusion(name):.3f}) than {effect_names(best.members)} ({best.support:.3f})"
 
 
 def rms(values: Floats) -> float:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
+from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.results.tables import Table, decimals
 
 _GPA = 1e9
@@ -24,9 +25,9 @@ def verdict_sentence(diagnosis: Mapping[str, Any]) -> str:
     """The verdict, its reason, and whether a lower error may be claimed."""
     word, effects = diagnosis["verdict"], diagnosis["effects"]
     if word == "named":
-        meaning = f"The readings name {_listed(effects, 'and')}"
+        meaning = f"The readings name {effect_names(effects)}"
     elif word == "indistinguishable group":
-        meaning = f"The readings ask for one of {_listed(effects, 'or')}, and cannot tell which"
+        meaning = f"The readings ask for one of {effect_names(effects, 'or')}, and cannot tell which"
     else:
         meaning = _MEANING[word]
     sentence = f"Verdict: {word}. {meaning}: {diagnosis['reason']}."
@@ -45,7 +46,7 @@ def errors_table(diagnosis: Mapping[str, Any]) -> Table:
     rows = [(words, _cents(before[key]), _cents(after[key])) for key, words in _ERRORS]
     rows.append(("log score, left out", _cents(before["log_score"]), _cents(after["log_score"])))
     rows.append(("readings within the 90 % band", f"{before['hits_90']:.0%}", f"{after['hits_90']:.0%}"))
-    added = _listed(diagnosis["refitted"], "and") if diagnosis["refitted"] else "nothing added"
+    added = effect_names(diagnosis["refitted"]) if diagnosis["refitted"] else "nothing added"
     return Table(f"Error of {diagnosis['name']} before and after", ("", "before", f"after: {added}"), tuple(rows))
 
 
@@ -64,7 +65,7 @@ def candidates_table(diagnosis: Mapping[str, Any]) -> Table:
     ordered = sorted(diagnosis["candidates"], key=lambda one: -one["inclusion_probability"])
     rows = [
         (
-            one["name"] + (f" {' / '.join(one['labels'])}" if "labels" in one else ""),
+            effect_name(one["name"]) + (f" {' / '.join(one['labels'])}" if "labels" in one else ""),
             _cents(one["raw_rms_cents"]),
             _cents(one["visible_rms_cents"]),
             f"{one['inclusion_probability']:.3f}",
@@ -98,7 +99,3 @@ def _size(amplitude: Mapping[str, Any] | None) -> str:
 
 def _cents(value: float | None) -> str:
     return "" if value is None else f"{value:.1f}"
-
-
-def _listed(names: Sequence[str], word: str) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {word} {names[-1]}"

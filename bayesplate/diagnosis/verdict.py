@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.folds import NEEDED
 from bayesplate.diagnosis.gate import PASSES
 from bayesplate.diagnosis.search import Found
+from bayesplate.effects.words import effect_names
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -111,15 +112,23 @@ def decide(found: Found) -> Verdict:
     passed = found.passes(best.index)
     if passed < PASSES:
         return Verdict(
-            "unexplained", (), 0, best, f"with {_names(best)} the misfit is still too large (gate {passed:.3f})"
+            "unexplained",
+            (),
+            0,
+            best,
+            f"with {effect_names(best.members)} the misfit is still too large (gate {passed:.3f})",
         )
     limit = at_limit(found, best.index)
     if limit:
-        return Verdict("unexplained", (), 0, best, f"{_names(best)} fits only at the limit of its range: {limit}")
+        return Verdict(
+            "unexplained", (), 0, best, f"{effect_names(best.members)} fits only at the limit of its range: {limit}"
+        )
     rivals = [one for one in ranked[1:] if one.support * WITHIN >= best.support]
     nearest = max((one.support for one in rivals), default=0.0)
     if best.support >= CLEARLY * nearest:
-        return Verdict("named", best.members, best.index, best, f"{_names(best)} has no rival within a factor 3")
+        return Verdict(
+            "named", best.members, best.index, best, f"{effect_names(best.members)} has no rival within a factor 3"
+        )
     group = tuple(dict.fromkeys(name for one in (best, *rivals) for name in one.members))
     return Verdict(
         "indistinguishable group", group, best.index, best, "several explanations are about equally probable"
@@ -198,10 +207,6 @@ def _is_extreme(prior: Quantity, z: float) -> bool:
     near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
     near_bottom = np.isfinite(low) and not starts_at_nothing and (ndtr(z) - ndtr(low)) / whole < AT_LIMIT
     return bool(near_top or near_bottom)
-
-
-def _names(answer: Answer) -> str:
-    return " and ".join(answer.members)
 
 
 def alternatives(found: Found, ranked: Sequence[Answer]) -> tuple[Answer, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -82,12 +83,17 @@ class OutlineProfile(Effect):
 
     def adjusted(self, values: Values) -> Values:
         """The widest width for the sides of the rectangle, and the density that leaves a given mass as it is."""
+        mean, widest = self._mean_and_widest
+        corrected = {"density": density(values) / mean} if "mass" in values else {}
+        return {**values, "length_y": values["length_y"] * widest, **corrected}
+
+    @cached_property
+    def _mean_and_widest(self) -> tuple[float, float]:
         width = self._widths(np.linspace(0.0, 1.0, _MEAN_POINTS + 1))
-        corrected = {"density": density(values) / width.mean()} if "mass" in values else {}
-        return {**values, "length_y": values["length_y"] * width.max(), **corrected}
+        return float(width.mean()), float(width.max())
 
     def _limits(self, x: Floats) -> tuple[Floats, Floats]:
-        widest = self._widths(np.linspace(0.0, 1.0, _MEAN_POINTS + 1)).max()
+        widest = self._mean_and_widest[1]
         missing = 1.0 - np.minimum(self._widths(self.part_x.on_whole(x)) / widest, 1.0)
         low, high = {
             ("free", True): (0.5 * missing, 1.0 - 0.5 * missing),

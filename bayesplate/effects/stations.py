@@ -12,6 +12,7 @@ Floats = NDArray[np.float64]
 
 _BEYOND = 0.5
 _FEWEST_FOR_CURVATURE = 9
+_MEAN_POINTS = 200
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class Stations:
         """Values at points: arrays that broadcast."""
         if self._grid is None:
             return self._fitted(x, y)
-        i, s = _between(x, np.unique(self.x))
-        j, t = _between(y, np.unique(self.y))
+        i, s = _between(x, self._axes[0])
+        j, t = _between(y, self._axes[1])
         grid = self._grid
         low = grid[i, j] * (1.0 - t) + grid[i, j + 1] * t
         high = grid[i + 1, j] * (1.0 - t) + grid[i + 1, j + 1] * t
@@ -52,9 +53,20 @@ class Stations:
         return len(set(self.y)) > 1
 
     @cached_property
+    def _axes(self) -> tuple[Floats, Floats]:
+        """The places along each side, increasing, each once."""
+        return np.unique(self.x), np.unique(self.y)
+
+    @cached_property
+    def mean(self) -> float:
+        """Mean over the unit square."""
+        middle = (np.arange(_MEAN_POINTS) + 0.5) / _MEAN_POINTS
+        return float(np.mean(self(middle[:, None], middle)))
+
+    @cached_property
     def _grid(self) -> Floats | None:
         """Means of the readings at each place of the grid, with its last row and column twice; None: not a grid."""
-        at_x, at_y = np.unique(self.x), np.unique(self.y)
+        at_x, at_y = self._axes
         rows, columns = np.searchsorted(at_x, self.x), np.searchsorted(at_y, self.y)
         counts, sums = np.zeros((2, at_x.size, at_y.size))
         np.add.at(counts, (rows, columns), 1.0)

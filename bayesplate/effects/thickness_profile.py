@@ -8,8 +8,6 @@ from functools import partial
 from math import comb
 from typing import ClassVar
 
-import numpy as np
-
 from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
 from bayesplate.effects.stations import Stations
@@ -22,7 +20,6 @@ DEFAULT_TAPER = Quantity.from_mean(0.0, 0.05, "normal")
 _SOURCE = "normal: hand-planed and belt-sanded boards of 3-5 mm differ by 0.1-0.2 mm from end to end, either way"
 _POWERS: dict[Group, int] = {"bending": 3, "shear": 1, "mass": 1, "rotary": 3}
 """How each group of terms goes with the thickness."""
-_MEAN_POINTS = 200
 
 
 @dataclass(frozen=True)
@@ -89,8 +86,7 @@ class ThicknessProfile(Effect):
         """The density that leaves a given mass as it is."""
         if self.stations is None or "mass" not in values:
             return values
-        middle = (np.arange(_MEAN_POINTS) + 0.5) / _MEAN_POINTS
-        return {**values, "density": density(values) / np.mean(self.stations(middle[:, None], middle))}
+        return {**values, "density": density(values) / self.stations.mean}
 
     def fields(self) -> Mapping[Group, tuple[Field | None, ...]]:
         """Powers of the known profile, or the powers of x and y that a taper is made of."""

@@ -9,6 +9,7 @@ import numpy as np
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, name_modes
+from bayesplate.modes.plate import PlateMatrices
 from bayesplate.modes.solve import Modes, solve
 from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.plate.setup import Setup
@@ -39,7 +40,9 @@ class NamedMode:
         return "cannot tell" if self.label is None else str(self.label)
 
 
-def spectrum(system: System, values: Values, n_modes: int) -> tuple[Modes, tuple[NamedMode, ...]]:
+def spectrum(
+    system: System, values: Values, n_modes: int, plate: PlateMatrices | None = None
+) -> tuple[Modes, tuple[NamedMode, ...]]:
     """Lowest modes of a setup at given constants and sizes.
 
     Parameters
@@ -48,6 +51,8 @@ def spectrum(system: System, values: Values, n_modes: int) -> tuple[Modes, tuple
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
     n_modes : int
+    plate : PlateMatrices, optional
+        Matrices to use again; by default those of the production mesh for these values.
 
     Returns
     -------
@@ -55,7 +60,8 @@ def spectrum(system: System, values: Values, n_modes: int) -> tuple[Modes, tuple
     named : tuple of NamedMode
         In the order of frequency.
     """
-    modes = solve(system.plate(values), system.weights(values).at(0), n_modes)
+    plate = system.plate(values) if plate is None else plate
+    modes = solve(plate, system.weights(values).at(0), n_modes)
     first = system.setup.first_label
     named = []
     for eigenvalue, ((i, j), correlation) in zip(modes.eigenvalues, name_modes(modes), strict=True):

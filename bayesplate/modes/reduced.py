@@ -26,8 +26,8 @@ _WHOLE = 40
 """Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
 _BEYOND = 6
 """Modes above the wanted ones that are kept from it."""
-_BATCH = 64
-"""Draws whose large matrices are held at once: all draws of a posterior would need gigabytes."""
+_BATCH, _SMALL_BATCH = 64, 512
+"""Draws whose large or small matrices are held at once: those of a whole posterior would not fit any cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +62,10 @@ class ReducedBlock:
 
         All r - n_rigid of them, or n_kept - n_rigid where the others are condensed.
         """
-        if self.n_kept and len(weights.stiffness) > _BATCH:
-            starts = range(0, len(weights.stiffness), _BATCH)
-            parts = [Weights(*(w[start : start + _BATCH] for w in weights)) for start in starts]
+        batch = _BATCH if self.n_kept else _SMALL_BATCH
+        if len(weights.stiffness) > batch:
+            starts = range(0, len(weights.stiffness), batch)
+            parts = [Weights(*(w[start : start + batch] for w in weights)) for start in starts]
             return np.concatenate([self.eigenvalues(part) for part in parts])
         stiffness = _weighted(weights.stiffness, self.stiffness)
         mass = _weighted(weights.mass, self.masses) if len(self.masses) else None

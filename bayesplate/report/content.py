@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesplate.cards import Density, PriorCard
+from bayesplate.effects.words import effect_name, joined
 from bayesplate.plate.board import Board
 from bayesplate.posterior.inference import Inference
 from bayesplate.quantities import Quantity
@@ -14,10 +15,8 @@ from bayesplate.report.priors import input_words, people_use
 from bayesplate.report.words import (
     GPA,
     MISSING,
-    effect_name,
     effect_sentence,
     interval,
-    joined,
     number,
     percent,
     plus_minus,
@@ -42,9 +41,7 @@ def summary_sentences(summary: Mapping[str, Any]) -> list[str]:
     elastic, error = summary["elastic"], summary["error"]
     E_x, E_y, G_xy = (plus_minus(elastic[name], GPA) for name in ("E_x", "E_y", "G_xy"))
     n = len(summary["modes"])
-    sentences = [
-        f"From {n} modes: {E_x} GPa along the grain, {E_y} GPa across it, and a shear modulus of {G_xy} GPa."
-    ]
+    sentences = [f"From {n} modes: {E_x} GPa along the grain, {E_y} GPa across it, and a shear modulus of {G_xy} GPa."]
     left_out = error["leave_one_out_rms_cents"]
     missed = f"The fit misses the frequencies by {_cents(error['in_sample_rms_cents'])}"
     if left_out is None:

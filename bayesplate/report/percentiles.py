@@ -92,9 +92,7 @@ def percentiles_picture(
     return Picture("percentiles", title, alt, caption, figure)
 
 
-def _draw(
-    panel: Axes, name: str, percentile: PercentileEstimate, n_modes: int, moduli: NDArray[np.float64]
-) -> None:
+def _draw(panel: Axes, name: str, percentile: PercentileEstimate, n_modes: int, moduli: NDArray[np.float64]) -> None:
     """One constant: the posterior at the foot, the band, and a dot an estimate."""
     i = MODULI.index(name)
     sizes = np.concatenate([np.full(comb(n_modes, size), size) for size in range(3, n_modes + 1)])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.effects import effects_of, is_effect_parameter
+from bayesplate.effects.words import effect_name
 from bayesplate.plate.board import Board
 from bayesplate.posterior.inference import Problem
 from bayesplate.quantities import Quantity
@@ -111,7 +112,7 @@ def input_words(name: str, board: Board) -> tuple[str, float, str]:
         parameter, _, setup = rest.rstrip("]").partition("[")
         where = f" ({setup})" if setup and len(board.setups) > 1 else ""
         factor, unit = people_use(_unit(name, board))
-        return f"{parameter} of {effect.replace('_', ' ')}{where}", factor, unit
+        return f"{parameter} of {effect_name(effect)}{where}", factor, unit
     if name.startswith("clamped_"):
         edge, _, setup = name.removeprefix("clamped_").rstrip("]").partition("[")
         return f"covered by the clamp on {edge} ({setup})", 1e3, "mm"

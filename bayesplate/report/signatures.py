@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bayesplate.effects.words import effect_name
 from bayesplate.report.style import (
     BLUE,
     DARK,
@@ -20,7 +21,6 @@ from bayesplate.report.style import (
     legend_below,
     stacked,
 )
-from bayesplate.report.words import effect_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

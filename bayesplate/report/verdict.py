@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bayesplate.effects.words import effect_name, joined
 from bayesplate.report.signatures import candidate_name, has_several_setups, is_refitted, worth_showing
 from bayesplate.report.words import (
     GPA,
     MISSING,
-    effect_name,
     effect_sentence,
     interval,
-    joined,
     number,
     percent,
     plus_minus,

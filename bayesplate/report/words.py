@@ -39,16 +39,6 @@ def percent(share: float | None, digits: int = 0) -> str:
     return MISSING if share is None else f"{100 * share:.{digits}f} %"
 
 
-def effect_name(name: str) -> str:
-    """The name of an effect as words."""
-    return name.replace("_", " ")
-
-
 def effect_sentence(name: str) -> str:
     """What an effect is, in one plain sentence; empty for a name that the library does not know."""
     return EFFECTS[name].sentence if name in EFFECTS else ""
-
-
-def joined(words: list[str], last: str = "and") -> str:
-    """A list in prose."""
-    return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.plate.board import density
 from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
 from bayesplate.posterior.inference import Inference, linear_suffices
@@ -21,6 +21,7 @@ QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 MOST_DRAWS_A_CHAIN = 4000
 _LINE_OF_PREDICTIVE_DRAWS = 1
 _N_LINEARISATION = 2000
+FEWEST_WEIGHTED_DRAWS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,36 +136,73 @@ def spread(values: Floats, unit: str) -> dict[str, float | str]:
     }
 
 
-def means_under(inference: Inference, draws: Draws, law: LawName) -> tuple[dict[str, float], float]:
-    """Posterior means of the constants under the other law, by weighting the draws of this one.
+def means_under(
+    inference: Inference, draws: Draws, law: LawName, errors: Floats | None = None
+) -> tuple[dict[str, float], float]:
+    """Posterior means of the constants under a law, by weighting the draws of the fit.
+
+    The exact law is dear: draws of the linear one are weighted at those draws only at which `linearisation` compared
+    the two, and the shift of their mean is added to the mean of all. Where these leave few, all are weighted.
 
     Parameters
     ----------
     inference : Inference
     draws : Draws
     law : "linear" or "exact"
+    errors : (n_some, n_modes) array, cents, optional
+        Those of `linearisation`, where they are known already.
 
     Returns
     -------
     means : dict of float
         E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m).
     effective_draws : float
-        How many independent draws the weights leave; all of them under the law of the fit.
+        How many draws of equal weight the weights are worth; all of them under the law of the fit.
     """
-    constants = {**draws.moduli, **draws.rigidities}
+    constants = {name: values.ravel() for name, values in {**draws.moduli, **draws.rigidities}.items()}
+    if law == "exact" != inference.problem.posterior.law:
+        every = _every(draws)
+        errors = linearisation(inference, draws) if errors is None else errors
+        exact = draws.log_frequency.reshape(-1, draws.log_frequency.shape[-1])[::every] - errors / cents(np.ones(1))
+        weights = _weights(_log_likelihood(inference, draws.flat[::every], exact), draws, every)
+        if effective_draws(weights) >= FEWEST_WEIGHTED_DRAWS:
+            means = {
+                name: float(np.mean(values)) + weighted_mean(values[::every] - np.mean(values[::every]), weights)
+                for name, values in constants.items()
+            }
+            return means, effective_draws(weights) * draws.log_posterior.size / weights.size
     weights = law_weights(inference, draws, law)
-    means = {name: weighted_mean(values.ravel(), weights) for name, values in constants.items()}
-    return means, effective_draws(weights)
+    return {name: weighted_mean(values, weights) for name, values in constants.items()}, effective_draws(weights)
 
 
 def law_weights(inference: Inference, draws: Draws, law: LawName) -> Floats:
     """Weights that make the draws of one law draws of another: (n_chains * n_draws,) array that sums to 1."""
     if law == inference.problem.posterior.law:
         return np.full(draws.log_posterior.size, 1.0 / draws.log_posterior.size)
-    other = inference.problem.under(law).posterior
-    log_weights = other.log_likelihood(draws.flat).sum(axis=1) - draws.log_likelihood.sum(axis=-1).ravel()
+    return _weights(inference.problem.under(law).posterior.log_likelihood(draws.flat), draws)
+
+
+def _weights(log_likelihood: Floats, draws: Draws, every: int = 1) -> Floats:
+    """Weights of every so many draws from what another law says of them: (n_some, n_modes) to (n_some,) array."""
+    own = draws.log_likelihood.sum(axis=-1).ravel()[::every]
+    log_weights = log_likelihood.sum(axis=1) - own
     weights = np.exp(log_weights - log_weights.max())
     return np.asarray(weights / weights.sum())
+
+
+def _log_likelihood(inference: Inference, theta: Floats, log_frequency: Floats) -> Floats:
+    """Log probability of every reading where the frequencies are known: (n_some, n_modes) arrays."""
+    posterior = inference.problem.posterior
+    log_noise = inference.problem.parameters.log_noise(theta)
+    ends = np.cumsum([len(setup.readings) for setup in inference.problem.board.setups])
+    parts = np.split(log_frequency, ends[:-1], axis=1)
+    return np.concatenate(
+        [
+            readings.log_likelihood(part, log_noise[:, i])
+            for i, (readings, part) in enumerate(zip(posterior.readings, parts, strict=True))
+        ],
+        axis=1,
+    )
 
 
 def weighted_mean(values: Floats, weights: Floats) -> float:
@@ -179,8 +217,14 @@ def effective_draws(weights: Floats) -> float:
 
 def linearisation(inference: Inference, draws: Draws) -> Floats:
     """Linear less exact law over the posterior: (n_some, n_modes) array, cents."""
-    some = draws.flat[:: max(1, len(draws.flat) // _N_LINEARISATION)]
-    return linearisation_errors(inference.problem.board, inference.problem.posterior.models, some)
+    return linearisation_errors(
+        inference.problem.board, inference.problem.posterior.models, draws.flat[:: _every(draws)]
+    )
+
+
+def _every(draws: Draws) -> int:
+    """Draws from one at which the laws are compared to the next."""
+    return max(1, len(draws.flat) // _N_LINEARISATION)
 
 
 def linear_is_enough(inference: Inference, draws: Draws, errors: Floats | None = None) -> bool:

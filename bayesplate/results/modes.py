@@ -91,10 +91,10 @@ def spectra(problem: Problem, draws: Draws) -> dict[str, Spectrum]:
         if not setup.unlabelled and setup.hammer is None:
             continue
         n_modes = max(_FEWEST_MODES, 2 * len(setup.readings), round(_SPARE * len(setup.readings + setup.unlabelled)))
-        found[setup.name] = spectrum(model.system, values, n_modes)
+        found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
         while found[setup.name][1][-1].frequency < max(setup.unlabelled, default=0.0) and n_modes < _MOST_MODES:
             n_modes *= 2
-            found[setup.name] = spectrum(model.system, values, n_modes)
+            found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
     return found
 
 

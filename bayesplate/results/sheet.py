@@ -188,7 +188,7 @@ def sheet(
             hertz=mode.frequency,
             measured_hz=measured.get(mode.name),
             band_hz=(
-                precision.band(mode.frequency, shares[i, :len(RIGIDITIES)], setup.name)
+                precision.band(mode.frequency, shares[i, : len(RIGIDITIES)], setup.name)
                 if precision is not None and mode.label is not None and mode.name not in measured
                 else _band(mode, bands)
             ),

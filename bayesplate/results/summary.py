@@ -21,7 +21,15 @@ from bayesplate.posterior.inference import Inference, Problem
 from bayesplate.posterior.region import worst_cents
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks
-from bayesplate.results.draws import Draws, finite, linear_is_enough, linearisation, means_under, spread
+from bayesplate.results.draws import (
+    FEWEST_WEIGHTED_DRAWS,
+    Draws,
+    finite,
+    linear_is_enough,
+    linearisation,
+    means_under,
+    spread,
+)
 from bayesplate.results.modes import (
     Spectrum,
     mode_entries,
@@ -32,7 +40,6 @@ from bayesplate.results.modes import (
 )
 
 FORMAT = 1
-FEWEST_WEIGHTED_DRAWS = 200
 _HIGH_EXACT_ERROR = 0.5
 _UNITS = {"length_x": "m", "length_y": "m", "thickness": "m", "mass": "kg", "density": "kg/m^3", "poisson_xy": "1"}
 
@@ -69,7 +76,14 @@ def unconverged_summary(
     }
 
 
-def summarise(inference: Inference, draws: Draws, seed: int, versions: Mapping[str, str], card_sha256: str) -> Summary:
+def summarise(
+    inference: Inference,
+    draws: Draws,
+    seed: int,
+    versions: Mapping[str, str],
+    card_sha256: str,
+    linear_errors: NDArray[np.float64] | None = None,
+) -> Summary:
     """The summary of a converged fit.
 
     Parameters
@@ -79,6 +93,8 @@ def summarise(inference: Inference, draws: Draws, seed: int, versions: Mapping[s
     seed : int
     versions : dict of str
     card_sha256 : str
+    linear_errors : (n_some, n_modes) array, cents, optional
+        Those of `bayesplate.results.draws.linearisation`, where they are known already.
 
     Returns
     -------
@@ -91,8 +107,9 @@ def summarise(inference: Inference, draws: Draws, seed: int, versions: Mapping[s
     system = paper_system(board, problem.estimate, compared=False)
     errors = mode_errors(inference, draws)
     found = spectra(problem, draws)
-    linear_errors = linearisation(inference, draws)
-    means = {law: _means(inference, draws, law) for law in ("linear", "exact")}
+    if linear_errors is None:
+        linear_errors = linearisation(inference, draws)
+    means = {law: _means(inference, draws, law, linear_errors) for law in ("linear", "exact")}
     return {
         **header(problem, seed, versions, card_sha256),
         "converged": True,
@@ -157,9 +174,9 @@ def sampler_health(chains: Chains, convergence: Convergence) -> Summary:
     }
 
 
-def _means(inference: Inference, draws: Draws, law: LawName) -> Summary:
+def _means(inference: Inference, draws: Draws, law: LawName, linear_errors: NDArray[np.float64]) -> Summary:
     """Posterior means under a law; none where the two laws are too far apart for one to stand for the other."""
-    means, effective = means_under(inference, draws, law)
+    means, effective = means_under(inference, draws, law, linear_errors)
     if effective < FEWEST_WEIGHTED_DRAWS:
         return {**dict.fromkeys(means, None), "effective_draws": effective}
     return {**means, "effective_draws": effective}

@@ -13,7 +13,7 @@ from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.inference import Inference, Problem, infer, pose
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.draws import Draws, linear_is_enough, named_draws
+from bayesplate.results.draws import Draws, linear_is_enough, linearisation, named_draws
 from bayesplate.results.summary import Summary, summarise
 from bayesplate.results.versions import versions
 from bayesplate.workflow.prepare import Prepared
@@ -102,10 +102,12 @@ def fitted(
         return inference, named_draws(inference, request.seed)
 
     inference, draws = sampled(problem)
-    if request.law is None and problem.posterior.law == "linear" and not linear_is_enough(inference, draws):
+    errors = linearisation(inference, draws)
+    if request.law is None and problem.posterior.law == "linear" and not linear_is_enough(inference, draws, errors):
         # The choice was made on a normal approximation; the draws know better.
         inference, draws = sampled(problem.under("exact"))
-    summary = summarise(inference, draws, request.seed, versions(), prepared.card.sha256)
+        errors = linearisation(inference, draws)
+    summary = summarise(inference, draws, request.seed, versions(), prepared.card.sha256, errors)
     return Fitted(prepared, inference, draws, summary)
 
 

@@ -113,9 +113,7 @@ def _has_labels(board: Board) -> bool:
     return any(setup.readings for setup in board.setups)
 
 
-def _sheets(
-    prepared: Prepared, values: Values, precision: Precision | None, rng: np.random.Generator
-) -> list[Sheet]:
+def _sheets(prepared: Prepared, values: Values, precision: Precision | None, rng: np.random.Generator) -> list[Sheet]:
     board, made = prepared.board, []
     basis = _AT_PRIOR if precision is None else _AT_ESTIMATE
     for setup in board.setups:

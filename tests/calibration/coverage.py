@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from calibration.cases import CASES
 from calibration.planted import Settings, cover_one, identity
-from calibration.records import Record, add_to, read_done
+from calibration.records import Record, add_to, publish, read_done
 from scipy import stats
 
 NOMINAL = 0.90
@@ -161,12 +161,16 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
     parser.add_argument("--base-seed", type=int, default=1)
+    parser.add_argument("--publish", type=Path, help="folder for a page of what was found")
     options = parser.parse_args()
     started = time.perf_counter()
     settings = Settings(base_seed=options.base_seed)
     records = run(settings, options.effect or list(CASES), options.boards, options.workers, options.out)
     lines, well = judge(records)
     print("\n".join(lines))
+    if options.publish:
+        title = "Coverage: how many 90 % intervals hold the planted value of a declared effect"
+        publish(options.publish, "coverage", title, "make coverage", "\n".join(lines).splitlines())
     print(f"{(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

@@ -64,3 +64,21 @@ def add_to(
                 left = (time.perf_counter() - started) / count * (len(futures) - count)
                 print(f"{count} of {len(futures)} done, {left / 60:.1f} minutes left", file=sys.stderr, flush=True)
     return records
+
+
+def publish(folder: Path, name: str, title: str, command: str, lines: Sequence[str]) -> None:
+    """Write what a command found to a page of the documentation.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+    name : str
+        Of the page, without its ending.
+    title, command : str
+    lines : sequence of str
+        As they were printed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    text = [f"# {title}", "", f"Written by `{command}`; do not edit.", "", "```", *lines, "```", ""]
+    (folder / f"{name}.md").write_text("\n".join(text), encoding="utf-8")

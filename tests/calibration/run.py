@@ -17,7 +17,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration.records import add_to, read_done
+from calibration.records import add_to, publish, read_done
 from calibration.sbc import Design, identity, simulate_one
 from calibration.table import family_p_value, is_calibrated, is_caught, rows, text
 
@@ -86,12 +86,16 @@ def main() -> int:
     parser.add_argument("--law", choices=("exact", "auto", "fixed-linear"), default="exact")
     parser.add_argument("--resolution", type=float, default=1.0, help="Hz; 0 for readings that are not rounded")
     parser.add_argument("--base-seed", type=int, default=1)
+    parser.add_argument("--publish", type=Path, help="folder for a page of what was found")
     arguments = vars(parser.parse_args())
     design = Design(**{f.name: arguments[f.name] for f in fields(Design) if f.name in arguments})
     started = time.perf_counter()
     records = run(design, arguments["simulations"], arguments["mutants"], arguments["workers"], arguments["out"])
     paragraphs, well = judge(records)
     print("\n".join(paragraphs))
+    if arguments["publish"]:
+        title = "Calibration of the posterior: ranks of the truth among its draws"
+        publish(arguments["publish"], "calibration", title, "make calibration", "\n".join(paragraphs).splitlines())
     print(f"{'calibrated' if well else 'NOT CALIBRATED'}, {(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

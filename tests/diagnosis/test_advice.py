@@ -34,6 +34,6 @@ def test_the_recommendation_names_the_effects_and_what_to_measure(finnish):
     found = search(finnish.ground)
     sentence = recommendation(found, ASKED)
     assert sentence.startswith("Measure ")
-    assert all(name in sentence for name in ASKED)
+    assert all(words in sentence for words in ("transverse shear", "clamp rotation"))
     assert "the same modes again" in recommendation(found, ())
     assert np.char.count(sentence, ". ") <= 3

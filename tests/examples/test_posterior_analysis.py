@@ -15,11 +15,12 @@ SDS = {"E_x": 0.40, "E_y": 0.045, "G_xy": 0.022}
 
 
 def test_the_numbers_of_the_cantilever_board(tmp_path):
-    numbers = runpy.run_path(str(EXAMPLE))["run"](tmp_path / "figure.png")
+    numbers = runpy.run_path(str(EXAMPLE))["run"](tmp_path / "figure.png", corner=tmp_path / "corner.png")
 
     for name, row in numbers.items():
         assert row["mean"] == pytest.approx(MEANS[name], abs=0.15 * SDS[name])
         assert row["sd"] == pytest.approx(SDS[name], rel=0.1)
     assert numbers["E_x"]["within_percentile_band"] > 0.4
     assert max(numbers[name]["within_percentile_band"] for name in ("E_y", "G_xy")) < 0.2
-    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+    for name in ("figure.png", "corner.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from trial.causes import narrowest, overlooked, taken_for, weakest
 from trial.cells import Cell
 from trial.counts import (
     Mean,
@@ -32,6 +33,18 @@ from trial.counts import (
 from trial.sizes import errors
 
 Bar = dict[str, Any]
+PLANNED = frozenset(
+    (
+        "clamp_rotation",
+        "attached_mass",
+        "air_loading",
+        "transverse_shear",
+        "grain_angle",
+        "thickness_profile",
+        "poisson_ratio",
+    )
+)
+"""The classes for which the bars on the best answer were set; the trial plants further ones, harder to tell apart."""
 Records = Sequence[Record]
 
 
@@ -50,7 +63,9 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
         found.append(_at_most(f"null, {design}: uniquely named", share(of("null", design=design), is_named), 0.02))
         found.append(_at_most(f"null, {design}: flagged at all", share(of("null", design=design), is_flagged), 0.05))
     for cell in (cell for cell in cells if cell.kind == "one"):
-        found.append(_at_most(f"{cell.name}: unique and wrong", share(by_cell[cell.name], is_wrong_name), 0.05))
+        records = by_cell[cell.name]
+        cause = taken_for(records, is_wrong_name)
+        found.append(_at_most(f"{cell.name}: unique and wrong", share(records, is_wrong_name), 0.05, cause))
     for design in designs:
         answered = [record for record in of("one", design=design) if is_answered(record)]
         found.append(_at_least(f"one effect, {design}: in the set given", share(answered, is_covered), 0.90))
@@ -58,11 +73,18 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
         found.append(_number(f"one effect, {design}: mean size of the set", size, 2.5))
     for design, least in ((six, 0.70), (nine, 0.90), (both, 0.95)):
         records = of("one", design=design, noise_cents=5.0, size=2.0, noise_factor=1.65)
-        found.append(_at_least(f"top-1, {design}, 5 cents, 2x", share(records, is_best), least))
+        planned = [record for record in records if truth(record) <= PLANNED]
+        for which, among in (("", planned), (", further classes too", records)):
+            quantity = f"top-1, {design}, 5 cents, 2x{which}"
+            found.append(_at_least(quantity, share(among, is_best), least, weakest(among)))
     for design in designs:
         records = of("outside", design=design)
-        found.append(_at_most(f"outside the library, {design}: falsely unique", share(records, is_named), 0.10))
-    found.append(_at_least("two effects: both in the set", share(of("two"), is_covered), 0.70))
+        cause = taken_for(records, is_named)
+        found.append(_at_most(f"outside the library, {design}: falsely unique", share(records, is_named), 0.10, cause))
+    planned = [record for record in of("two") if truth(record) <= PLANNED]
+    for which, among in (("", planned), (", further classes too", of("two"))):
+        quantity = f"two effects: both in the set{which}"
+        found.append(_at_least(quantity, share(among, is_covered), 0.70, overlooked(among)))
     loud = of("one", noise_cents=17.0)
     found.append(_at_least("17 cents: not named", share(loud, lambda r: not is_named(r)), 0.80))
     found.append(_at_most("17 cents: unique and wrong", share(loud, is_wrong_name), 0.02))
@@ -72,12 +94,14 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
     return [bar for bar in found if bar is not None]
 
 
-def _at_most(quantity: str, found: Share, limit: float) -> Bar | None:
-    return _bar(quantity, f"<= {100 * limit:g} %", found, found.high <= limit) if found.n else None
+def _at_most(quantity: str, found: Share, limit: float, cause: str = "") -> Bar | None:
+    met = found.high <= limit
+    return _bar(quantity, f"<= {100 * limit:g} %", found, met, "" if met else cause) if found.n else None
 
 
-def _at_least(quantity: str, found: Share, limit: float) -> Bar | None:
-    return _bar(quantity, f">= {100 * limit:g} %", found, found.low >= limit) if found.n else None
+def _at_least(quantity: str, found: Share, limit: float, cause: str = "") -> Bar | None:
+    met = found.low >= limit
+    return _bar(quantity, f">= {100 * limit:g} %", found, met, "" if met else cause) if found.n else None
 
 
 def _bar(quantity: str, wanted: str, found: Share, met: bool, note: str = "") -> Bar:
@@ -120,7 +144,8 @@ def _of_constants(design: str, records: Records) -> Iterable[Bar]:
         "85 to 95 %",
         after,
         after.low >= 0.85 and after.high <= 0.95,
-        f"averaged over classes and hypotheses; by the hypothesis of the verdict alone {100 * alone.value:.1f} %",
+        f"averaged over classes and hypotheses; by the hypothesis of the verdict alone {100 * alone.value:.1f} %; "
+        + narrowest(records, after),
     )
     gain = mean([holds(r, "averaged") - holds(r, "without") for r in records])
     yield _bar(

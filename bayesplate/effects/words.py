@@ -1,0 +1,20 @@
+"""Names of effects in sentences that people read; files keep the names themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def effect_name(name: str) -> str:
+    """The name of an effect as words."""
+    return name.replace("_", " ")
+
+
+def effect_names(names: Sequence[str], last: str = "and") -> str:
+    """Names of effects as words, as a list in prose."""
+    return joined([effect_name(name) for name in names], last)
+
+
+def joined(words: Sequence[str], last: str = "and") -> str:
+    """A list in prose."""
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

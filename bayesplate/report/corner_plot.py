@@ -1,0 +1,46 @@
+"""The corner plot of chosen draws by the `corner` package, for scripts; the report's own fits a phone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.report.saving import save_figure
+from bayesplate.report.style import BLUE, ORANGE
+
+_INCHES = 1.9
+_HELD = (0.5, 0.9)
+
+
+def write_corner_plot(
+    path: Path, columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float] | None = None
+) -> None:
+    """Draw every pair of columns against each other, and write it by the ending of the path, PNG or SVG.
+
+    Parameters
+    ----------
+    path : Path
+    columns : dict of array of any shape
+        Draws by what stands at their axis, units included; all of one size.
+    marked : dict of float, optional
+        Values to mark by a line, such as the least squares, by the same words.
+    """
+    import corner
+    from matplotlib.figure import Figure
+
+    side = _INCHES * len(columns)
+    figure = Figure(figsize=(side, side))
+    corner.corner(
+        np.column_stack([np.ravel(values) for values in columns.values()]),
+        fig=figure,
+        labels=list(columns),
+        levels=_HELD,
+        smooth=1.0,
+        color=BLUE,
+        truths=None if marked is None else [marked.get(name) for name in columns],
+        truth_color=ORANGE,
+    )
+    save_figure(figure, path)

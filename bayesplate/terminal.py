@@ -1,0 +1,113 @@
+"""How the command line talks: tables, progress, errors as one message with an exit code, and signals to stop."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bayesplate.errors import BayesplateError
+
+if TYPE_CHECKING:
+    from bayesplate.workflow.shown import Progress, Shown
+
+INTERRUPTED = 130
+INTERNAL = 70
+
+
+def print_shown(shown: Shown) -> None:
+    """Tables, remarks, warnings and the closing words on the standard output."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(soft_wrap=False, highlight=False)
+    with console.capture() as printed:
+        for table in shown.tables:
+            laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
+            for i, column in enumerate(table.columns):
+                laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
+            for row in table.rows:
+                laid_out.add_row(*(Text(cell) for cell in row))
+            console.print(laid_out)
+        for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
+            console.print(Text(sentence))
+        console.print(Text(shown.closing))
+    click.echo(printed.get(), nl=False)  # rich itself would exit with 1 where a reader like `head` has closed the pipe
+
+
+def print_json(content: Mapping[str, Any]) -> None:
+    """What a command found, for other programs."""
+    from bayesplate.workflow.shown import json_text
+
+    click.echo(json_text(content), nl=False)
+
+
+@contextmanager
+def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]:
+    """A status line on the standard error while sampling; a line now and then where that is no terminal."""
+    if not shown:
+        yield None
+        return
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    with console.status("reading the card and solving the plate") as status:
+        # Now, and not when first told: Python gives another exit code to a run that is interrupted while it defines
+        # classes of an import by executing text.
+        from bayesplate.workflow.shown import progress_text
+
+        def tell(progress: Progress) -> None:
+            text = progress_text(progress)
+            if console.is_terminal:
+                status.update(text)
+            elif progress.n_steps % 1000 == 0:
+                click.echo(text, err=True)
+
+        yield tell
+
+
+@contextmanager
+def reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterator[None]:
+    """Turn errors into one message and an exit code, and signals to stop into an interruption."""
+
+    def interrupt(signum: int, frame: object) -> None:
+        signal.signal(signum, signal.SIG_IGN)  # a second one must not disturb the farewell of the first
+        raise KeyboardInterrupt
+
+    # A run in the background of a shell ignores interrupts, and goes on doing so.
+    heeded = [s for s in (signal.SIGTERM, signal.SIGINT) if signal.getsignal(s) != signal.SIG_IGN]
+    before = {s: signal.signal(s, interrupt) for s in heeded}
+    try:
+        yield
+    except BayesplateError as error:
+        if debug:
+            traceback.print_exc()
+        _fail(str(error), error.exit_code, as_json, [vars(fault) for fault in error.faults])
+    except KeyboardInterrupt:
+        remedy = "; --resume continues from the last checkpoint" if resumable else ""
+        _fail(f"interrupted{remedy}", INTERRUPTED, as_json)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", INTERNAL, as_json)
+    finally:
+        for heard, handler in before.items():
+            signal.signal(heard, handler)
+
+
+def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:
+    click.echo(message, err=True)
+    if as_json:
+        click.echo(json.dumps({"error": {"exit_code": code, "message": message, "faults": list(faults)}}, indent=2))
+    sys.exit(code)

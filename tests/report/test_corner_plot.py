@@ -1,0 +1,66 @@
+"""The corner plot by the `corner` package: what is drawn, what is marked, and that nothing else is left behind."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from bayesplate.report.corner_plot import write_corner_plot
+
+N_DRAWS = 4000
+WORDS = ("E_x, GPa", "E_y, GPa", "G_xy, GPa")
+
+
+@pytest.fixture
+def columns():
+    """Draws of a chain shape, each constant with its own mean."""
+    rng = np.random.default_rng(1)
+    return {name: rng.normal(mean, 0.1, (4, N_DRAWS // 4)) for name, mean in zip(WORDS, (11.0, 0.9, 0.7), strict=True)}
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that are written, kept to be looked at."""
+    kept = []
+    monkeypatch.setattr("bayesplate.report.corner_plot.save_figure", lambda figure, path: kept.append(figure))
+    return kept
+
+
+def test_every_pair_has_a_panel_with_its_draws(columns, drawn, tmp_path):
+    write_corner_plot(tmp_path / "corner.png", columns)
+    (figure,) = drawn
+    panels = np.array(figure.axes).reshape(3, 3)
+
+    assert tuple(panel.get_xlabel() for panel in panels[-1]) == WORDS
+    assert tuple(panel.get_ylabel() for panel in panels[1:, 0]) == WORDS[1:]
+    for i, name in enumerate(WORDS):
+        for j, other in enumerate(WORDS[:i]):
+            low, high = panels[i, j].get_xlim()
+            assert low < columns[other].mean() < high
+            low, high = panels[i, j].get_ylim()
+            assert low < columns[name].mean() < high
+
+
+@pytest.mark.parametrize(("marked", "n_lines"), [(None, 0), ({WORDS[0]: 11.05}, 1)], ids=["nothing", "one"])
+def test_what_is_marked_gets_its_line_and_the_rest_none(columns, drawn, tmp_path, marked, n_lines):
+    write_corner_plot(tmp_path / "corner.png", columns, marked)
+    panels = np.array(drawn[0].axes).reshape(3, 3)
+    lines = [line.get_xdata()[0] for line in panels[0, 0].lines]
+
+    assert lines == [11.05] * n_lines
+    assert not panels[1, 1].lines
+
+
+def test_the_same_draws_give_the_same_file_and_no_state_of_pyplot(columns, tmp_path):
+    from matplotlib import pyplot
+
+    before = pyplot.get_fignums()
+    for name in ("one.svg", "other.svg"):
+        write_corner_plot(tmp_path / name, columns)
+
+    one, other = ((tmp_path / name).read_bytes() for name in ("one.svg", "other.svg"))
+    assert one == other
+    assert re.match(rb"<\?xml", one)
+    assert pyplot.get_fignums() == before
