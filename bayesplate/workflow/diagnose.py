@@ -13,6 +13,7 @@ from bayesplate.diagnosis.advice import recommendation
 from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.diagnosis.findings import Case, Diagnosis, Side, diagnosis
 from bayesplate.diagnosis.folds import nested
+from bayesplate.diagnosis.hypotheses import order_conflicts
 from bayesplate.diagnosis.null_control import N_SETS, NullControl, null_control
 from bayesplate.diagnosis.refits import excludes_zero, likely_forms, refit_board
 from bayesplate.diagnosis.search import Found, prepare_search, search
@@ -120,7 +121,7 @@ def diagnose(
     verdict = decide(found)
     control = null_control(found, np.random.default_rng([seed, _NULL_LINE]), n_null)
     refits: dict[int, Fitted] = {}
-    notes = []
+    notes = list(order_conflicts(found.ground.baseline))
     for answer in finalists(found, verdict):
         try:
             name = "-".join((*answer.members, str(answer.index)))

@@ -84,16 +84,17 @@ _SIX, _NINE, _FREE, _CLAMPED, _BOTH = DESIGNS
 CELLS: tuple[Cell, ...] = (
     *(Cell("null", _SIX, 200, noise) for noise in (2.0, 5.0, 17.0)),
     *(Cell("null", design, 200) for design in (_NINE, _FREE, _CLAMPED, _BOTH)),
-    Cell("one", _SIX, 600, size=2.0),
+    Cell("one", _SIX, 1200, size=2.0),
     Cell("one", _SIX, 200, size=1.0),
     Cell("one", _SIX, 200, size=0.5),
     Cell("one", _SIX, 200, 2.0, size=1.0),
     Cell("one", _SIX, 200, 17.0, size=1.0),
     Cell("one", _SIX, 200, size=2.0, noise_factor=KNOWN),
-    *(Cell("one", design, 200, size=2.0) for design in (_NINE, _FREE, _CLAMPED)),
-    *(Cell("one", _BOTH, 200, size=size) for size in (1.0, 2.0)),
-    Cell("two", _BOTH, 200, size=2.0),
-    *(Cell("outside", design, 200, size=2.0) for design in (_SIX, _BOTH)),
+    *(Cell("one", design, 600, size=2.0) for design in (_NINE, _FREE, _CLAMPED)),
+    Cell("one", _BOTH, 200, size=1.0),
+    Cell("one", _BOTH, 600, size=2.0),
+    Cell("two", _BOTH, 600, size=2.0),
+    *(Cell("outside", design, 600, size=2.0) for design in (_SIX, _BOTH)),
 )
 
 
