@@ -91,16 +91,18 @@ def write_report(
     Returns
     -------
     Path
-        Of report.html, which is written last.
+        Of report.html. It shows the SVG figures, and is there before the PNG files are.
     """
     make_folder(folder / FIGURES)
+    page = folder / PAGE
     with _uncollected():
         groups = pictures(inference, draws, summary, diagnosis)
-        vector = save_pictures((one for found in groups.values() for one in found), folder / FIGURES)
-    shown = {place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}
-    write_exports(folder, summary, inference.problem.board.title or summary["name"], diagnosis)
-    page = folder / PAGE
-    write_text(page, render(card, inference, draws, summary, shown, diagnosis))
+        every = [one for found in groups.values() for one in found]
+        vector = save_pictures(every, folder / FIGURES, "svg")
+        shown = {place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}
+        write_exports(folder, summary, inference.problem.board.title or summary["name"], diagnosis)
+        write_text(page, render(card, inference, draws, summary, shown, diagnosis))
+        save_pictures(every, folder / FIGURES, "png")
     return page
 
 

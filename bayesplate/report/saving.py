@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from bayesplate.report.style import Picture
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 200
-ENDINGS = ("png", "svg")
+Ending = Literal["png", "svg"]
 _PACKING = 3
 """Of PNG, 0 to 9: beyond this it takes long and saves little."""
 
@@ -32,29 +32,28 @@ def save_figure(figure: Figure, path: Path) -> None:
         write_bytes(path, _bytes_of(figure, path.suffix.removeprefix("."), {}))
 
 
-def save_pictures(pictures: Iterable[Picture], folder: Path) -> dict[str, bytes]:
-    """Write pictures as PNG and SVG, title and alternative text in both.
+def save_pictures(pictures: Iterable[Picture], folder: Path, ending: Ending) -> dict[str, bytes]:
+    """Write pictures as PNG or SVG files, title and alternative text inside.
 
     Parameters
     ----------
     pictures : iterable of Picture
     folder : Path
         Must be there.
+    ending : "png" or "svg"
 
     Returns
     -------
     dict of bytes
-        The SVG of each picture, by its name.
+        The content of each file, by the picture's name.
     """
-    vector = {}
+    written = {}
     with _salted():
         for picture in pictures:
             told = {"Title": picture.title, "Description": picture.alt}
-            content = {ending: _bytes_of(picture.figure, ending, told) for ending in ENDINGS}
-            for ending, data in content.items():
-                write_bytes(folder / f"{picture.name}.{ending}", data)
-            vector[picture.name] = content["svg"]
-    return vector
+            written[picture.name] = _bytes_of(picture.figure, ending, told)
+            write_bytes(folder / f"{picture.name}.{ending}", written[picture.name])
+    return written
 
 
 @contextmanager
