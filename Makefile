@@ -4,6 +4,11 @@ PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python
 VENV ?= .venv
 BIN = $(VENV)/bin
 
+# Thousands of small matrices: threads of a linear algebra library would only wait for one another.
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
+
 .PHONY: fit test docs calibration coverage trial benchmarks
 
 fit: $(VENV)/installed
