@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 from bayesplate.effects import EFFECTS, declare, effects_of
-from bayesplate.effects.base import Effect
+from bayesplate.effects.base import Effect, Floats
 from bayesplate.plate.board import Board, vibrating_lengths
 from bayesplate.plate.setup import AttachedItem, Setup
 from bayesplate.quantities import Quantity
@@ -150,7 +150,7 @@ def _form(name: str, detail: str, board: Board, setups: tuple[Setup, ...]) -> Fo
     return Form(name, detail, board, tuple(found.values()))
 
 
-def sizes(form: Form, values: Mapping[str, float]) -> dict[str, float]:
+def sizes(form: Form, values: Mapping[str, Floats]) -> dict[str, Floats]:
     """Inputs of the board from values of the free parameters."""
     return {key: values[free.name] for free in form.free for key in free.keys}
 

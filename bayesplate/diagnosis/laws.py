@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.following import Following
-from bayesplate.diagnosis.forms import Form
+from bayesplate.diagnosis.forms import Form, sizes
 from bayesplate.frequencies.laws import ExactLaw, log_frequency
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
@@ -52,8 +52,8 @@ class FormLaw:
             The form's free parameters, SI.
         """
         inputs = _inputs(baseline, self.form)
-        sizes = {key: values[free.name] for free in self.form.free for key in free.keys}
-        there: Values = inputs | sizes | dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))
+        constants = dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))
+        there: Values = inputs | sizes(self.form, values) | constants
         followed = self.following or ((),) * len(self.models)
         parts = [_log_frequencies(model, each, there) for model, each in zip(self.models, followed, strict=True)]
         return np.concatenate(parts, axis=1)
