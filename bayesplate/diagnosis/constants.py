@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.evidence import normalised
 from bayesplate.diagnosis.search import Found
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 
@@ -64,8 +65,7 @@ def _draws(found: Found, index: int, rng: np.random.Generator, n: int) -> tuple[
     baseline, table = ground.baseline, hypothesis.table
     residual = hypothesis.seen(baseline, found.residual[None, :])[0]
     log_density = hypothesis.terms(ground.whole).log_densities(residual[None, :])[:, 0]
-    shares = np.exp(log_density - log_density.max())
-    picked, counts = np.unique(rng.choice(shares.size, size=n, p=shares / shares.sum()), return_counts=True)
+    picked, counts = np.unique(rng.choice(log_density.size, size=n, p=normalised(log_density)), return_counts=True)
     result, poisson, thickness = [], [], []
     first_input = 3 + table.slopes.shape[2]
     for term, count in zip(picked, counts, strict=True):

@@ -147,7 +147,7 @@ class Terms:
 
     def left_out_errors(self, residuals: Floats) -> Floats:
         """Reading that was left out less its mean prediction: (n_sets,) array, ln f."""
-        shares = _shares(self.log_densities(residuals))
+        shares = normalised(self.log_densities(residuals))
         misses = self.fold.misses
         by_cell = shares.reshape(self.noise.weights.size, self.table.n_cells, -1)
         own = (residuals @ misses)[None, :] - (self.table.shift @ misses)[:, None]
@@ -178,7 +178,7 @@ def _log_sum(values: Floats) -> Floats:
     return np.asarray(top + np.log(np.exp(values - top).sum(axis=0)))
 
 
-def _shares(log_values: Floats) -> Floats:
-    """Normalised over the first axis."""
+def normalised(log_values: Floats) -> Floats:
+    """Probabilities from logarithms of weights, summing to one over the first axis."""
     shares = np.exp(log_values - log_values.max(axis=0))
     return np.asarray(shares / shares.sum(axis=0))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.evidence import Fold, Terms
+from bayesplate.diagnosis.evidence import Fold, Terms, normalised
 from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
 from bayesplate.diagnosis.tables import Table, nothing, together
 
@@ -147,5 +147,4 @@ def probabilities(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
     """Posterior probabilities, summing to one over the hypotheses: same shape as the evidences."""
     log_prior = np.log([one.prior for one in found])
     total = evidences + log_prior.reshape(-1, *([1] * (evidences.ndim - 1)))
-    shares = np.exp(total - total.max(axis=0))
-    return np.asarray(shares / shares.sum(axis=0))
+    return normalised(total)

@@ -147,7 +147,7 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
     at_middle = {**values, **middle, **{n: baseline.values[n] for n in RIGIDITIES}}
     models = tuple(setup_model(system_of(board, setup), at_middle) for setup in board.setups)
     noise = np.array([setup.noise.median for setup in board.setups])
-    centre = parameters.theta({**at_middle, **{n: baseline.values[n] for n in RIGIDITIES}}, noise)
+    centre = parameters.theta(at_middle, noise)
     covariance = np.eye(parameters.n_dim)
     if half_width is None:
         weighted = baseline.slopes / baseline.scales[:, None]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence import Terms
+from bayesplate.diagnosis.evidence import Terms, normalised
 from bayesplate.diagnosis.folds import nested
 from bayesplate.diagnosis.hypotheses import log_evidences, probabilities
 from bayesplate.diagnosis.search import Found
@@ -88,8 +88,7 @@ def simulate_null(found: Found, rng: np.random.Generator, n_sets: int) -> Floats
     bare = ground.hypotheses[0]
     terms = Terms(bare.table, ground.whole, bare.noise)
     log_density = terms.log_densities(found.residual[None, :])[:, 0]
-    shares = np.exp(log_density - log_density.max())
-    level = rng.choice(len(shares), size=n_sets, p=shares / shares.sum())
+    level = rng.choice(len(log_density), size=n_sets, p=normalised(log_density))
     sd = np.sqrt(bare.noise.sd[level][:, baseline.setup_index] ** 2 + baseline.own_variance)
     inputs = rng.standard_normal((n_sets, baseline.input_slopes.shape[1]))
     return np.asarray(sd * rng.standard_normal(sd.shape) + inputs @ baseline.input_slopes.T)

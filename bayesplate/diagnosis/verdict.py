@@ -1,4 +1,4 @@
-"""The verdict: one of five words, by rules that were fixed before any data were seen."""
+"""The verdict: one of five words, by rules that are the same for every board."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.diagnosis.evidence import normalised
 from bayesplate.diagnosis.folds import NEEDED
 from bayesplate.diagnosis.gate import PASSES
 from bayesplate.diagnosis.search import Found
@@ -185,8 +186,7 @@ def size_posterior(found: Found, index: int, member: int, form: int, parameter: 
     ground, hypothesis = found.ground, found.ground.hypotheses[index]
     terms = hypothesis.terms(ground.whole)
     log_density = terms.log_densities(hypothesis.seen(ground.baseline, found.residual[None, :]))[:, 0]
-    shares = np.exp(log_density - log_density.max())
-    by_cell = (shares / shares.sum()).reshape(hypothesis.noise.weights.size, -1).sum(axis=0)
+    by_cell = normalised(log_density).reshape(hypothesis.noise.weights.size, -1).sum(axis=0)
     if len(hypothesis.members) == 1:
         own = hypothesis.table
     else:

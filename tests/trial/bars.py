@@ -1,7 +1,8 @@
 """The bars of the trial: each a question, the estimate with its exact bounds, and whether the bounds satisfy it.
 
 A bar is met if the bound that could break it does not: the upper one for "at most", the lower one for "at least". The
-bars were set before any board was planted. A bar that is missed stays here as missed.
+figures of the bars were set before any board was planted; what was changed since, which intervals of the constants and
+which classes of effects they are put to, the page says. A bar that is missed stays here as missed.
 """
 
 from __future__ import annotations
