@@ -10,9 +10,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, ndtr, ndtri
 
-Kind = Literal["normal", "log-normal"]
+Kind = Literal["normal", "log-normal", "log-uniform"]
 Floats = NDArray[np.float64]
 _LOG_ROOT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 
@@ -28,10 +28,11 @@ class Quantity:
     ----------
     mean, sd : float
         Mean and standard deviation, in the quantity's unit, before truncation; sd = 0 says that the number is exact.
-    kind : {"normal", "log-normal"}
-        A positive physical quantity is log-normal with exactly this mean and sd; a Poisson ratio is normal.
+    kind : {"normal", "log-normal", "log-uniform"}
+        A positive physical quantity is log-normal with exactly this mean and sd; a Poisson ratio is normal; a constant
+        of which only the range is known is log-uniform between its bounds.
     lower, upper : float
-        Bounds; the density is truncated there and normalised again.
+        Bounds; a normal or log-normal density is truncated there and normalised again.
     readings : tuple of float
         What was read, in the quantity's unit; empty if only a mean was given.
     resolution : float
@@ -57,6 +58,8 @@ class Quantity:
             raise ValueError(f"sd: wanted a finite number, zero or positive, got {self.sd}")
         if self.kind == "log-normal" and self.sd > 0 and self.mean <= 0:
             raise ValueError(f"mean: wanted a positive number for a log-normal quantity, got {self.mean}")
+        if self.kind == "log-uniform" and not 0 < self.lower < self.upper < math.inf:
+            raise ValueError(f"bounds: wanted 0 < lower < upper, got {self.lower} and {self.upper}")
         if not self.lower < self.upper:
             raise ValueError(f"bounds: wanted lower < upper, got {self.lower} and {self.upper}")
         for places in (self.at_x, self.at_y):
@@ -91,6 +94,15 @@ class Quantity:
         variance = math.log(factor) ** 2
         mean = median * math.exp(variance / 2)
         return cls(mean, mean * math.sqrt(math.expm1(variance)))
+
+    @classmethod
+    def from_range(cls, lower: float, upper: float) -> Quantity:
+        """A quantity whose logarithm is uniform between two positive bounds, in the quantity's unit."""
+        if not 0 < lower < upper < math.inf:
+            raise ValueError(f"bounds: wanted 0 < lower < upper, got {lower} and {upper}")
+        width = math.log(upper / lower)
+        mean = (upper - lower) / width
+        return cls(mean, math.sqrt((upper**2 - lower**2) / (2.0 * width) - mean**2), "log-uniform", lower, upper)
 
     @classmethod
     def from_readings(
@@ -139,18 +151,27 @@ class Quantity:
 
     @property
     def log_sd(self) -> float:
-        """Standard deviation of the logarithm of a log-normal quantity, before truncation; 0 if exact."""
+        """Standard deviation of the logarithm, before truncation; 0 if exact."""
         if self.is_exact:
             return 0.0
-        if self.kind != "log-normal":
-            raise ValueError("log_sd: wanted a log-normal quantity, got a normal one")
+        if self.kind == "normal":
+            raise ValueError("log_sd: wanted the quantity of a positive thing, got a normal one")
+        if self.kind == "log-uniform":
+            return math.log(self.upper / self.lower) / math.sqrt(12.0)
         return math.sqrt(math.log1p((self.sd / self.mean) ** 2))
+
+    @property
+    def factor(self) -> float:
+        """exp of the standard deviation of the logarithm: two thirds of a log-normal lie within it about the median."""
+        return math.exp(self.log_sd)
 
     @property
     def median(self) -> float:
         """The value at z = 0, in the quantity's unit."""
         if self.is_exact or self.kind == "normal":
             return self.mean
+        if self.kind == "log-uniform":
+            return math.sqrt(self.lower * self.upper)
         return self.mean * math.exp(-(self.log_sd**2) / 2)
 
     def value(self, z: ArrayLike) -> Floats:
@@ -169,6 +190,8 @@ class Quantity:
             return np.full(coordinate.shape, self.mean)[()]
         if self.kind == "normal":
             return np.asarray(self.mean + self.sd * coordinate)[()]
+        if self.kind == "log-uniform":
+            return np.asarray(self.lower * (self.upper / self.lower) ** ndtr(coordinate))[()]
         return np.asarray(self.median * np.exp(self.log_sd * coordinate))[()]
 
     def standard(self, value: ArrayLike) -> Floats:
@@ -181,13 +204,17 @@ class Quantity:
         Returns
         -------
         array of the same shape, no unit
-            0 if the quantity is exact; -inf where a log-normal quantity would not be positive.
+            0 if the quantity is exact; infinite beyond what a quantity can be: zero for a log-normal one, its bounds
+            for a log-uniform one.
         """
         number = np.asarray(value, dtype=np.float64)
         if self.is_exact:
             return np.zeros(number.shape)[()]
         if self.kind == "normal":
             return np.asarray((number - self.mean) / self.sd)[()]
+        if self.kind == "log-uniform":
+            share = np.log(np.clip(number, self.lower, self.upper) / self.lower) / math.log(self.upper / self.lower)
+            return np.asarray(ndtri(share))[()]
         positive = number > 0
         ratio = np.where(positive, number, self.median) / self.median
         return np.where(positive, np.log(ratio) / self.log_sd, -np.inf)[()]
@@ -208,9 +235,87 @@ class Quantity:
         density = -0.5 * coordinate**2 - _LOG_ROOT_TWO_PI
         if self.is_exact or (self.lower == -math.inf and self.upper == math.inf):
             return np.asarray(density)[()]
-        low, high = float(self.standard(self.lower)), float(self.standard(self.upper))
+        low, high = self.standard_bounds
         inside = (coordinate >= low) & (coordinate <= high)
         return np.where(inside, density - _log_probability(low, high), -np.inf)[()]
+
+    @property
+    def standard_bounds(self) -> tuple[float, float]:
+        """The standard coordinates of the bounds; infinite where there are none."""
+        low = float(self.standard(self.lower)) if math.isfinite(self.lower) else -math.inf
+        high = float(self.standard(self.upper)) if math.isfinite(self.upper) else math.inf
+        return low, high
+
+    def log_density(self, value: ArrayLike) -> Floats:
+        """Logarithm of the normalised density of the quantity itself.
+
+        Parameters
+        ----------
+        value : array of any shape, in the quantity's unit
+
+        Returns
+        -------
+        array of the same shape, per unit
+            -inf outside the support.
+
+        Raises
+        ------
+        ValueError
+            If the quantity is exact, and so has no density.
+        """
+        if self.is_exact:
+            raise ValueError("log_density: wanted an uncertain quantity, got an exact one")
+        number = np.asarray(value, dtype=np.float64)
+        if self.kind == "normal":
+            return np.asarray(self.log_prior(self.standard(number)) - math.log(self.sd))[()]
+        possible = number > 0
+        logarithm = np.log(np.where(possible, number, self.median))
+        return np.where(possible, self.log_density_of_log(logarithm) - logarithm, -np.inf)[()]
+
+    def log_density_of_log(self, logarithm: ArrayLike) -> Floats:
+        """Logarithm of the normalised density of the logarithm of a positive quantity.
+
+        Parameters
+        ----------
+        logarithm : array of any shape, of the quantity in its unit
+
+        Returns
+        -------
+        array of the same shape, no unit
+            -inf outside the support.
+
+        Raises
+        ------
+        ValueError
+            If the quantity is exact or normal.
+        """
+        if self.is_exact or self.kind == "normal":
+            raise ValueError("log_density_of_log: wanted the quantity of a positive thing, got an exact or normal one")
+        at = np.asarray(logarithm, dtype=np.float64)
+        if self.kind == "log-uniform":
+            low, high = math.log(self.lower), math.log(self.upper)
+            return np.where((at >= low) & (at <= high), -math.log(high - low), -np.inf)[()]
+        log_sd = self.log_sd
+        return np.asarray(self.log_prior((at - math.log(self.median)) / log_sd) - math.log(log_sd))[()]
+
+    def quantile(self, probability: ArrayLike) -> Floats:
+        """The value below which the quantity lies with a given probability.
+
+        Parameters
+        ----------
+        probability : array of any shape, 0 to 1
+
+        Returns
+        -------
+        array of the same shape, in the quantity's unit
+        """
+        share = np.asarray(probability, dtype=np.float64)
+        low, high = (float(ndtr(bound)) for bound in self.standard_bounds)
+        return self.value(ndtri(low + (high - low) * share))
+
+    def sample(self, rng: np.random.Generator, n: int) -> Floats:
+        """Draws of the quantity: (n,) array in its unit."""
+        return np.asarray(self.quantile(rng.uniform(size=n)))
 
     def scaled(self, factor: float) -> Quantity:
         """The same quantity in another unit.

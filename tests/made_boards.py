@@ -12,8 +12,9 @@ import ritz
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import INPUTS, Board, made_board
 from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.setup import Reading, Setup
 from bayesplate.quantities import Quantity
 
@@ -53,12 +54,13 @@ def setup_of(
 def board_of(plate: ritz.Plate, setups: Sequence[Setup], **inputs: Quantity) -> Board:
     """A board with the sizes of a plate; what a clamp covers is added to its length."""
     lengths = {"length_x": plate.L_x, "length_y": plate.L_y}
-    covered = {setup.input_name(e): length for setup in setups for e, length in setup.clamped.items()}
     for setup in setups:
         for edge, length in setup.clamped.items():
             lengths[f"length_{edge[0]}"] += length.mean
     exact = {**lengths, "thickness": plate.h, "density": plate.rho, "poisson_xy": plate.nu_xy}
-    return Board("made", {**{n: Quantity.exact(v) for n, v in exact.items()}, **covered, **inputs}, tuple(setups))
+    stated = {n: Quantity.exact(v) for n, v in exact.items() if n != "density" or "mass" not in inputs}
+    board = made_board("made", stated | {n: q for n, q in inputs.items() if n in INPUTS}, setups)
+    return board.with_priors({n: q for n, q in inputs.items() if n not in INPUTS})
 
 
 def models_at(board: Board, rigidities: Sequence[float], **inputs: float) -> tuple[SetupModel, ...]:
@@ -87,10 +89,6 @@ def swapped(board: Board) -> Board:
         )
         for setup in board.setups
     )
-    inputs = dict(board.inputs)
-    inputs["length_x"], inputs["length_y"] = board.inputs["length_y"], board.inputs["length_x"]
-    for old, new in zip(board.setups, setups, strict=True):
-        for edge, length in old.clamped.items():
-            inputs.pop(old.input_name(edge))
-            inputs[new.input_name(exchange[edge])] = length
-    return replace(board, setups=setups, inputs=inputs)
+    own = {one.name: one.prior for one in board.parameters if one.owner == BOARD}
+    own["length_x"], own["length_y"] = own["length_y"], own["length_x"]
+    return made_board(board.name, own, setups, prior=board.prior, effects=board.effects)

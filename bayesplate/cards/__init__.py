@@ -3,7 +3,7 @@
 from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, load_board, read_board_text
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.physical import physical_faults, plate_mass_g
-from bayesplate.cards.prior import Density, PriorCard, load_prior
+from bayesplate.cards.prior import PriorCard, StatedPrior, load_prior
 from bayesplate.cards.setup import AirSection, AttachedItem, Edges, HammerSection, SetupSection
 from bayesplate.cards.shelf import card_names
 from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
@@ -16,13 +16,13 @@ __all__ = [
     "AttachedItem",
     "BoardCard",
     "CoefficientCard",
-    "Density",
     "Edges",
     "HammerSection",
     "MaterialSection",
     "PlateSection",
     "PriorCard",
     "SetupSection",
+    "StatedPrior",
     "card_names",
     "load_board",
     "load_coefficients",

@@ -1,16 +1,13 @@
-"""The prior card: densities of the elastic constants, or of the rigidities, each with its source."""
+"""The prior card: priors of the elastic constants, or of the rigidities, each with its source."""
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, PlainValidator
 
 from bayesplate.cards.board import LARGEST_POISSON, name_faults
@@ -23,80 +20,25 @@ from bayesplate.cards.words import plain, shown
 from bayesplate.errors import Fault
 from bayesplate.quantities import Quantity
 
-Floats = NDArray[np.float64]
 ELASTIC = ("E_x", "E_y", "G_xy")
 RIGIDITY = ("D_x", "D_y", "D_s")
 
 
 @dataclass(frozen=True)
-class Density:
-    """A proper density of a positive constant, in SI units (Pa or N m).
+class StatedPrior:
+    """A prior of a card, in SI units or percent, and the source it was taken from."""
 
-    Attributes
-    ----------
-    kind : {"log-normal", "log-uniform"}
-    median, factor : float
-        Of a log-normal density; the logarithm has the standard deviation ln(factor).
-    lower, upper : float
-        Limits of a log-uniform density.
-    source : str
-        Where the numbers come from.
-    """
-
-    kind: Literal["log-normal", "log-uniform"]
-    median: float = math.nan
-    factor: float = math.nan
-    lower: float = 0.0
-    upper: float = math.inf
-    source: str = ""
-
-    @property
-    def log_mean(self) -> float:
-        """Mean of the logarithm."""
-        if self.kind == "log-normal":
-            return math.log(self.median)
-        return 0.5 * (math.log(self.lower) + math.log(self.upper))
-
-    @property
-    def log_sd(self) -> float:
-        """Standard deviation of the logarithm."""
-        if self.kind == "log-normal":
-            return math.log(self.factor)
-        return math.log(self.upper / self.lower) / math.sqrt(12)
-
-    def log_density(self, log_value: ArrayLike) -> Floats:
-        """Logarithm of the normalised density of the logarithm of the constant.
-
-        Parameters
-        ----------
-        log_value : array of any shape, logarithm of the constant in SI units
-
-        Returns
-        -------
-        array of the same shape, no unit
-        """
-        logarithm = np.asarray(log_value, dtype=np.float64)
-        if self.kind == "log-normal":
-            z = (logarithm - self.log_mean) / self.log_sd
-            return np.asarray(-0.5 * z**2 - math.log(self.log_sd * math.sqrt(2 * math.pi)))[()]
-        low, high = math.log(self.lower), math.log(self.upper)
-        inside = (logarithm >= low) & (logarithm <= high)
-        return np.where(inside, -math.log(high - low), -np.inf)[()]
-
-    def sample(self, rng: np.random.Generator, n: int) -> Floats:
-        """Draws of the constant: (n,) array in SI units."""
-        if self.kind == "log-normal":
-            return np.exp(self.log_mean + self.log_sd * rng.standard_normal(n))
-        return np.exp(rng.uniform(math.log(self.lower), math.log(self.upper), n))
+    quantity: Quantity
+    source: str
 
 
 @dataclass(frozen=True)
-class _DensityReader:
+class _ConstantReader:
     """Reads { distribution, median_gpa, factor, source } or { distribution, lower_gpa, upper_gpa, source }."""
 
     unit: Literal["gpa", "n_m"]
 
-    def __call__(self, value: object) -> Density:
+    def __call__(self, value: object) -> StatedPrior:
         distributions = ("log-normal", "log-uniform")
         if not isinstance(value, dict):
             raise Refusal(Complaint("a table with a distribution", shown(value)))
@@ -107,12 +49,12 @@ class _DensityReader:
         common: dict[str, Any] = {"distribution": Choice(distributions), "source": read_text}
         if value["distribution"] == "log-normal":
             read = read_whole_table(value, {**common, median: number, "factor": read_factor})
-            return Density("log-normal", read[median] * si, read["factor"], source=read["source"])
+            return StatedPrior(Quantity.from_median(read[median] * si, read["factor"]), read["source"])
         read = read_whole_table(value, {**common, lower: number, upper: number})
         if not read[lower] < read[upper]:
             both = f"{shown(value[lower])} and {shown(value[upper])}"
             raise Refusal(Complaint(f"{lower} below {upper}", both))
-        return Density("log-uniform", lower=read[lower] * si, upper=read[upper] * si, source=read["source"])
+        return StatedPrior(Quantity.from_range(read[lower] * si, read[upper] * si), read["source"])
 
 
 def _distribution_complaint(value: object, distributions: tuple[str, ...]) -> Complaint:
@@ -124,30 +66,23 @@ def _distribution_complaint(value: object, distributions: tuple[str, ...]) -> Co
     raise AssertionError("unreachable: the word was refused before")
 
 
-@dataclass(frozen=True)
-class _Stated:
-    """A quantity of a prior card and the source it was taken from."""
-
-    quantity: Quantity
-    source: str
-
-
-def _stated(value: object, read: Any) -> _Stated:
+def _stated(value: object, read: Any) -> StatedPrior:
     """Read a quantity whose table holds its source too."""
     if not isinstance(value, dict):
         raise Refusal(Complaint("a table with a source", shown(value)))
     if "source" not in value:
         raise Refusal(Complaint("where the numbers come from", "nothing", inside=("source",)))
-    return _Stated(read({key: entry for key, entry in value.items() if key != "source"}), read_text(value["source"]))
+    quantity = read({key: entry for key, entry in value.items() if key != "source"})
+    return StatedPrior(quantity, read_text(value["source"]))
 
 
-_Elastic = Annotated[Density | None, PlainValidator(_DensityReader("gpa"))]
-_Rigidity = Annotated[Density | None, PlainValidator(_DensityReader("n_m"))]
+_Elastic = Annotated[StatedPrior | None, PlainValidator(_ConstantReader("gpa"))]
+_Rigidity = Annotated[StatedPrior | None, PlainValidator(_ConstantReader("n_m"))]
 _POISSON = QuantityReader(Number(-LARGEST_POISSON, LARGEST_POISSON), "normal")
 
 
 class PriorCard(Section):
-    """Densities of E_x, E_y, G_xy or of D_x, D_y, D_s, and optionally the noise and nu_xy. `load_prior` makes one."""
+    """Priors of E_x, E_y, G_xy or of D_x, D_y, D_s, and optionally the noise and nu_xy. `load_prior` makes one."""
 
     format: Annotated[Literal[1], PlainValidator(read_format)] = Field(description="1")
     name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
@@ -158,17 +93,22 @@ class PriorCard(Section):
     D_x: _Rigidity = None
     D_y: _Rigidity = None
     D_s: _Rigidity = None
-    stated_noise: Annotated[_Stated | None, PlainValidator(lambda value: _stated(value, read_noise))] = Field(
+    stated_noise: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, read_noise))] = Field(
         default=None, alias="noise_percent"
     )
-    stated_poisson: Annotated[_Stated | None, PlainValidator(lambda value: _stated(value, _POISSON))] = Field(
+    stated_poisson: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, _POISSON))] = Field(
         default=None, alias="poisson_xy"
     )
 
     @property
-    def densities(self) -> dict[str, Density]:
-        """Name of the constant to its density; the names are all of E_x, E_y, G_xy or all of D_x, D_y, D_s."""
-        return {name: density for name in (*ELASTIC, *RIGIDITY) if (density := getattr(self, name)) is not None}
+    def stated_constants(self) -> dict[str, StatedPrior]:
+        """Name of the constant to its prior and source: all of E_x, E_y, G_xy or all of D_x, D_y, D_s."""
+        return {name: stated for name in (*ELASTIC, *RIGIDITY) if (stated := getattr(self, name)) is not None}
+
+    @property
+    def constants(self) -> dict[str, Quantity]:
+        """Name of the constant to its prior, in SI units."""
+        return {name: stated.quantity for name, stated in self.stated_constants.items()}
 
     @property
     def noise_percent(self) -> Quantity | None:
@@ -182,11 +122,10 @@ class PriorCard(Section):
 
     @property
     def sources(self) -> dict[str, str]:
-        """Name of each stated density to its source."""
+        """Name of each stated prior to its source."""
         stated = {"noise_percent": self.stated_noise, "poisson_xy": self.stated_poisson}
         return {
-            **{name: density.source for name, density in self.densities.items()},
-            **{name: one.source for name, one in stated.items() if one},
+            **{name: one.source for name, one in (self.stated_constants | stated).items() if one},
         }
 
 
@@ -212,7 +151,7 @@ def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None)
 
 
 def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    """Three densities that belong together, no mixture and no gap."""
+    """Three priors that belong together, no mixture and no gap."""
     given = [name for name in (*ELASTIC, *RIGIDITY) if name in table]
     if tuple(given) in (ELASTIC, RIGIDITY):
         return []

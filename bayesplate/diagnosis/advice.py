@@ -109,7 +109,7 @@ def _boards(board: Board, values: Values) -> Iterator[tuple[str, Board]]:
             setups = tuple(longer if one is setup else one for one in board.setups)
             where = f" in setup {setup.name}" if len(board.setups) > 1 else ""
             yield f"Measure modes {names} as well{where}", replace(board, setups=setups)
-    if not any({*setup.ends_x, *setup.ends_y} == {"free"} for setup in board.setups):
+    if not any(setup.is_free for setup in board.setups):
         free = Setup("free", ("free", "free"), ("free", "free"), (), DEFAULT_NOISE, attached=board.setups[0].attached)
         longer = replace(free, readings=_next_modes(board, free, values, _FREE_MODES))
         sentence = f"Measure the {_FREE_MODES} lowest modes of the same board with all edges free"
@@ -134,9 +134,8 @@ def _with_effects(board: Board, setup: Setup, values: Values) -> Values:
     missing: dict[str, Floats] = {}
     for effect in system_of(board, setup).effects:
         for parameter in effect.parameters():
-            key = effect.key(parameter.name)
-            if key not in values:
-                missing[key] = np.asarray(parameter.prior.median)
+            if parameter.name not in values:
+                missing[parameter.name] = np.asarray(parameter.prior.median)
     return {**values, **missing}
 
 
@@ -161,10 +160,11 @@ def _judged(sentence: str, board: Board, values: Values, asked: Sequence[Form]) 
 
 def _carrying(board: Board, form: Form) -> Board:
     """A board with the effect of a form, also in setups that the form does not know."""
-    attached = {setup.name: setup.attached for setup in form.board.setups}
-    anywhere = form.board.setups[0].attached
-    setups = tuple(replace(setup, attached=attached.get(setup.name, anywhere)) for setup in board.setups)
-    return replace(board, effects=form.board.effects, chosen=form.board.chosen, setups=setups, inputs=form.board.inputs)
+    own = [one for one in form.board.chosen if one.name == form.effect]
+    known = {setup.name for setup in form.board.setups}
+    new = [s for s in board.setups if own[0].scope == "setup" and s.name not in known]
+    chosen = (*form.board.chosen, *(one for s in new if (one := own[0].in_setup(board, s)) is not None))
+    return replace(board, effects=form.board.effects, chosen=chosen, parameters=form.board.parameters)
 
 
 def _at_nominal(board: Board, form: Form, values: Values) -> dict[str, Floats]:
@@ -173,11 +173,10 @@ def _at_nominal(board: Board, form: Form, values: Values) -> dict[str, Floats]:
     for setup in board.setups:
         for effect in system_of(board, setup).effects:
             for parameter in effect.parameters():
-                key = effect.key(parameter.name)
-                if effect.name == form.effect and parameter.name in nominal:
-                    there[key] = nominal[parameter.name]
-                elif key not in there:
-                    there[key] = np.asarray(parameter.prior.median)
+                if effect.name == form.effect and parameter.key in nominal:
+                    there[parameter.name] = nominal[parameter.key]
+                elif parameter.name not in there:
+                    there[parameter.name] = np.asarray(parameter.prior.median)
     return there
 
 

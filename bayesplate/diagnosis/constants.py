@@ -15,8 +15,6 @@ from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 
 Floats = NDArray[np.float64]
 
-_POISSON = "poisson_ratio"
-
 
 @dataclass(frozen=True, eq=False)
 class ConstantDraws:
@@ -66,7 +64,9 @@ def _draws(found: Found, index: int, rng: np.random.Generator, n: int) -> tuple[
     residual = hypothesis.seen(baseline, found.residual[None, :])[0]
     log_density = hypothesis.terms(ground.whole).log_densities(residual[None, :])[:, 0]
     picked, counts = np.unique(rng.choice(log_density.size, size=n, p=normalised(log_density)), return_counts=True)
-    result, poisson, thickness = [], [], []
+    result: list[Floats] = []
+    thickness: list[Floats] = []
+    poisson: list[Floats] = []
     first_input = 3 + table.slopes.shape[2]
     for term, count in zip(picked, counts, strict=True):
         level, cell = divmod(int(term), table.n_cells)
@@ -77,9 +77,10 @@ def _draws(found: Found, index: int, rng: np.random.Generator, n: int) -> tuple[
         moved = table.moved[cell] + joint[:, 3:first_input] @ table.moved_slopes[cell].T
         result.append(baseline.log_rigidities + joint[:, :3] + moved)
         inputs = joint[:, first_input:]
-        thickness.append(_input(baseline, "thickness", inputs))
-        stated = _input(baseline, "poisson_xy", inputs)
-        poisson.append(stated if _POISSON not in hypothesis.members else np.full(count, _nu_xy(found, index, cell)))
+        replaced = _replaced_inputs(found, index, cell)
+        for name, drawn in (("thickness", thickness), ("poisson_xy", poisson)):
+            own = replaced.get(name)
+            drawn.append(_input(baseline, name, inputs) if own is None else np.full(count, own))
     return np.concatenate(result), np.concatenate(poisson), np.concatenate(thickness)
 
 
@@ -101,14 +102,24 @@ def _regression(columns: Floats, variance: Floats, target: Floats) -> tuple[Floa
     return spread @ (columns.T @ (target / variance)), spread
 
 
-def _nu_xy(found: Found, index: int, cell: int) -> float:
-    """The Poisson ratio in the middle of a cell of a hypothesis that frees it."""
+def _replaced_inputs(found: Found, index: int, cell: int) -> dict[str, float]:
+    """Inputs of the board whose place a parameter of the hypothesis takes, in the middle of one of its cells."""
     hypothesis = found.ground.hypotheses[index]
-    tables = [found.ground.candidates[name].coarse for name in hypothesis.members]
-    member = hypothesis.members.index(_POISSON)
-    if len(hypothesis.members) == 1:
-        z = hypothesis.table.z[cell, 0]
-    else:
-        z = tables[member].z[divmod(cell, tables[1].n_cells)[member], 0]
-    (free,) = found.ground.candidates[_POISSON].laws[0].form.free
-    return float(free.prior.value(z))
+    baseline = found.ground.baseline
+    values: dict[str, float] = {}
+    for member, name in enumerate(hypothesis.members):
+        if name not in found.ground.candidates:
+            continue
+        candidate = found.ground.candidates[name]
+        alone = len(hypothesis.members) == 1
+        table, row = (hypothesis.table, cell) if alone else (candidate.coarse, _own_cell(found, index, cell, member))
+        for i, free in enumerate(candidate.laws[int(table.form[row])].form.free):
+            own = float(free.prior.value(table.z[row, i]))
+            values |= {key: own for key in free.keys if key in baseline.board.inputs}
+    return values
+
+
+def _own_cell(found: Found, index: int, cell: int, member: int) -> int:
+    """The cell of one of two effects behind a cell of both together."""
+    other = found.ground.candidates[found.ground.hypotheses[index].members[1]].coarse
+    return divmod(cell, other.n_cells)[member]

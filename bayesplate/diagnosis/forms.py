@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 
-from bayesplate.effects import EFFECTS, declare, effects_of
-from bayesplate.effects.base import Effect, Floats
-from bayesplate.plate.board import Board, vibrating_lengths
-from bayesplate.plate.setup import AttachedItem, Setup
+from bayesplate.effects import EFFECTS, declare
+from bayesplate.effects.base import EffectForm, Floats
+from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import Parameter
 from bayesplate.quantities import Quantity
-
-MASS = "attached_mass"
 
 
 @dataclass(frozen=True)
@@ -25,10 +22,12 @@ class Free:
         SI.
     prior : Quantity
     keys : tuple of str
-        The board's inputs that take its value: one a setup in which the effect acts. In the search it has one value in
-        all setups; a refit lets each setup have its own.
+        The board's parameters that take its value: one per owner. In the search it has one value for all of them; a
+        refit lets each have its own.
     nominal : float
         A representative size.
+    null : float
+        The value at which the effect is absent.
     """
 
     name: str
@@ -36,6 +35,7 @@ class Free:
     prior: Quantity
     keys: tuple[str, ...]
     nominal: float
+    null: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,78 +76,26 @@ def forms(board: Board) -> dict[str, tuple[Form, ...]]:
     dict
         Effect name -> its forms, which share the effect's prior probability equally.
     """
-    result = {}
-    for name in EFFECTS:
-        if name in board.effects and name != MASS:
-            continue
-        found = tuple(_forms_of(board, name))
-        if found:
-            result[name] = found
-    return result
+    tried = {name: effect.forms(board) for name, effect in EFFECTS.items() if name not in board.effects}
+    return {name: tuple(_form(board, name, one) for one in found) for name, found in tried.items() if found}
 
 
-def _forms_of(board: Board, name: str) -> Iterator[Form]:
-    if name == MASS and not any(setup.attached for setup in board.setups):
-        yield from _forgotten(board)
-        return
-    if name in board.effects:
-        return
-    tried = {s.name: EFFECTS[name].candidates(board, s) for s in board.setups if not EFFECTS[name].refusal(board, s)}
-    acting = {setup: found for setup, found in tried.items() if found}
-    if not acting:
-        return
-    for together in zip_longest(*acting.values()):
-        chosen = tuple(
-            effect or EFFECTS[name].candidates(board, setup)[0]
-            for effect, setup in zip(together, (s for s in board.setups if s.name in acting), strict=True)
-        )
-        declared = replace(board, effects=(*board.effects, name), chosen=(*board.chosen, *chosen))
-        yield _form(name, _detail(chosen[0]), declared, board.setups)
+def _form(board: Board, name: str, form: EffectForm) -> Form:
+    declared = declare(replace(board, effects=(*board.effects, name), chosen=(*board.chosen, *form.effects)))
+    by_key: dict[str, list[Parameter]] = {}
+    for effect in form.effects:
+        for parameter in effect.parameters():
+            if not parameter.prior.is_exact:
+                by_key.setdefault(parameter.key, []).append(parameter)
+    return Form(name, form.detail, declared, tuple(_free(key, each) for key, each in by_key.items()))
 
 
-def _forgotten(board: Board) -> Iterator[Form]:
-    """One small thing that nobody mentioned, at one of a few places, the same in all setups."""
-    lists = [EFFECTS[MASS].candidates(board, setup) for setup in board.setups]
-    most = max(range(len(lists)), key=lambda i: len(lists[i]))
-    setup = board.setups[most]
-    nominal = board.nominal()
-    sides = [float(side) for side in vibrating_lengths(nominal, setup)]
-    covered = [float(nominal[setup.input_name(e)]) if e in setup.clamped else 0.0 for e in ("x0", "y0")]
-    for effect in lists[most]:
-        (item,) = effect.items  # type: ignore[attr-defined]
-        (fractions,) = item.places
-        x, y = (c + f * side for c, f, side in zip(covered, fractions, sides, strict=True))
-        thing = AttachedItem("weight", ((x, y),), item.mass)
-        declared = replace(
-            board,
-            effects=(*board.effects, MASS),
-            setups=tuple(replace(s, attached=(thing,)) for s in board.setups),
-        )
-        yield _form(MASS, f"at {1e3 * x:.0f}, {1e3 * y:.0f} mm", declared, declared.setups)
-
-
-def _detail(effect: Effect) -> str:
-    axis = getattr(effect, "axis", "")
-    return f"along {axis}" if axis in ("x", "y") else ""
-
-
-def _form(name: str, detail: str, board: Board, setups: tuple[Setup, ...]) -> Form:
-    board = declare(board)
-    found: dict[str, Free] = {}
-    for setup in setups:
-        for effect in effects_of(board, setup):
-            if effect.name != name:
-                continue
-            for parameter in effect.parameters():
-                if parameter.prior.is_exact:
-                    continue
-                key = effect.key(parameter.name)
-                earlier = found.get(parameter.name)
-                keys = (key,) if earlier is None else tuple(dict.fromkeys((*earlier.keys, key)))
-                found[parameter.name] = Free(
-                    parameter.name, parameter.unit, parameter.prior, keys, float(parameter.nominal)
-                )
-    return Form(name, detail, board, tuple(found.values()))
+def _free(key: str, owned: Sequence[Parameter]) -> Free:
+    """One value for the parameters that share a key: the first one's prior stands for all."""
+    first = owned[0]
+    assert first.null is not None
+    keys = tuple(dict.fromkeys(parameter.name for parameter in owned))
+    return Free(key, first.unit, first.prior, keys, first.nominal, first.null)
 
 
 def sizes(form: Form, values: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -158,12 +106,10 @@ def sizes(form: Form, values: Mapping[str, Floats]) -> dict[str, Floats]:
 def with_forms(board: Board, added: Sequence[Form]) -> Board:
     """A board with the effects of some forms declared together."""
     for form in added:
-        attached = {setup.name: setup.attached for setup in form.board.setups}
         board = replace(
             board,
             effects=tuple(dict.fromkeys((*board.effects, *form.board.effects))),
             chosen=tuple(dict.fromkeys((*board.chosen, *form.board.chosen))),
-            setups=tuple(replace(setup, attached=attached[setup.name] or setup.attached) for setup in board.setups),
         )
     return declare(board)
 

@@ -97,8 +97,8 @@ class FormLaw:
         return tuple(result)
 
     def _without(self, baseline: Baseline) -> Values:
-        """Values of the baseline with the effect at zero size."""
-        nothing = {key: np.zeros(1) for free in self.form.free for key in free.keys}
+        """Values of the baseline with the effect absent."""
+        nothing = {key: np.full(1, free.null) for free in self.form.free for key in free.keys}
         constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities)[:, None], strict=True))
         return _inputs(baseline, self.form) | nothing | constants
 

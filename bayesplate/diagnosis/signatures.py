@@ -141,7 +141,7 @@ def frequencies_with(problem: Problem, name: str) -> tuple[Floats, dict[str, flo
     for setup in board.setups:
         for effect in effects_of(board, setup):
             if effect.name == name:
-                nominal = {effect.key(p.name): p.nominal for p in effect.parameters()}
+                nominal = {p.name: p.nominal for p in effect.parameters()}
                 size |= nominal
     for key, quantity in board.inputs.items():
         values.setdefault(key, np.asarray(quantity.mean))

@@ -1,72 +1,53 @@
-"""What an ideal plate lacks: one protocol (`base.py`), one file an effect, and the list of them here."""
+"""What an ideal plate lacks: one protocol (`base.py`), one file per effect, and the library of them here.
+
+The list of effects is that of the words a card may use (`bayesplate.cards.words.EFFECT_NAMES`); the file of an effect
+bears its name.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from importlib import import_module
 
-from bayesplate.effects.air_loading import AirLoading
-from bayesplate.effects.attached_mass import AttachedMass
-from bayesplate.effects.base import Effect, EffectParameter
-from bayesplate.effects.clamp_rotation import ClampRotation
-from bayesplate.effects.clamp_translation import ClampTranslation
-from bayesplate.effects.density_gradient import DensityGradient
-from bayesplate.effects.grain_angle import GrainAngle
-from bayesplate.effects.membrane_tension import MembraneTension
-from bayesplate.effects.outline_profile import OutlineProfile
-from bayesplate.effects.poisson_ratio import PoissonRatio
-from bayesplate.effects.support_mass import SupportMass
-from bayesplate.effects.support_stiffness import SupportStiffness
-from bayesplate.effects.thickness_profile import ThicknessProfile
-from bayesplate.effects.transverse_shear import TransverseShear
+from bayesplate.cards import EFFECT_NAMES
+from bayesplate.effects.base import Effect
 from bayesplate.errors import Fault
 from bayesplate.plate.board import Board
 from bayesplate.plate.setup import Setup
 
-EFFECTS: dict[str, type[Effect]] = {
-    effect.name: effect
-    for effect in (
-        TransverseShear,
-        AttachedMass,
-        ClampRotation,
-        ClampTranslation,
-        MembraneTension,
-        SupportMass,
-        SupportStiffness,
-        AirLoading,
-        ThicknessProfile,
-        OutlineProfile,
-        DensityGradient,
-        GrainAngle,
-        PoissonRatio,
-    )
-}
+
+def _effect_of(name: str) -> type[Effect]:
+    """The effect that the file of that name defines."""
+    defined = vars(import_module(f"bayesplate.effects.{name}")).values()
+    return next(one for one in defined if isinstance(one, type) and getattr(one, "name", "") == name)
+
+
+EFFECTS: dict[str, type[Effect]] = {name: _effect_of(name) for name in EFFECT_NAMES}
 """Every effect of the library by name."""
 
-__all__ = [
-    "EFFECTS",
-    "Effect",
-    "EffectParameter",
-    "declare",
-    "effect_faults",
-    "effects_of",
-    "implied_effects",
-    "is_effect_parameter",
-]
-
-
-def is_effect_parameter(name: str) -> bool:
-    """Whether a board's input of that name is a parameter of an effect."""
-    return name.split(".")[0] in EFFECTS
+__all__ = ["EFFECTS", "Effect", "declare", "effect_faults", "effects_of", "implied_effects", "notes"]
 
 
 def effects_of(board: Board, setup: Setup) -> tuple[Effect, ...]:
-    """The declared effects as they act in a setup, in the order of their declaration."""
-    chosen = {(effect.name, effect.setup_name): effect for effect in board.chosen}
-    return tuple(
-        chosen.get((name, setup.name)) or EFFECTS[name].of(board, setup)
-        for name in board.effects
-        if not EFFECTS[name].refusal(board, setup)
-    )
+    """The declared effects as they act in a setup, in the order of the library whatever that of their declaration."""
+    found = []
+    for name, effect in EFFECTS.items():
+        if name not in board.effects:
+            continue
+        if any(one.name == name for one in board.chosen):
+            found += _chosen(board, setup, name)
+        elif not effect.refusal(board, setup):
+            found.append(effect.of(board, setup))
+    return tuple(found)
+
+
+def _chosen(board: Board, setup: Setup, name: str) -> list[Effect]:
+    """The form of an effect that was chosen for a setup, or for the board."""
+    forms = {one.owner: one for one in board.chosen if one.name == name}
+    if setup.owner in forms:
+        return [forms[setup.owner]]
+    of_board = next((one for one in forms.values() if one.scope == "board"), None)
+    acting = None if of_board is None else of_board.in_setup(board, setup)
+    return [] if acting is None else [acting]
 
 
 def implied_effects(board: Board) -> tuple[str, ...]:
@@ -80,12 +61,15 @@ def implied_effects(board: Board) -> tuple[str, ...]:
 
 
 def declare(board: Board) -> Board:
-    """A board whose inputs hold the parameters of its declared effects, so that they are known or marginalised."""
-    inputs = dict(board.inputs)
-    for setup in board.setups:
-        for effect in effects_of(board, setup):
-            inputs |= {effect.key(parameter.name): parameter.prior for parameter in effect.parameters()}
-    return replace(board, inputs=inputs)
+    """A board whose parameters hold those of its declared effects, so that they are known or marginalised."""
+    return board.with_parameters(
+        parameter for setup in board.setups for effect in effects_of(board, setup) for parameter in effect.parameters()
+    )
+
+
+def notes(board: Board) -> tuple[str, ...]:
+    """What each effect has to say of a board with its declared effects."""
+    return tuple(sentence for effect in EFFECTS.values() for sentence in effect.notes(board))
 
 
 def effect_faults(board: Board) -> list[Fault]:

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Contribution, Effect, Floats, ProjectedMass, Scope
 from bayesplate.modes.air import air_mass
-from bayesplate.modes.plate import Projection
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 DEFAULT_DENSITY = Quantity.exact(1.2)
 UNKNOWN_BAFFLE = Quantity.from_mean(0.5, 1.0, "normal", lower=0.0, upper=1.0)
 BAFFLES = {"none": Quantity.exact(0.0), "full": Quantity.exact(1.0)}
-_DENSITY_SOURCE = "air at 20 degrees Celsius near sea level, within 5 %"
-_BAFFLE_SOURCE = "nearly uniform from the open air (0) to a rigid wall around the board (1)"
+_SOURCES = (
+    "air at 20 degrees Celsius near sea level, within 5 %",
+    "nearly uniform from the open air (0) to a rigid wall around the board (1)",
+)
 
 
 @dataclass(frozen=True)
@@ -49,41 +50,56 @@ class AirLoading(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> AirLoading:
         """The effect with what the setup declares of its air."""
-        length_x, length_y = vibrating_lengths(board.nominal(), setup)
         declared = setup.air
         return cls(
-            setup_name=setup.name,
-            aspect_ratio=float(length_x / length_y),
+            owner=setup.owner,
+            aspect_ratio=_aspect_ratio(board, setup),
             density=declared.density if declared and declared.density else DEFAULT_DENSITY,
             baffle=BAFFLES[declared.baffle] if declared and declared.baffle else UNKNOWN_BAFFLE,
         )
+
+    def in_setup(self, board: Board, setup: Setup) -> AirLoading:
+        """The same air around the board of another setup."""
+        return replace(self, owner=setup.owner, aspect_ratio=_aspect_ratio(board, setup))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
         """Whether a setup of the board declares its air."""
         return any(setup.air is not None for setup in board.setups)
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
-        """Density of the air and share of the baffle."""
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Density of the air and share of the baffle; without density there is no air, whatever the baffle."""
+        stated = self.density is not DEFAULT_DENSITY, self.baffle is not UNKNOWN_BAFFLE
+        sources = ("" if is_stated else source for is_stated, source in zip(stated, _SOURCES, strict=True))
+        of_density, of_baffle = sources
         return (
-            EffectParameter("density", "kg/m^3", self.density, _DENSITY_SOURCE),
-            EffectParameter("baffle", "1", self.baffle, _BAFFLE_SOURCE),
+            self.parameter("density", self.density, "kg/m^3", 0.0, of_density),
+            self.parameter("baffle", self.baffle, "1", 0.0, of_baffle),
         )
 
-    def projected_masses(self) -> tuple[Projection, ...]:
-        """The air of a plate in the open and of one in a wall; one of them where the baffle is known."""
-        return tuple(partial(air_mass, aspect_ratio=self.aspect_ratio, is_baffled=b) for b, _ in self._shares())
+    def contributions(self) -> tuple[Contribution, ...]:
+        """The air of a plate in the open and of one in a wall, each with its share; one of them where that is known.
 
-    def mass_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """Mass of the air in a volume of the area to the power 3/2, relative to the plate's, shared by the two."""
-        length_x, length_y = vibrating_lengths(values, setup)
-        air = self.value(values, "density") * np.sqrt(length_x * length_y) / (density(values) * values["thickness"])
-        baffle = self.value(values, "baffle")
-        return tuple(air * share(baffle) for _, share in self._shares())
+        The mass of the air in a volume of the area to the power 3/2, relative to the plate's.
+        """
 
-    def _shares(self) -> tuple[tuple[bool, Callable[[Floats], Floats]], ...]:
-        """Whether there is a wall, and the share of that case."""
-        cases: tuple[tuple[bool, Callable[[Floats], Floats]], ...] = ((False, lambda b: 1.0 - b), (True, lambda b: b))
-        if self.baffle.is_exact and self.baffle.mean in (0.0, 1.0):
-            return (cases[int(self.baffle.mean)],)
-        return cases
+        def weight(values: Values, setup: Setup, is_baffled: bool) -> Floats:
+            length_x, length_y = vibrating_lengths(values, setup)
+            air = self.value(values, "density") * np.sqrt(length_x * length_y) / (density(values) * values["thickness"])
+            baffle = self.value(values, "baffle")
+            return air * (baffle if is_baffled else 1.0 - baffle)
+
+        known = self.baffle.is_exact and self.baffle.mean in (0.0, 1.0)
+        cases = (bool(self.baffle.mean),) if known else (False, True)
+        return tuple(
+            ProjectedMass(
+                partial(air_mass, aspect_ratio=self.aspect_ratio, is_baffled=is_baffled),
+                partial(weight, is_baffled=is_baffled),
+            )
+            for is_baffled in cases
+        )
+
+
+def _aspect_ratio(board: Board, setup: Setup) -> float:
+    length_x, length_y = vibrating_lengths(board.nominal(), setup)
+    return float(length_x / length_y)

@@ -12,6 +12,9 @@ from bayesplate.plate.setup import AttachedItem, Setup
 from bayesplate.quantities import Quantity
 
 Fractions = tuple[tuple[float, float], ...]
+"""Places as fractions of the vibrating sides."""
+Places = tuple[tuple[float, float], ...]
+"""Places on the whole board, m from the corner of x0 and y0."""
 
 _PRIORS = {
     "accelerometer": (Quantity.from_median(1.2e-3, 2.5), "log-normal: accelerometers for light boards weigh 0.2-5 g"),
@@ -37,17 +40,20 @@ class Item:
     ----------
     mass : Quantity, kg
     source : str
-        Where the mass comes from.
+        Where the mass comes from; empty if the card states it.
     places : tuple of (float, float)
         As fractions of the vibrating sides; several are those over which it roved.
     radius : (float, float)
         Of its base, over the two sides; 0 if it does not turn with the board, as on a stinger.
+    base : float, m
+        Radius of its base.
     """
 
     mass: Quantity
     source: str
     places: Fractions
     radius: tuple[float, float] = (0.0, 0.0)
+    base: float = 0.0
 
 
 def base_diameter(mass: Floats | float) -> Floats:
@@ -62,17 +68,38 @@ def rotary_inertia(mass: Floats) -> Floats:
 
 def item_on_board(board: Board, setup: Setup, item: AttachedItem) -> Item:
     """A thing of the card: its mass, or the prior of its kind, and its places on the vibrating part."""
-    mass, source = (item.mass, "the card") if item.mass is not None else _PRIORS[item.kind]
+    mass, source = (item.mass, "") if item.mass is not None else _PRIORS[item.kind]
+    base = 0.0 if item.kind == "shaker" else 0.5 * float(base_diameter(mass.median))
+    return Item(mass, source, fractions_on(board, setup, item.places), radius_on(board, setup, base), base)
+
+
+def fractions_on(board: Board, setup: Setup, places: Places) -> Fractions:
+    """Places as fractions of the sides that vibrate in a setup, at nominal sizes; what a clamp covers is at its rim."""
+    starts, sides = _vibrating(board, setup)
+    return tuple(
+        (float(np.clip((x - starts[0]) / sides[0], 0.0, 1.0)), float(np.clip((y - starts[1]) / sides[1], 0.0, 1.0)))
+        for x, y in places
+    )
+
+
+def places_on(board: Board, setup: Setup, fractions: Fractions) -> Places:
+    """Places on the whole board from fractions of the sides that vibrate in a setup; the inverse of `fractions_on`."""
+    starts, sides = _vibrating(board, setup)
+    return tuple((starts[0] + s * sides[0], starts[1] + t * sides[1]) for s, t in fractions)
+
+
+def radius_on(board: Board, setup: Setup, base: float) -> tuple[float, float]:
+    """The radius of a base over the two sides that vibrate in a setup."""
+    _, sides = _vibrating(board, setup)
+    return base / sides[0], base / sides[1]
+
+
+def _vibrating(board: Board, setup: Setup) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Where the vibrating part begins along x and y, and how long it is, m."""
     nominal = board.nominal()
-    sides = vibrating_lengths(nominal, setup)
-    covered = [nominal[setup.input_name(e)] if e in setup.clamped else 0.0 for e in ("x0", "y0")]
-    places = [
-        tuple(float(np.clip((p - c) / side, 0.0, 1.0)) for p, c, side in zip(place, covered, sides, strict=True))
-        for place in item.places
-    ]
-    radius = 0.0 if item.kind == "shaker" else 0.5 * float(base_diameter(mass.median))
-    fractions = tuple((along_x, along_y) for along_x, along_y in places)
-    return Item(mass, source, fractions, (radius / float(sides[0]), radius / float(sides[1])))
+    length_x, length_y = vibrating_lengths(nominal, setup)
+    x, y = (float(nominal[setup.input_name(edge)]) if edge in setup.clamped else 0.0 for edge in ("x0", "y0"))
+    return (x, y), (float(length_x), float(length_y))
 
 
 def forgotten_items(board: Board, setup: Setup) -> list[Item]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,15 +13,20 @@ import numpy as np
 from bayesplate.effects.attached_items import (
     Fractions,
     Item,
+    Places,
     board_mass,
     forgotten_items,
+    fractions_on,
     item_on_board,
+    places_on,
+    radius_on,
     rotary_inertia,
 )
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Mass, Scope
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import KronSum
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 
 HEAVIEST_ROVING = 0.02
@@ -41,7 +48,7 @@ class AttachedMass(Effect):
     the mass: 1.7 percent of a cantilever err by up to 2.2 cents, 3.4 percent of a clamped board by 14, growing with the
     square; where two modes lie close, 0.6 percent err by 3.5. A roving item above 2 percent is refused.
 
-    A place that nobody knows is no continuous parameter: `candidates` tries a few places instead. Places are fractions
+    A place that nobody knows is no continuous parameter: `forms` tries a few places instead. Places are fractions
     of the nominal sides.
 
     Attributes
@@ -61,7 +68,7 @@ class AttachedMass(Effect):
         """The things of known mass; the others too if the card lists the effect, or alone if there are no others."""
         known = [item for item in setup.attached if item.mass is not None]
         items = setup.attached if cls.name in board.effects or not known else known
-        return cls(setup.name, tuple(item_on_board(board, setup, item) for item in items))
+        return cls(setup.owner, tuple(item_on_board(board, setup, item) for item in items))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
@@ -75,12 +82,50 @@ class AttachedMass(Effect):
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[AttachedMass, ...]:
-        """Each thing of unknown mass beside those that are known; one thing at a few places if the setup has none."""
+        """Each thing of unknown mass beside those that are known."""
+        if cls.refusal(board, setup):
+            return ()
         known = tuple(item_on_board(board, setup, item) for item in setup.attached if item.mass is not None)
         unknown = [item_on_board(board, setup, item) for item in setup.attached if item.mass is None]
-        if not setup.attached:
-            unknown = forgotten_items(board, setup)
-        return tuple(cls(setup.name, (*known, item)) for item in unknown)
+        return tuple(cls(setup.owner, (*known, item)) for item in unknown)
+
+    @classmethod
+    def forms(cls, board: Board) -> tuple[EffectForm, ...]:
+        """Each thing of unknown mass; where nothing is attached, one that nobody mentioned at one of a few places."""
+        if any(setup.attached for setup in board.setups):
+            return super().forms(board)
+        tried = [[cls(setup.owner, (item,)) for item in forgotten_items(board, setup)] for setup in board.setups]
+        forms = []
+        for effect in max(tried, key=len):
+            x, y = effect._places_on(board)[0][0]
+            effects = tuple(effect.in_setup(board, setup) for setup in board.setups)
+            forms.append(EffectForm(f"at {1e3 * x:.0f}, {1e3 * y:.0f} mm", effects))
+        return tuple(forms)
+
+    def in_setup(self, board: Board, setup: Setup) -> AttachedMass:
+        """The same things at the same places of the board, held another way."""
+        items = tuple(
+            replace(item, places=fractions_on(board, setup, places), radius=radius_on(board, setup, item.base))
+            for item, places in zip(self.items, self._places_on(board), strict=True)
+        )
+        return replace(self, owner=setup.owner, items=items)
+
+    def _places_on(self, board: Board) -> list[Places]:
+        """Where the things are on the whole board, m."""
+        own = board.setup(self.owner.name)
+        return [places_on(board, own, item.places) for item in self.items]
+
+    @classmethod
+    def notes(cls, board: Board) -> tuple[str, ...]:
+        """That what roved and is not light is rough."""
+        if cls.name not in board.effects:
+            return ()
+        return tuple(
+            f"what roved in setup '{setup.name}' weighs {100.0 * share:.1f} % of the board: the mean over its places "
+            f"is right to first order in the mass only and may err by some cents; a setup for each place is exact"
+            for setup in board.setups
+            if (share := heaviest_roving(board, setup)) > ROUGH_ROVING
+        )
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -91,12 +136,15 @@ class AttachedMass(Effect):
             return f"something above {HEAVIEST_ROVING:.0%} of the board roved: give each place a setup of its own"
         return ""
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """The mass of each item: `mass`, or `mass_1`, `mass_2` and so on."""
-        return tuple(EffectParameter(n, "kg", i.mass, i.source) for n, i in zip(self._names, self.items, strict=True))
+        return tuple(
+            self.parameter(key, item.mass, "kg", 0.0, item.source)
+            for key, item in zip(self._keys, self.items, strict=True)
+        )
 
     @property
-    def _names(self) -> list[str]:
+    def _keys(self) -> list[str]:
         return ["mass"] if len(self.items) == 1 else [f"mass_{i}" for i in range(1, len(self.items) + 1)]
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -104,30 +152,30 @@ class AttachedMass(Effect):
         along_x, along_y = (all(_mirrors(item.places, axis) for item in self.items) for axis in (0, 1))
         return along_x, along_y
 
-    def masses(self, x: Line, y: Line) -> tuple[KronSum, ...]:
-        """For each item the mean square over its places of the deflection, then of the tilts along x and y."""
-        terms: list[KronSum] = []
-        for item in self.items:
-            at_x, at_y = (np.array(values) for values in zip(*item.places, strict=True))
-            moved = x.shapes(at_x), y.shapes(at_y)
-            terms.append(_mean_squares(*moved))
-            if any(item.radius):
-                tilt_x, tilt_y = _tilts(x, at_x, item.radius[0]), _tilts(y, at_y, item.radius[1])
-                terms += [_mean_squares(tilt_x, moved[1]), _mean_squares(moved[0], tilt_y)]
-        return tuple(terms)
+    def contributions(self) -> tuple[Contribution, ...]:
+        """For each item its mass, at the mean square deflection of its places, and its inertia, at their tilts."""
+        return tuple(
+            contribution
+            for key, item in zip(self._keys, self.items, strict=True)
+            for contribution in self._of_item(key, item)
+        )
 
-    def mass_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """Mass and rotary inertia of each item over the vibrating mass."""
-        length_x, length_y = vibrating_lengths(values, setup)
-        vibrating = density(values) * values["thickness"] * length_x * length_y
-        weights: list[Floats] = []
-        for name, item in zip(self._names, self.items, strict=True):
-            mass = self.value(values, name)
-            weights.append(mass / vibrating)
-            if any(item.radius):
-                inertia = rotary_inertia(mass)
-                weights += [inertia / (vibrating * length_x**2), inertia / (vibrating * length_y**2)]
-        return tuple(weights)
+    def _of_item(self, key: str, item: Item) -> Iterator[Contribution]:
+        def vibrating(values: Values, setup: Setup) -> tuple[Floats, tuple[Floats, Floats]]:
+            sides = vibrating_lengths(values, setup)
+            return density(values) * values["thickness"] * sides[0] * sides[1], sides
+
+        def mass(values: Values, setup: Setup) -> Floats:
+            return self.value(values, key) / vibrating(values, setup)[0]
+
+        def inertia(values: Values, setup: Setup, axis: int) -> Floats:
+            total, sides = vibrating(values, setup)
+            return rotary_inertia(self.value(values, key)) / (total * sides[axis] ** 2)
+
+        yield Mass(partial(_mean_squares, item=item), mass)
+        if any(item.radius):
+            for axis in (0, 1):
+                yield Mass(partial(_mean_squares, item=item, tilt=axis), partial(inertia, axis=axis))
 
 
 def heaviest_roving(board: Board, setup: Setup) -> float:
@@ -150,8 +198,11 @@ def _tilts(along: Line, at: Floats, radius: float) -> Any:
     return (along.shapes(high) - along.shapes(low)).multiply(1.0 / (high - low)[:, None]).tocsr()
 
 
-def _mean_squares(along_x: Any, along_y: Any) -> KronSum:
-    """The mean over places of the product of two rows: (n_places, n_dof_x) and (n_places, n_dof_y) sparse arrays."""
-    n = along_x.shape[0]
-    rows = [(along_x[[i]], along_y[[i]]) for i in range(n)]
-    return tuple((row_x.T @ row_x / n, row_y.T @ row_y) for row_x, row_y in rows)
+def _mean_squares(x: Line, y: Line, item: Item, tilt: int | None = None) -> KronSum:
+    """The mean over an item's places of the square of the deflection, or of the tilt along x (0) or y (1)."""
+    rows = []
+    for axis, (line, at) in enumerate(zip((x, y), np.array(item.places).T, strict=True)):
+        rows.append(_tilts(line, at, item.radius[axis]) if axis == tilt else line.shapes(at))
+    n = len(item.places)
+    by_place = [(rows[0][[i]], rows[1][[i]]) for i in range(n)]
+    return tuple((row_x.T @ row_x / n, row_y.T @ row_y) for row_x, row_y in by_place)

@@ -1,15 +1,18 @@
 """What an effect is: something the ideal plate lacks, with parameters, physical priors, and a place in the problem.
 
-An effect adds terms to the budget of energies: stiffness, mass, or both, each with a weight that its parameters set.
-It may also change the plate they are added to: another theory, a released edge, a term that is not even about the
-middle. Everything that an effect can do to a plate is a method of `Effect`; each has a default that does nothing.
+An effect adds terms to the budget of energies, stiffness or mass, each one object that holds its matrix and its weight,
+so that the two cannot fall out of step. It may also change the plate they are added to: another theory, a released
+edge, properties that vary over the plate, a term that is not even about the middle. Everything that an effect can do to
+a plate, and everything that the rest of the package must know of it, is a method or a class variable of `Effect`; each
+has a default that does nothing. The file of an effect is all that an effect needs.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -19,6 +22,7 @@ from bayesplate.modes.fields import Field, Group, Outline
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import KronSum, Projection, Term, Weights
 from bayesplate.plate.board import Board, Values
+from bayesplate.plate.parameter import BOARD, Owner, Parameter, shown_name
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -27,34 +31,68 @@ Theory = Literal["thin", "shear-flexible"]
 Release = Literal["", "value", "slope"]
 """What clamped edges let go in the presence of an effect, whose springs then hold it: nothing, deflection or slope."""
 Floats = NDArray[np.float64]
+Weight = Callable[[Values, Setup], Floats]
+"""What a term weighs at values in a setup: a number or an (n_draws,) array."""
 
 
 @dataclass(frozen=True)
-class EffectParameter:
-    """A parameter of an effect.
+class Stiffness:
+    """A stiffness term: its matrix from the lines of the plate, and its weight in s^-2."""
+
+    matrix: Callable[[Line, Line], Term]
+    weight: Weight
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A mass term on the deflection: its matrix from the lines, and its weight as a fraction of the vibrating mass."""
+
+    matrix: Callable[[Line, Line], KronSum]
+    weight: Weight
+
+
+@dataclass(frozen=True)
+class ProjectedMass:
+    """A mass term without a sparse matrix: its projection on given deflections, and its weight like that of `Mass`."""
+
+    projection: Projection
+    weight: Weight
+
+
+Contribution = Stiffness | Mass | ProjectedMass
+"""One term that an effect adds to the budget of energies."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A field over the plate that one of its own properties follows, and the weight with which it does.
 
     Attributes
     ----------
-    name : str
-    unit : str
-        SI.
-    prior : Quantity
-        Physical: sign and range are its bounds. An exact quantity fixes the parameter.
-    source : str
-        Where the prior comes from.
+    field : Field or None
+        None is uniform.
+    weight : callable or None
+        From the values to a number or an (n_draws,) array; None is one.
     """
 
-    name: str
-    unit: str
-    prior: Quantity
-    source: str
+    field: Field | None
+    weight: Callable[[Values], Floats] | None = None
 
-    @property
-    def nominal(self) -> float:
-        """A representative size: the median of a log-normal prior, one sd above a normal one if its bounds allow."""
-        if self.prior.is_exact or self.prior.kind == "log-normal":
-            return self.prior.median
-        return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))
+
+@dataclass(frozen=True)
+class EffectForm:
+    """One way in which a search may try an effect on a board.
+
+    Attributes
+    ----------
+    detail : str
+        What tells it from the effect's other forms; empty if there are none.
+    effects : tuple of Effect
+        One per setup in which it acts.
+    """
+
+    detail: str
+    effects: tuple[Effect, ...]
 
 
 @dataclass(frozen=True)
@@ -63,15 +101,19 @@ class Effect(ABC):
 
     Attributes
     ----------
-    setup_name : str
-        The setup it acts in; empty for an effect whose parameters belong to the board.
+    owner : Owner
+        Of its parameters: the setup it acts in, the board, or a group that shares them.
     """
 
-    setup_name: str = ""
+    owner: Owner = BOARD
 
     name: ClassVar[str]
     scope: ClassVar[Scope]
+    """Whether its parameters belong to the board or to each setup."""
     sentence: ClassVar[str]
+    """What it does, for the report."""
+    references: ClassVar[tuple[str, ...]] = ()
+    """Where its formulas are taken from print."""
     theory: ClassVar[Theory] = "thin"
     releases: ClassVar[Release] = ""
     turns_grain: ClassVar[bool] = False
@@ -99,22 +141,64 @@ class Effect(ABC):
         return False
 
     @classmethod
+    def notes(cls, board: Board) -> tuple[str, ...]:
+        """Sentences on what a board with its declared effects leaves out of this one, or has only roughly."""
+        return ()
+
+    @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
         """The forms in which a search should try the effect in a setup; none if it cannot act there."""
         return () if cls.refusal(board, setup) else (cls.of(board, setup),)
 
+    @classmethod
+    def forms(cls, board: Board) -> tuple[EffectForm, ...]:
+        """The forms in which a search should try the effect on a board, each in all setups where it can act."""
+        acting = [found for setup in board.setups if (found := cls.candidates(board, setup))]
+        together = zip_longest(*acting)
+        chosen = (tuple(one or found[0] for one, found in zip(each, acting, strict=True)) for each in together)
+        return tuple(EffectForm(effects[0].detail, effects) for effects in chosen)
+
+    @property
+    def detail(self) -> str:
+        """What tells this form of the effect from its others; empty if there are none."""
+        return ""
+
+    def in_setup(self, board: Board, setup: Setup) -> Effect | None:
+        """The same form of the effect in another setup of the board; None if it cannot act there."""
+        if self.refusal(board, setup):
+            return None
+        return self if self.scope == "board" else replace(self, owner=setup.owner)
+
     @abstractmethod
-    def parameters(self) -> tuple[EffectParameter, ...]:
-        """The effect's parameters with their priors."""
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The effect's parameters with their priors; `parameter` makes one."""
 
-    def key(self, parameter: str) -> str:
-        """Name of a parameter among the values of a board."""
-        place = f"[{self.setup_name}]" if self.scope == "setup" else ""
-        return f"{self.name}.{parameter}{place}"
+    def parameter(self, key: str, prior: Quantity, unit: str, null: float, source: str, words: str = "") -> Parameter:
+        """A parameter of the effect.
 
-    def value(self, values: Values, parameter: str) -> Floats:
+        Parameters
+        ----------
+        key : str
+        prior : Quantity
+        unit : str
+            SI.
+        null : float
+            The value at which the effect is absent.
+        source : str
+            Where the prior comes from; empty if the card states it.
+        words : str
+            What people call it, if not its key.
+        """
+        said = f"{words or key} of {self.name.replace('_', ' ')}"
+        return Parameter(key, self.owner, prior, unit, null, self.name, source=source, words=said)
+
+    def value(self, values: Values, key: str) -> Floats:
         """Value of a parameter: a number or an (n_draws,) array."""
-        return np.asarray(values[self.key(parameter)])
+        return np.asarray(values[self.name_of(key)])
+
+    def name_of(self, key: str) -> str:
+        """Name of a parameter among the values of a board."""
+        return shown_name(key, self.owner, self.name)
 
     def adjusted(self, values: Values) -> Values:
         """The values as all weights take them in the presence of the effect, which may correct sizes and density."""
@@ -124,36 +208,16 @@ class Effect(ABC):
         """The plate's outline where it is not the whole rectangle."""
         return None
 
-    def fields(self) -> Mapping[Group, tuple[Field | None, ...]]:
-        """Fields that the plate's own terms take instead of being uniform (None is uniform), by group of terms."""
-        return {}
-
-    def field_weights(self, values: Values) -> Mapping[Group, tuple[Floats, ...]]:
-        """Factor on the weight of the plate's own terms for each field; empty where each is one."""
+    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+        """Fields that the plate's own terms follow instead of being uniform, by group of terms."""
         return {}
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """Whether the two halves of the plate stay alike along x and along y."""
         return True, True
 
-    def stiffness(self, x: Line, y: Line) -> tuple[Term, ...]:
-        """Stiffness terms."""
-        return ()
-
-    def masses(self, x: Line, y: Line) -> tuple[KronSum, ...]:
-        """Mass terms on the deflection."""
-        return ()
-
-    def projected_masses(self) -> tuple[Projection, ...]:
-        """Mass terms that have no sparse matrix."""
-        return ()
-
-    def stiffness_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """Weight of each stiffness term, s^-2: numbers or (n_draws,) arrays."""
-        return ()
-
-    def mass_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """Weight of each mass term, sparse ones first, as fractions of the vibrating mass."""
+    def contributions(self) -> tuple[Contribution, ...]:
+        """The terms that the effect adds to the budget of energies."""
         return ()
 
     def reweigh(self, base: Weights, values: Values, setup: Setup) -> Weights:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesplate.effects.base import EffectParameter, Floats, Release
-from bayesplate.effects.clamps import CompliantClamp, spring_weights
+from bayesplate.effects.base import Contribution, Release
+from bayesplate.effects.clamps import CompliantClamp
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import EdgeTurn, Term
-from bayesplate.plate.board import Values
-from bayesplate.plate.setup import Setup
+from bayesplate.plate.parameter import Parameter
 from bayesplate.quantities import Quantity
 
 STIFFEST = 1e-5
@@ -35,14 +34,14 @@ class ClampRotation(CompliantClamp):
     sentence: ClassVar[str] = "The clamp lets the board turn a little, as if the board were longer than it is."
     releases: ClassVar[Release] = "slope"
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """The compliance D / (k_R L)."""
-        return (EffectParameter("compliance", "1", _PRIOR, _SOURCE),)
+        return (self.parameter("compliance", _PRIOR, "1", 0.0, _SOURCE),)
 
-    def stiffness(self, x: Line, y: Line) -> tuple[Term, ...]:
-        """The squared turning along the clamped edges of each side."""
-        return tuple(EdgeTurn(axis, at) for axis, at in enumerate(self.clamped) if any(at))
+    def contributions(self) -> tuple[Contribution, ...]:
+        """The squared turning along the clamped edges of each side, with k_R over rho h and the cube of the side."""
 
-    def stiffness_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """k_R over rho h and the third power of the side."""
-        return spring_weights(self.clamped, self.value(values, "compliance"), STIFFEST, 3, values, setup)
+        def turning(x: Line, y: Line, side: int) -> Term:
+            return EdgeTurn(side, self.clamped[side])
+
+        return self.springs(turning, STIFFEST, power=3)

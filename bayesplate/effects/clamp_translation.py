@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesplate.effects.base import EffectParameter, Floats, Release
-from bayesplate.effects.clamps import CompliantClamp, spring_weights
+from bayesplate.effects.base import Contribution, Release
+from bayesplate.effects.clamps import CompliantClamp
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import Term
-from bayesplate.plate.board import Values
-from bayesplate.plate.setup import Setup
+from bayesplate.plate.parameter import Parameter
 from bayesplate.quantities import Quantity
 
 STIFFEST = 1e-7
@@ -35,20 +34,15 @@ class ClampTranslation(CompliantClamp):
     sentence: ClassVar[str] = "The clamp gives way across the board, most of all in its higher modes."
     releases: ClassVar[Release] = "value"
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """The compliance D / (k_T L^3)."""
-        return (EffectParameter("compliance", "1", _PRIOR, _SOURCE),)
+        return (self.parameter("compliance", _PRIOR, "1", 0.0, _SOURCE),)
 
-    def stiffness(self, x: Line, y: Line) -> tuple[Term, ...]:
-        """The squared deflection along the clamped edges of each side."""
-        along_x, along_y = self.clamped
-        terms: list[Term] = []
-        if any(along_x):
-            terms.append(((x.at_ends(along_x, 0), y.mass),))
-        if any(along_y):
-            terms.append(((x.mass, y.at_ends(along_y, 0)),))
-        return tuple(terms)
+    def contributions(self) -> tuple[Contribution, ...]:
+        """The squared deflection along the clamped edges of each side, with k_T over rho h and the side."""
 
-    def stiffness_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """k_T over rho h and the side."""
-        return spring_weights(self.clamped, self.value(values, "compliance"), STIFFEST, 1, values, setup)
+        def deflection(x: Line, y: Line, side: int) -> Term:
+            held = self.clamped[side]
+            return ((x.at_ends(held, 0), y.mass),) if side == 0 else ((x.mass, y.at_ends(held, 0)),)
+
+        return self.springs(deflection, STIFFEST, power=1)

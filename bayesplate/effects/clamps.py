@@ -1,13 +1,17 @@
-"""What the two clamp effects share: which edges are clamped, and what springs of one stiffness weigh along them."""
+"""What the two clamp effects share: which edges are clamped, and springs of one stiffness along them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
 
-from bayesplate.effects.base import Effect, Floats, Scope
+from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
+from bayesplate.modes.line import Line
+from bayesplate.modes.plate import Term
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.setup import Setup
 
@@ -37,39 +41,47 @@ class CompliantClamp(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Self:
         """The effect on all clamped edges of the setup."""
-        return cls(setup.name, clamped_ends(setup))
+        return cls(setup.owner, clamped_ends(setup))
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
         """Refused where no edge is clamped."""
         return "" if any(any(at) for at in clamped_ends(setup)) else "no edge is clamped"
 
+    def in_setup(self, board: Board, setup: Setup) -> Self | None:
+        """The same springs on the clamped edges of another setup."""
+        return None if self.refusal(board, setup) else replace(self, owner=setup.owner, clamped=clamped_ends(setup))
 
-def spring_weights(
-    clamped: ClampedEnds, compliance: Floats, stiffest: float, power: int, values: Values, setup: Setup
-) -> tuple[Floats, ...]:
-    """Weight of springs along the clamped edges of each side that has any, s^-2.
+    def springs(
+        self, matrix: Callable[[Line, Line, int], Term], stiffest: float, power: int
+    ) -> tuple[Contribution, ...]:
+        """Springs along the clamped edges of each side that has any.
 
-    Parameters
-    ----------
-    clamped : ClampedEnds
-    compliance : array, no unit
-        D / (k L^(4 - power)) of the first side that has a clamped edge; k is the same along all of them. Taken as 0
-        where it is negative: a normal approximation of the posterior may ask for that.
-    stiffest : float
-        Added to the compliance: with too stiff a spring the modal matrices lose digits.
-    power : int
-        A spring of stiffness k has the weight k / (rho h L^power): 3 if it holds the slope, 1 if the deflection.
-    values : dict of array
-    setup : Setup
+        Parameters
+        ----------
+        matrix : callable
+            From the lines and a side, 0 for the edges x0 and x1, 1 for y0 and y1, to what the springs hold there.
+        stiffest : float
+            Added to the compliance: with too stiff a spring the reduced-order model loses digits.
+        power : int
+            A spring of stiffness k has the weight k / (rho h L^power): 3 if it holds the slope, 1 if the deflection.
+            The parameter `compliance` is D / (k L^(4 - power)) of the first side that has a clamped edge; k is the same
+            along all of them. It is taken as 0 where it is negative: a normal approximation may ask for that.
+        """
+        first = 0 if any(self.clamped[0]) else 1
 
-    Returns
-    -------
-    tuple of array
-    """
-    sides = vibrating_lengths(values, setup)
-    first = 0 if any(clamped[0]) else 1
-    rigidity = values["D_x" if first == 0 else "D_y"]
-    stiffness = rigidity / ((np.maximum(compliance, 0.0) + stiffest) * sides[first] ** (4 - power))
-    areal = density(values) * values["thickness"]
-    return tuple(stiffness / (areal * side**power) for side, at in zip(sides, clamped, strict=True) if any(at))
+        def weight(values: Values, setup: Setup, side: int) -> Floats:
+            sides = vibrating_lengths(values, setup)
+            compliance = np.maximum(self.value(values, "compliance"), 0.0) + stiffest
+            stiffness = values["D_x" if first == 0 else "D_y"] / (compliance * sides[first] ** (4 - power))
+            return stiffness / (density(values) * values["thickness"] * sides[side] ** power)
+
+        return tuple(
+            Stiffness(partial(_on_side, matrix=matrix, side=side), partial(weight, side=side))
+            for side, at in enumerate(self.clamped)
+            if any(at)
+        )
+
+
+def _on_side(x: Line, y: Line, matrix: Callable[[Line, Line, int], Term], side: int) -> Term:
+    return matrix(x, y, side)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.modes.fields import Field, Group
-from bayesplate.plate.board import Board, Values
+from bayesplate.modes.fields import Group
+from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -40,22 +41,25 @@ class DensityGradient(Effect):
         """The effect on the part of the board that vibrates."""
         return cls(part=vibrating_part(board, setup, "x"))
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    def in_setup(self, board: Board, setup: Setup) -> DensityGradient:
+        """The same gradient on the part of the board that vibrates in another setup."""
+        return replace(self, part=vibrating_part(board, setup, "x"))
+
+    def parameters(self) -> tuple[Parameter, ...]:
         """Relative growth of the density from x = 0 to the other end."""
-        return (EffectParameter("gradient", "1", DEFAULT_GRADIENT, _SOURCE),)
+        return (self.parameter("gradient", DEFAULT_GRADIENT, "1", 0.0, _SOURCE),)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """The two ends along x differ."""
         return False, True
 
-    def fields(self) -> Mapping[Group, tuple[Field | None, ...]]:
-        """Inertia as it is, and growing along x from the middle of the vibrating part."""
-        return dict.fromkeys(("mass", "rotary"), (None, _along_x))
-
-    def field_weights(self, values: Values) -> Mapping[Group, tuple[Floats, ...]]:
-        """Density at the middle of the vibrating part, and its growth over that part, both relative to the mean."""
-        gradient = self.value(values, "gradient")
-        return dict.fromkeys(("mass", "rotary"), (1.0 + gradient * self.part.middle, gradient * self.part.share))
+    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+        """Inertia as at the middle of the vibrating part, and growing along x from there, both relative to the mean."""
+        inertia = (
+            Variation(None, lambda values: 1.0 + self.value(values, "gradient") * self.part.middle),
+            Variation(_along_x, lambda values: self.value(values, "gradient") * self.part.share),
+        )
+        return dict.fromkeys(("mass", "rotary"), inertia)
 
 
 def _along_x(x: Floats, y: Floats) -> Floats:

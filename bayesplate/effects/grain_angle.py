@@ -7,9 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Effect, EffectParameter, Scope
+from bayesplate.effects.base import Effect, Scope
 from bayesplate.modes.plate import THIN_TERMS, Weights
 from bayesplate.plate.board import Board, Values, vibrating_lengths
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -36,15 +37,19 @@ class GrainAngle(Effect):
     scope: ClassVar[Scope] = "board"
     sentence: ClassVar[str] = "The grain runs at an angle to the sides, so bending and twist are no longer separate."
     turns_grain: ClassVar[bool] = True
+    references: ClassVar[tuple[str, ...]] = (
+        "N. T. Mascia, F. A. R. Lahr: Remarks on orthotropic elastic models applied to wood. Materials Research 9, "
+        "301-310 (2006), doi:10.1590/S1516-14392006000300010. [the turned grain]",
+    )
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> GrainAngle:
         """The effect; it is the same in every setup."""
         return cls()
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """Angle from the side x to the grain."""
-        return (EffectParameter("angle", "rad", DEFAULT_ANGLE, _SOURCE),)
+        return (self.parameter("angle", DEFAULT_ANGLE, "rad", 0.0, _SOURCE),)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """Neither half mirrors the other; only half a turn leaves the plate as it was."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Literal
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
 from bayesplate.modes.line import Line
-from bayesplate.modes.plate import Term
+from bayesplate.modes.plate import KronSum
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -42,7 +44,7 @@ class MembraneTension(Effect):
         """Equal tension along all sides of the setup that are held at both ends."""
         held = "".join(axis for axis, ends in (("x", setup.ends_x), ("y", setup.ends_y)) if "free" not in ends)
         axis: Axis = "x" if held == "x" else "y" if held == "y" else "both"
-        return cls(setup.name, axis)
+        return cls(setup.owner, axis)
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[MembraneTension, ...]:
@@ -50,7 +52,7 @@ class MembraneTension(Effect):
         if cls.refusal(board, setup):
             return ()
         equal = cls.of(board, setup)
-        return (equal,) if equal.axis != "both" else (equal, cls(setup.name, "x"), cls(setup.name, "y"))
+        return (equal,) if equal.axis != "both" else (equal, cls(setup.owner, "x"), cls(setup.owner, "y"))
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -59,19 +61,32 @@ class MembraneTension(Effect):
             return "no two opposite edges are held, so nothing can stretch the board"
         return ""
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    @property
+    def detail(self) -> str:
+        """The side along which it acts, if not equally along both."""
+        return "" if self.axis == "both" else f"along {self.axis}"
+
+    def parameters(self) -> tuple[Parameter, ...]:
         """The tension."""
-        return (EffectParameter("N", "N/m", _PRIOR, _SOURCE),)
+        return (self.parameter("N", _PRIOR, "N/m", 0.0, _SOURCE, words="tension"),)
 
-    def stiffness(self, x: Line, y: Line) -> tuple[Term, ...]:
-        """The squared slopes along the sides that are stretched."""
-        along_x: Term = ((x.slope, y.mass),)
-        along_y: Term = ((x.mass, y.slope),)
-        return (along_x, along_y) if self.axis == "both" else (along_x,) if self.axis == "x" else (along_y,)
+    def contributions(self) -> tuple[Contribution, ...]:
+        """The squared slope along each side that is stretched, with N over rho h and the square of the side."""
 
-    def stiffness_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """N over rho h and the square of the side."""
-        areal = density(values) * values["thickness"]
-        sides = dict(zip("xy", vibrating_lengths(values, setup), strict=True))
-        axes = "xy" if self.axis == "both" else self.axis
-        return tuple(self.value(values, "N") / (areal * sides[axis] ** 2) for axis in axes)
+        def weight(values: Values, setup: Setup, side: int) -> Floats:
+            areal = density(values) * values["thickness"]
+            return self.value(values, "N") / (areal * vibrating_lengths(values, setup)[side] ** 2)
+
+        sides = {"x": (0,), "y": (1,), "both": (0, 1)}[self.axis]
+        return tuple(Stiffness(_SQUARED_SLOPES[side], partial(weight, side=side)) for side in sides)
+
+
+def _along_x(x: Line, y: Line) -> KronSum:
+    return ((x.slope, y.mass),)
+
+
+def _along_y(x: Line, y: Line) -> KronSum:
+    return ((x.mass, y.slope),)
+
+
+_SQUARED_SLOPES = (_along_x, _along_y)

@@ -8,11 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Effect, Floats, Scope
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
 from bayesplate.effects.stations import Stations
 from bayesplate.modes.fields import Outline
 from bayesplate.plate.board import Board, Values, density
+from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.setup import Ends, Setup
 
 _MEAN_POINTS = 2000
@@ -53,12 +54,23 @@ class OutlineProfile(Effect):
             (0.0,) * len(width.at_x),
             tuple(reading / width.mean for reading in width.readings),
         )
-        return cls("", setup.ends_y, vibrating_part(board, setup, "x"), stations)
+        return cls(BOARD, setup.ends_y, vibrating_part(board, setup, "x"), stations)
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
         """Whether the card's width was read at stations along the board."""
         return bool(board.inputs["length_y"].at_x)
+
+    @classmethod
+    def notes(cls, board: Board) -> tuple[str, ...]:
+        """That readings of the width at stations serve for their mean alone where the effect is not declared."""
+        if cls.name in board.effects or not board.inputs["length_y"].has_profile:
+            return ()
+        return (f"the length_y was read at several places: its mean is used, the {cls.name} is not part of this model",)
+
+    def in_setup(self, board: Board, setup: Setup) -> OutlineProfile | None:
+        """The same outline in another setup."""
+        return None if self.refusal(board, setup) else self.of(board, setup)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -69,7 +81,7 @@ class OutlineProfile(Effect):
             return "neither y0 nor y1 is free, and a held edge is straight"
         return ""
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """None: the readings say it all."""
         return ()
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, EffectParameter, Scope
+from bayesplate.effects.base import Effect, Scope
 from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -23,7 +24,14 @@ class PoissonRatio(Effect):
 
     Its parameter is the board's input `poisson_xy` itself: once declared, every use of that input, from the weight of
     the mixed term to E from D, takes the free value.
+
+    Attributes
+    ----------
+    stated : float
+        The card's own number.
     """
+
+    stated: float = FREE_POISSON.mean
 
     name: ClassVar[str] = "poisson_ratio"
     scope: ClassVar[Scope] = "board"
@@ -32,7 +40,7 @@ class PoissonRatio(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> PoissonRatio:
         """The effect; it is the same in every setup."""
-        return cls()
+        return cls(stated=board.inputs["poisson_xy"].mean)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -42,10 +50,7 @@ class PoissonRatio(Effect):
             return f"poisson_xy is already uncertain ({stated.mean:g} +- {stated.sd:g}) and so part of every fit"
         return ""
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
-        """The Poisson ratio nu_xy."""
-        return (EffectParameter("nu_xy", "1", FREE_POISSON, _SOURCE),)
-
-    def key(self, parameter: str) -> str:
-        """The board's own input, so that declaring the effect replaces the card's number."""
-        return "poisson_xy"
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The Poisson ratio nu_xy, in the place of the board's own; the card's number is its null value."""
+        free = self.parameter("nu_xy", FREE_POISSON, "1", self.stated, _SOURCE)
+        return (replace(free, replaces="poisson_xy", words="Poisson ratio nu_xy"),)

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Contribution, Effect, Floats, ProjectedMass, Scope
 from bayesplate.modes.line import Line
-from bayesplate.modes.plate import Projection
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -33,7 +33,7 @@ class SupportMass(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> SupportMass:
         """The effect in a setup."""
-        return cls(setup.name)
+        return cls(setup.owner)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -42,19 +42,19 @@ class SupportMass(Effect):
             return "no two opposite edges are held, so there is no frame that would only shift"
         return ""
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
-        """The frame's mass."""
-        return (EffectParameter("mass", "kg", _PRIOR, _SOURCE),)
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The frame's mass; one of a thousand tons stands still."""
+        return (self.parameter("mass", _PRIOR, "kg", 1e6, _SOURCE),)
 
-    def projected_masses(self) -> tuple[Projection, ...]:
-        """Less the product of the mean deflections."""
-        return (_mean_products,)
+    def contributions(self) -> tuple[Contribution, ...]:
+        """Less the product of the mean deflections, with the share of the vibrating mass in frame and board."""
 
-    def mass_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """The share of the vibrating mass in frame and board."""
-        length_x, length_y = vibrating_lengths(values, setup)
-        vibrating = density(values) * values["thickness"] * length_x * length_y
-        return (vibrating / (self.value(values, "mass") + vibrating),)
+        def weight(values: Values, setup: Setup) -> Floats:
+            length_x, length_y = vibrating_lengths(values, setup)
+            vibrating = density(values) * values["thickness"] * length_x * length_y
+            return vibrating / (self.value(values, "mass") + vibrating)
+
+        return (ProjectedMass(_mean_products, weight),)
 
 
 def _mean_products(x: Line, y: Line, deflections: Floats) -> Floats:

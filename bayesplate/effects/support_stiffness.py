@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
 from bayesplate.modes.line import Line
-from bayesplate.modes.plate import Term
+from bayesplate.modes.plate import KronSum
 from bayesplate.plate.board import Board, Values, density
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -30,23 +31,27 @@ class SupportStiffness(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> SupportStiffness:
         """The effect under the whole board."""
-        return cls(setup.name)
+        return cls(setup.owner)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
         """Refused where an edge is held: such a board lies on nothing."""
-        if {*setup.ends_x, *setup.ends_y} != {"free"}:
+        if not setup.is_free:
             return "an edge is held, so the board does not lie or hang on anything else"
         return ""
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """Stiffness per area."""
-        return (EffectParameter("stiffness", "N/m^3", _PRIOR, _SOURCE),)
+        return (self.parameter("stiffness", _PRIOR, "N/m^3", 0.0, _SOURCE),)
 
-    def stiffness(self, x: Line, y: Line) -> tuple[Term, ...]:
-        """The squared deflection over the board."""
-        return (((x.mass, y.mass),),)
+    def contributions(self) -> tuple[Contribution, ...]:
+        """The squared deflection over the board, with the weight k over rho h."""
 
-    def stiffness_weights(self, values: Values, setup: Setup) -> tuple[Floats, ...]:
-        """k over rho h."""
-        return (self.value(values, "stiffness") / (density(values) * values["thickness"]),)
+        def weight(values: Values, setup: Setup) -> Floats:
+            return self.value(values, "stiffness") / (density(values) * values["thickness"])
+
+        return (Stiffness(_squared_deflection, weight),)
+
+
+def _squared_deflection(x: Line, y: Line) -> KronSum:
+    return ((x.mass, y.mass),)

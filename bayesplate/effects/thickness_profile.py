@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import comb
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, EffectParameter, Floats, Scope
+from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
 from bayesplate.effects.stations import Stations
 from bayesplate.modes.fields import Field, Group
 from bayesplate.plate.board import Board, Values, density
+from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -54,10 +55,10 @@ class ThicknessProfile(Effect):
         """The effect with the board's readings where they have places."""
         parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
         if not cls.is_implied(board):
-            return cls("", *parts)
+            return cls(BOARD, *parts)
         thickness, length_x, length_y = (board.inputs[n] for n in ("thickness", "length_x", "length_y"))
         return cls(
-            "",
+            BOARD,
             *parts,
             Stations(
                 tuple(at / length_x.mean for at in thickness.at_x),
@@ -72,11 +73,26 @@ class ThicknessProfile(Effect):
         thickness = board.inputs["thickness"]
         return bool(thickness.at_x and thickness.at_y)
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
+    @classmethod
+    def notes(cls, board: Board) -> tuple[str, ...]:
+        """That readings of the thickness at places serve for their mean alone where the effect is not declared."""
+        if cls.name in board.effects or not board.inputs["thickness"].has_profile:
+            return ()
+        told = "the thickness was read at several places: its mean is used"
+        return (f"{told}, the {cls.name} is not part of this model",)
+
+    def in_setup(self, board: Board, setup: Setup) -> ThicknessProfile:
+        """The same profile on the part of the board that vibrates in another setup."""
+        part_x, part_y = (vibrating_part(board, setup, axis) for axis in "xy")
+        return replace(self, part_x=part_x, part_y=part_y)
+
+    def parameters(self) -> tuple[Parameter, ...]:
         """None with readings, otherwise the relative growth of the thickness from end to end, along x and along y."""
         if self.stations is not None:
             return ()
-        return tuple(EffectParameter(name, "1", DEFAULT_TAPER, _SOURCE) for name in ("taper_x", "taper_y"))
+        return tuple(
+            self.parameter(f"taper_{axis}", DEFAULT_TAPER, "1", 0.0, _SOURCE, f"taper along {axis}") for axis in "xy"
+        )
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """Neither half mirrors the other, save across a board that was read along one row only."""
@@ -88,29 +104,25 @@ class ThicknessProfile(Effect):
             return values
         return {**values, "density": density(values) / self.stations.mean}
 
-    def fields(self) -> Mapping[Group, tuple[Field | None, ...]]:
-        """Powers of the known profile, or the powers of x and y that a taper is made of."""
+    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+        """Powers of the known profile, or of a taper: (c + a u + b v)^n by the multinomial theorem."""
         if self.stations is not None:
-            known = {power: (partial(self._known, power=power),) for power in (1, 3)}
+            known = {power: (Variation(partial(self._known, power=power)),) for power in (1, 3)}
             return {group: known[power] for group, power in _POWERS.items()}
-        monomials: dict[tuple[int, int], Field | None] = {
+        fields: dict[tuple[int, int], Field | None] = {
             (i, j): partial(_monomial, i=i, j=j) if i + j else None for i, j in _exponents(max(_POWERS.values()))
         }
-        return {group: tuple(monomials[e] for e in _exponents(power)) for group, power in _POWERS.items()}
-
-    def field_weights(self, values: Values) -> Mapping[Group, tuple[Floats, ...]]:
-        """Coefficients of the powers of a taper; (c + a u + b v)^n by the multinomial theorem."""
-        if self.stations is not None:
-            return {}
-        taper_x, taper_y = self.value(values, "taper_x"), self.value(values, "taper_y")
-        along_x, along_y = taper_x * self.part_x.share, taper_y * self.part_y.share
-        middle = 1.0 + taper_x * self.part_x.middle + taper_y * self.part_y.middle
         return {
-            group: tuple(
-                comb(n, i) * comb(n - i, j) * middle ** (n - i - j) * along_x**i * along_y**j for i, j in _exponents(n)
-            )
+            group: tuple(Variation(fields[i, j], partial(self._coefficient, n=n, i=i, j=j)) for i, j in _exponents(n))
             for group, n in _POWERS.items()
         }
+
+    def _coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
+        """Of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
+        taper_x, taper_y = self.value(values, "taper_x"), self.value(values, "taper_y")
+        middle = 1.0 + taper_x * self.part_x.middle + taper_y * self.part_y.middle
+        along_x, along_y = taper_x * self.part_x.share, taper_y * self.part_y.share
+        return comb(n, i) * comb(n - i, j) * middle ** (n - i - j) * along_x**i * along_y**j
 
     def _known(self, x: Floats, y: Floats, power: int) -> Floats:
         assert self.stations is not None

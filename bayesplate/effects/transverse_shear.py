@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, EffectParameter, Scope, Theory
-from bayesplate.plate.board import Board
+from bayesplate.effects.base import Effect, Scope, Theory
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 _SOURCE = "spruce, log-normal around published values of G_xz 0.5-0.75 GPa and G_yz 20-40 MPa, widened for other woods"
+_RIGID = 1e13
+"""A modulus, Pa, at which the frequencies are those of the thin plate to a hundredth of a cent."""
+
 DEFAULT_XZ = Quantity.from_median(0.62e9, 1.5)
 DEFAULT_YZ = Quantity.from_median(0.030e9, 1.8)
 
@@ -33,14 +37,28 @@ class TransverseShear(Effect):
     theory: ClassVar[Theory] = "shear-flexible"
     sentence: ClassVar[str] = "The board gives way in shear through its thickness, so higher modes ring lower."
 
+    references: ClassVar[tuple[str, ...]] = (
+        "E. Reissner: The effect of transverse shear deformation on the bending of elastic plates. J. Appl. Mech. 12, "
+        "A69-A77 (1945). [the plate theory]",
+        "R. D. Mindlin: Influence of rotatory inertia and shear on flexural motions of isotropic, elastic plates. J. "
+        "Appl. Mech. 18, 31-38 (1951), doi:10.1115/1.4010217. [the plate theory]",
+        "M. Endo, N. Kimura: An alternative formulation of the boundary value problem for the Timoshenko beam and "
+        "Mindlin plate. J. Sound Vib. 301, 355-373 (2007). [shear strains as unknowns]",
+    )
+
     @classmethod
     def of(cls, board: Board, setup: Setup) -> TransverseShear:
         """The effect with the card's thick-plate constants where it gives them."""
         return cls(xz=board.shear_xz or DEFAULT_XZ, yz=board.shear_yz or DEFAULT_YZ)
 
-    def parameters(self) -> tuple[EffectParameter, ...]:
-        """G_xz and G_yz."""
-        return (
-            EffectParameter("G_xz", "Pa", self.xz, _SOURCE),
-            EffectParameter("G_yz", "Pa", self.yz, _SOURCE),
+    def parameters(self) -> tuple[Parameter, ...]:
+        """G_xz and G_yz; a plate stiffer than any solid does not give way in shear."""
+        given = (("G_xz", self.xz, DEFAULT_XZ), ("G_yz", self.yz, DEFAULT_YZ))
+        return tuple(
+            self.parameter(key, prior, "Pa", _RIGID, _SOURCE if prior is default else "")
+            for key, prior, default in given
         )
+
+    def adjusted(self, values: Values) -> Values:
+        """The values with the two moduli under the names that the shear-flexible plate knows."""
+        return {**values, **{key: self.value(values, key) for key in ("G_xz", "G_yz")}}

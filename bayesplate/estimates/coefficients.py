@@ -135,7 +135,8 @@ def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingCons
         if printed is not None and (not _has_shear(model) or (printed.G_xz and printed.G_yz)):
             return printed, f"those of {setup.published_coefficients}"
     E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    shear = {name: float(values[f"transverse_shear.{name}"]) for name in ("G_xz", "G_yz") if _has_shear(model)}
+    there = model.system.adjusted(values)
+    shear = {name: float(there[name]) for name in ("G_xz", "G_yz") if _has_shear(model)}
     own = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
     return own, "the weighted least-squares estimate"
 

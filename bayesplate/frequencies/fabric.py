@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.effects.base import Effect, Theory
+from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.modes.fields import Fabric, Field, Group, layout
 from bayesplate.modes.plate import Weights, thin_groups
 from bayesplate.modes.shear import shear_groups
@@ -20,18 +20,33 @@ Floats = NDArray[np.float64]
 _GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")
 
 
+Joined = tuple[Variation, ...]
+"""One field of a property where several effects vary it: the product of one variation per effect."""
+
+
+@lru_cache(maxsize=32)
+def _joined(effects: tuple[Effect, ...]) -> dict[Group, list[Joined]]:
+    """Every variation of one effect with every one of the others, by group; empty where no effect varies anything.
+
+    Fields and weights are both read from this one list.
+    """
+    varying = [variations for effect in effects if (variations := effect.variations())]
+    if not varying:
+        return {}
+    uniform = (Variation(None),)
+    return {group: list(product(*(each.get(group, uniform) for each in varying))) for group in _GROUPS}
+
+
 def fabric_of(effects: Sequence[Effect]) -> Fabric:
     """What a plate is made of in the presence of effects.
 
     Where several vary the same property, every field of one multiplies every field of the others.
     """
-    varying = [effect.fields() for effect in effects]
     outlines = [outline for effect in effects if (outline := effect.outline()) is not None]
     return Fabric(
         fields={
-            group: [reduce(_times, each) for each in product(*(fields.get(group, (None,)) for fields in varying))]
-            for group in _GROUPS
-            if varying
+            group: [reduce(_times, (one.field for one in joined)) for joined in each]
+            for group, each in _joined(tuple(effects)).items()
         },
         outline=outlines[0] if outlines else None,
         is_turned=any(effect.turns_grain for effect in effects),
@@ -55,13 +70,10 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
     Weights
         In the order of `bayesplate.modes.fields.layout`.
     """
-    varying = [given for effect in effects if (given := effect.field_weights(values))]
-    if not varying:
+    varying = _joined(tuple(effects))
+    if not any(one.weight for each in varying.values() for joined in each for one in joined):
         return base
-    weights: dict[Group, list[Floats]] = {
-        group: [reduce(np.multiply, each) for each in product(*(w.get(group, (np.ones(1),)) for w in varying))]
-        for group in _GROUPS
-    }
+    weights = {group: [_weight(joined, values) for joined in each] for group, each in varying.items()}
     counts = {group: len(made) for group, made in weights.items()}
     is_turned = any(effect.turns_grain for effect in effects)
     groups = thin_groups(is_turned) if theory == "thin" else shear_groups(is_turned)
@@ -71,6 +83,10 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
         return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
     return Weights(*(spread(own, group) for own, group in zip(base, groups, strict=True)))
+
+
+def _weight(joined: Joined, values: Values) -> Floats:
+    return reduce(np.multiply, (one.weight(values) for one in joined if one.weight), np.ones(1))
 
 
 def _times(first: Field | None, second: Field | None) -> Field | None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from bayesplate.effects import effects_of
-from bayesplate.effects.base import Effect, Theory
+from bayesplate.effects.base import Effect, Mass, ProjectedMass, Stiffness, Theory
 from bayesplate.frequencies.fabric import fabric_of, over_fields
 from bayesplate.frequencies.shear_terms import shear_term_weights
 from bayesplate.frequencies.terms import term_weights
@@ -52,16 +54,28 @@ class System:
         elements = mesh(term_weights(values, self.setup).at(0), per_side)
         return _plate(self.setup.ends_x, self.setup.ends_y, self.theory, self.effects, *elements)
 
-    def weights(self, values: Values) -> Weights:
-        """What every term weighs: (n_draws, n_terms) and (n_draws, n_masses) arrays."""
+    @cached_property
+    def contributions(self) -> Contributions:
+        """The terms that the effects add, by kind."""
+        return contributions_of(self.effects)
+
+    def adjusted(self, values: Values) -> Values:
+        """The values as all weights take them: sizes and density corrected, shear moduli where the plate has them."""
         for effect in self.effects:
             values = effect.adjusted(values)
-        base = self._own_weights(values)
+        return values
+
+    def weights(self, values: Values) -> Weights:
+        """What every term weighs: (n_draws, n_terms) and (n_draws, n_masses) arrays."""
+        values = self.adjusted(values)
+        base = (shear_term_weights if self.theory == "shear-flexible" else term_weights)(values, self.setup)
         for effect in self.effects:
             base = effect.reweigh(base, values, self.setup)
         base = over_fields(base, self.effects, self.theory, values)
-        stiffness = [w for e in self.effects for w in e.stiffness_weights(values, self.setup)]
-        masses = [w for e in self.effects for w in e.mass_weights(values, self.setup)]
+        added = self.contributions
+        stiffness = [one.weight(values, self.setup) for one in added.stiffness]
+        masses = [one.weight(values, self.setup) for one in added.masses]
+        masses += [one.weight(values, self.setup) for one in added.projected]
         if not stiffness and not masses:
             return base
         shape = np.broadcast_shapes(base.stiffness.shape[:1], *(np.shape(w) for w in (*stiffness, *masses)))
@@ -73,12 +87,23 @@ class System:
         ]
         return Weights(*joined)
 
-    def _own_weights(self, values: Values) -> Weights:
-        for effect in self.effects:
-            if effect.theory == "shear-flexible":
-                shear = {name: effect.value(values, name) for name in ("G_xz", "G_yz")}
-                return shear_term_weights({**values, **shear}, self.setup)
-        return term_weights(values, self.setup)
+
+class Contributions(NamedTuple):
+    """The terms that effects add to the budget of energies, by kind; their weights stand in this order too."""
+
+    stiffness: tuple[Stiffness, ...]
+    masses: tuple[Mass, ...]
+    projected: tuple[ProjectedMass, ...]
+
+
+def contributions_of(effects: Sequence[Effect]) -> Contributions:
+    """What some effects add, by kind: matrices and weights are both read from this one list."""
+    added = [one for effect in effects for one in effect.contributions()]
+    return Contributions(
+        tuple(one for one in added if isinstance(one, Stiffness)),
+        tuple(one for one in added if isinstance(one, Mass)),
+        tuple(one for one in added if isinstance(one, ProjectedMass)),
+    )
 
 
 def system_of(board: Board, setup: Setup) -> System:
@@ -94,9 +119,10 @@ def _plate(
     symmetry = [effect.keeps_symmetry() for effect in effects]
     x = line(ends_x, n_x, is_sheared, all(along_x for along_x, _ in symmetry), _held(ends_x, effects))
     y = line(ends_y, n_y, is_sheared, all(along_y for _, along_y in symmetry), _held(ends_y, effects))
-    stiffness = tuple(term for effect in effects for term in effect.stiffness(x, y))
-    masses = tuple(term for effect in effects for term in effect.masses(x, y))
-    projected = tuple(term for effect in effects for term in effect.projected_masses())
+    added = contributions_of(effects)
+    stiffness = tuple(one.matrix(x, y) for one in added.stiffness)
+    masses = tuple(one.matrix(x, y) for one in added.masses)
+    projected = tuple(one.projection for one in added.projected)
     fabric = fabric_of(effects)
     if is_sheared:
         return assemble_shear_flexible(x, y, stiffness, masses, projected, fabric)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import BoardCard, PriorCard, SetupSection
+from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE, AttachedItem, DeclaredAir, Reading, Setup
 from bayesplate.quantities import Quantity
 
@@ -19,19 +21,34 @@ Values = Mapping[str, NDArray[np.float64]]
 _MILLI = 1e-3
 
 
+INPUTS = {
+    "length_x": ("m", "length along the grain"),
+    "length_y": ("m", "length across the grain"),
+    "thickness": ("m", "thickness"),
+    "mass": ("kg", "mass"),
+    "density": ("kg/m^3", "density"),
+    "poisson_xy": ("1", "Poisson ratio nu_xy"),
+}
+"""What a card states of a board: unit, and what people call it."""
+
+
 @dataclass(frozen=True)
 class Board:
     """A board and its setups, in SI units.
 
+    `board_from_card` makes one from a card, `made_board` from numbers.
+
     Attributes
     ----------
-    name, title, source : str
-    inputs : dict of Quantity
-        What the card states: length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), poisson_xy, and the
-        length each clamp covers. A quantity with an uncertainty is a prior.
+    name : str
+    parameters : tuple of Parameter
+        What is known of the board besides the readings: length_x, length_y, thickness (m), mass (kg) or density
+        (kg m^-3), poisson_xy, the length each clamp covers, and what the declared effects take. A parameter with an
+        uncertainty is marginalised.
     setups : tuple of Setup
     prior : str
         Name of the prior card.
+    title, source : str
     effects : tuple of str
         Declared effects.
     chosen : tuple
@@ -42,7 +59,7 @@ class Board:
     """
 
     name: str
-    inputs: Mapping[str, Quantity]
+    parameters: tuple[Parameter, ...]
     setups: tuple[Setup, ...]
     prior: str = "weakly-informative"
     title: str = ""
@@ -53,14 +70,68 @@ class Board:
     shear_yz: Quantity | None = None
     notes: tuple[str, ...] = ()
 
+    @cached_property
+    def inputs(self) -> Mapping[str, Quantity]:
+        """Prior of every parameter by its name."""
+        return {parameter.name: parameter.prior for parameter in self.parameters}
+
+    @cached_property
+    def uncertain(self) -> tuple[Parameter, ...]:
+        """Parameters that carry an uncertainty, in a fixed order."""
+        return tuple(parameter for parameter in self.parameters if not parameter.prior.is_exact)
+
     @property
     def uncertain_inputs(self) -> dict[str, Quantity]:
-        """Inputs that carry an uncertainty, in a fixed order."""
-        return {name: quantity for name, quantity in self.inputs.items() if not quantity.is_exact}
+        """Priors of the uncertain parameters by name, in their order."""
+        return {parameter.name: parameter.prior for parameter in self.uncertain}
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of a name."""
+        return next(parameter for parameter in self.parameters if parameter.name == name)
+
+    def setup(self, name: str) -> Setup:
+        """The setup of a name."""
+        return next(setup for setup in self.setups if setup.name == name)
 
     def nominal(self) -> dict[str, NDArray[np.float64]]:
-        """Mean of every input."""
+        """Mean of every parameter."""
         return {name: np.asarray(quantity.mean) for name, quantity in self.inputs.items()}
+
+    def with_parameters(self, parameters: Iterable[Parameter]) -> Board:
+        """The board with further parameters; one of the same name takes the place of the earlier one."""
+        joined = {parameter.name: parameter for parameter in (*self.parameters, *parameters)}
+        return replace(self, parameters=tuple(joined.values()))
+
+    def with_priors(self, priors: Mapping[str, Quantity]) -> Board:
+        """The board with other priors of some of its parameters, by their names."""
+        unknown = set(priors) - set(self.inputs)
+        if unknown:
+            raise ValueError(f"priors: wanted names of {', '.join(self.inputs)}, got {', '.join(sorted(unknown))}")
+        return replace(
+            self, parameters=tuple(replace(one, prior=priors.get(one.name, one.prior)) for one in self.parameters)
+        )
+
+
+def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup], **more: Any) -> Board:
+    """A board from quantities in SI units, without a card.
+
+    Parameters
+    ----------
+    name : str
+    inputs : dict of Quantity
+        length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), and poisson_xy.
+    setups : sequence of Setup
+        What their clamps cover becomes parameters too.
+    **more
+        Other attributes of `Board`.
+
+    Returns
+    -------
+    Board
+    """
+    stated = [Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1]) for key, prior in inputs.items()]
+    covered = [parameter for setup in setups for parameter in setup.clamped_parameters]
+    return Board(name, (*stated, *covered), tuple(setups), **more)
 
 
 def board_from_card(card: BoardCard, prior: PriorCard | None = None) -> Board:
@@ -87,14 +158,12 @@ def board_from_card(card: BoardCard, prior: PriorCard | None = None) -> Board:
     elif card.plate.density_kg_m3 is not None:
         inputs["density"] = card.plate.density_kg_m3
     inputs["poisson_xy"] = _poisson(card, prior)
-    for setup in setups:
-        inputs |= {setup.input_name(edge): length for edge, length in setup.clamped.items()}
-    return Board(
-        name=card.name,
+    return made_board(
+        card.name,
+        inputs,
+        setups,
         title=card.title,
         source=card.source,
-        inputs=inputs,
-        setups=setups,
         prior=card.material.prior,
         effects=tuple(card.effects),
         shear_xz=_optional(card.material.shear_xz_gpa, 1e9),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.labels import Label
+from bayesplate.plate.parameter import Owner, Parameter, shown_name
 from bayesplate.quantities import Quantity
 
 End = Literal["clamped", "supported", "free"]
@@ -118,6 +119,29 @@ class Setup:
         """Relative uncertainty of each reading itself, apart from the noise: (n_modes,) array."""
         return np.array([reading.frequency.sd / reading.frequency.mean for reading in self.readings])
 
+    @property
+    def owner(self) -> Owner:
+        """The owner of the setup's parameters."""
+        return Owner("setup", self.name)
+
+    @property
+    def is_free(self) -> bool:
+        """Whether no edge is held."""
+        return {*self.ends_x, *self.ends_y} == {"free"}
+
+    @property
+    def noise_parameter(self) -> Parameter:
+        """The relative noise of a frequency as a parameter."""
+        return Parameter("noise", self.owner, self.noise, "1", words="noise")
+
+    @property
+    def clamped_parameters(self) -> tuple[Parameter, ...]:
+        """What the clamps cover, one parameter per clamped edge for which the card states it."""
+        return tuple(
+            Parameter(f"clamped_{edge}", self.owner, length, "m", words=f"covered by the clamp on {edge}")
+            for edge, length in self.clamped.items()
+        )
+
     def input_name(self, edge: str) -> str:
-        """Name under which the clamped length of an edge goes among the board's inputs."""
-        return f"clamped_{edge}[{self.name}]"
+        """Name of the clamped length of an edge among the board's inputs."""
+        return shown_name(f"clamped_{edge}", self.owner)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.effects import is_effect_parameter
 from bayesplate.estimates.refit import Bounds
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.parameter import Parameter
 
 N_RIGIDITIES = len(RIGIDITIES)
 
@@ -19,8 +20,8 @@ N_RIGIDITIES = len(RIGIDITIES)
 class Parameters:
     """Names, order and meaning of the columns that are sampled.
 
-    Columns: ln D_x, ln D_y, ln D_s (N m); ln of the relative noise, one a setup; the standard coordinate z of each
-    uncertain input of the card (`bayesplate.quantities`).
+    Columns: ln D_x, ln D_y, ln D_s (N m); ln of the relative noise, one per setup; the standard coordinate z of each
+    uncertain parameter of the board (`bayesplate.quantities`).
 
     Attributes
     ----------
@@ -34,40 +35,58 @@ class Parameters:
         """Number of setups."""
         return len(self.board.setups)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the uncertain inputs, in the order of their columns."""
-        return tuple(self.board.uncertain_inputs)
+    @cached_property
+    def noises(self) -> tuple[Parameter, ...]:
+        """The relative noise of each setup."""
+        return tuple(setup.noise_parameter for setup in self.board.setups)
 
     @property
+    def uncertain(self) -> tuple[Parameter, ...]:
+        """The uncertain parameters of the board, in the order of their columns."""
+        return self.board.uncertain
+
+    @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(parameter.name for parameter in self.uncertain)
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of all columns."""
-        noises = [f"log_noise[{setup.name}]" for setup in self.board.setups]
+        noises = [f"log_{noise.name}" for noise in self.noises]
         return (*(f"log_{name}" for name in RIGIDITIES), *noises, *(f"z[{name}]" for name in self.inputs))
 
     @property
+    def first_input(self) -> int:
+        """Column of the first uncertain parameter of the board."""
+        return N_RIGIDITIES + self.n_setups
+
+    @cached_property
     def n_dim(self) -> int:
         """Number of columns."""
-        return N_RIGIDITIES + self.n_setups + len(self.inputs)
+        return self.first_input + len(self.inputs)
 
-    @property
+    @cached_property
     def fitted_columns(self) -> NDArray[np.intp]:
         """Columns that frequencies depend on: all but the noise."""
-        return np.r_[:N_RIGIDITIES, N_RIGIDITIES + self.n_setups : self.n_dim]
+        return np.r_[:N_RIGIDITIES, self.first_input : self.n_dim]
 
-    @property
+    @cached_property
     def effect_columns(self) -> list[int]:
-        """Columns of the parameters of effects."""
-        return [i for i, n in enumerate(self.inputs, start=N_RIGIDITIES + self.n_setups) if is_effect_parameter(n)]
+        """Columns of the sizes of effects."""
+        return [i for i, one in enumerate(self.uncertain, start=self.first_input) if one.is_of_effect]
 
-    @property
+    @cached_property
     def fitted_bounds(self) -> Bounds:
-        """Limits of the fitted columns: those of the inputs' priors."""
+        """Limits of the fitted columns: those of the priors."""
         lower, upper = np.full(self.n_dim, -np.inf), np.full(self.n_dim, np.inf)
-        for i, quantity in enumerate(self.board.uncertain_inputs.values(), start=N_RIGIDITIES + self.n_setups):
-            lower[i] = float(quantity.standard(quantity.lower)) if np.isfinite(quantity.lower) else -np.inf
-            upper[i] = float(quantity.standard(quantity.upper)) if np.isfinite(quantity.upper) else np.inf
+        for i, parameter in enumerate(self.uncertain, start=self.first_input):
+            lower[i], upper[i] = parameter.prior.standard_bounds
         return Bounds(lower[self.fitted_columns], upper[self.fitted_columns])
+
+    @cached_property
+    def _exact(self) -> dict[str, NDArray[np.float64]]:
+        return {name: np.asarray(prior.mean) for name, prior in self.board.inputs.items() if prior.is_exact}
 
     def values(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Rigidities and inputs by name, SI; (n_draws,) arrays, or numbers for exact inputs.
@@ -76,29 +95,31 @@ class Parameters:
         ----------
         theta : (n_draws, n_dim) array
         """
-        values: dict[str, NDArray[np.float64]] = {}
-        for name, quantity in self.board.inputs.items():
-            if quantity.is_exact:
-                values[name] = np.asarray(quantity.mean)
-            else:
-                values[name] = quantity.value(self._z(theta, name))
-        return values | {name: np.exp(theta[:, i]) for i, name in enumerate(RIGIDITIES)}
+        values = dict(self._exact)
+        for i, parameter in enumerate(self.uncertain, start=self.first_input):
+            values[parameter.name] = parameter.prior.value(theta[:, i])
+        values.update((name, np.exp(theta[:, i])) for i, name in enumerate(RIGIDITIES))
+        return values
 
     def log_noise(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """ln of the relative noise: (n_draws, n_setups) array."""
-        return theta[:, N_RIGIDITIES : N_RIGIDITIES + self.n_setups]
+        return theta[:, N_RIGIDITIES : self.first_input]
 
     def log_prior_inputs(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log density of the input columns: (n_draws,) array."""
         total = np.zeros(theta.shape[0])
-        for name, quantity in self.board.uncertain_inputs.items():
-            total += quantity.log_prior(self._z(theta, name))
+        for i, parameter in enumerate(self.uncertain, start=self.first_input):
+            total += parameter.prior.log_prior(theta[:, i])
+        return total
+
+    def log_prior_noise(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log density of the columns of noise: (n_draws,) array."""
+        total = np.zeros(theta.shape[0])
+        for log_noise, noise in zip(self.log_noise(theta).T, self.noises, strict=True):
+            total += noise.prior.log_density_of_log(log_noise)
         return total
 
     def theta(self, values: Values, noise: NDArray[np.float64]) -> NDArray[np.float64]:
         """Columns of one point from rigidities, inputs and relative noises: (n_dim,) array; inverse of `values`."""
-        inputs = [float(q.standard(values[name])) for name, q in self.board.uncertain_inputs.items()]
+        inputs = [float(one.prior.standard(values[one.name])) for one in self.uncertain]
         return np.array([*(np.log(float(values[n])) for n in RIGIDITIES), *np.log(noise), *inputs])
-
-    def _z(self, theta: NDArray[np.float64], name: str) -> NDArray[np.float64]:
-        return theta[:, N_RIGIDITIES + self.n_setups + self.inputs.index(name)]

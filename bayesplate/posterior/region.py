@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.effects import is_effect_parameter
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.laws import LawName, cents
@@ -147,7 +146,6 @@ def exact_models(
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
     """
     parameters = Parameters(board)
-    first_input = N_RIGIDITIES + len(board.setups)
     ratios = np.eye(N_RIGIDITIES)[:2] - np.eye(N_RIGIDITIES)[2]
     spread = ratios @ covariance[:N_RIGIDITIES, :N_RIGIDITIES] @ ratios.T
     half_widths = np.zeros(parameters.n_dim)
@@ -155,11 +153,11 @@ def exact_models(
     sds = np.sqrt(np.diagonal(covariance))
     boxed = [0, 1]
     alone = []
-    for i, name in enumerate(parameters.inputs, start=first_input):
-        if name == "poisson_xy":
+    for i, parameter in enumerate(parameters.uncertain, start=parameters.first_input):
+        if parameter.name == "poisson_xy":
             boxed.append(i)
             half_widths[i] = _BOX_SDS
-        elif is_effect_parameter(name):
+        elif parameter.is_of_effect:
             alone.append(i)
             half_widths[i] = _BOX_SDS * sds[i]
     corners = np.zeros((2 ** len(boxed), parameters.n_dim))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +15,7 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
 from bayesplate.posterior.likelihood import Readings
 from bayesplate.posterior.parameters import Parameters
+from bayesplate.quantities import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class Posterior:
     prior : PriorCard
         Densities of E_x, E_y, G_xy or of D_x, D_y, D_s.
     models : sequence of SetupModel
-        One a setup.
+        One per setup.
     law : "linear" or "exact"
     robust : bool
     """
@@ -39,9 +40,11 @@ class Posterior:
     robust: bool = False
     parameters: Parameters = field(init=False)
     readings: tuple[Readings, ...] = field(init=False)
+    priors: Mapping[str, Quantity] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", Parameters(self.board))
+        object.__setattr__(self, "priors", self.prior.constants)
         object.__setattr__(self, "readings", tuple(Readings.of(s, self.robust) for s in self.board.setups))
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -54,10 +57,8 @@ class Posterior:
 
     def log_prior(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log prior density: (n_draws,) array."""
-        total = self.parameters.log_prior_inputs(theta) + self.log_prior_constants(theta)
-        for log_noise, setup in zip(self.parameters.log_noise(theta).T, self.board.setups, strict=True):
-            total += -0.5 * ((log_noise - np.log(setup.noise.median)) / setup.noise.log_sd) ** 2
-            total -= np.log(setup.noise.log_sd) + 0.5 * np.log(2.0 * np.pi)
+        total = self.parameters.log_prior_inputs(theta) + self.parameters.log_prior_noise(theta)
+        total += self.log_prior_constants(theta)
         return np.where(np.isnan(total), -np.inf, total)
 
     def log_prior_constants(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -69,8 +70,7 @@ class Posterior:
         values = self.parameters.values(theta)
         constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
         by_name = values | constants._asdict()
-        with np.errstate(invalid="ignore"):
-            densities = [d.log_density(np.log(by_name[name])) for name, d in self.prior.densities.items()]
+        densities = [prior.log_density_of_log(np.log(by_name[name])) for name, prior in self.priors.items()]
         return np.where(np.isnan(constants.E_x), -np.inf, np.sum(densities, axis=0))
 
     def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from bayesplate.cards import Density, PriorCard
+from bayesplate.cards import PriorCard
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import unit_of_people
 from bayesplate.posterior.inference import Inference
 from bayesplate.quantities import Quantity
-from bayesplate.report.priors import input_words, people_use
+from bayesplate.report.priors import input_words
 from bayesplate.report.words import (
     GPA,
     MISSING,
@@ -114,7 +114,7 @@ def effects_table(summary: Mapping[str, Any]) -> Table | None:
 
 def _measured(entry: Mapping[str, Any]) -> tuple[str, str]:
     """Mean ± sd and the unit, in the unit that people use."""
-    factor, unit = people_use(entry["unit"])
+    factor, unit = unit_of_people(entry["unit"])
     return _spread({key: entry[key] * factor for key in ("mean", "sd")}), unit or MISSING
 
 
@@ -139,7 +139,8 @@ def budget_table(inference: Inference, draws: Draws, summary: Mapping[str, Any])
         entry = summary["elastic"][name]
         largest = sorted(shares[name].items(), key=lambda item: -item[1])[:2]
         board = inference.problem.board
-        told = [f"{input_words(key, board)[0]} {percent(share)}" for key, share in largest if share >= 0.05]
+        named = {one.name: input_words(one, board)[0] for one in board.uncertain}
+        told = [f"{named[key]} {percent(share)}" for key, share in largest if share >= 0.05]
         both = (f"{100 * entry['sd'] / entry['mean']:.1f} %", f"{100 * alone[name]:.1f} %")
         rows.append((name, *both, ", ".join(told) or MISSING))
     columns = ("constant", "sd", "from the expected noise alone", "share of the variance from inputs")
@@ -149,11 +150,11 @@ def budget_table(inference: Inference, draws: Draws, summary: Mapping[str, Any])
 def inputs_table(board: Board, summary: Mapping[str, Any]) -> Table:
     """What the card states, and what became of it where it was uncertain."""
     rows = []
-    for name, quantity in board.inputs.items():
-        words, factor, unit = input_words(name, board)
-        after = summary["inputs"].get(name)
+    for one in board.parameters:
+        words, factor, unit = input_words(one, board)
+        after = summary["inputs"].get(one.name)
         rows.append(
-            (f"{words}, {unit}" if unit else words, _stated(quantity, factor), MISSING if after is None else
+            (f"{words}, {unit}" if unit else words, _stated(one.prior, factor), MISSING if after is None else
              _spread({key: after[key] * factor for key in ("mean", "sd")}))
         )  # fmt: skip
     return Table("Inputs", ("quantity", "as stated", "after the fit"), tuple(rows))
@@ -174,28 +175,24 @@ def setups_table(board: Board) -> Table:
             setup.name,
             ", ".join(f"{edge} {word}" for edge, word in setup.edges.items()),
             f"{setup.resolution:g} Hz" if setup.resolution else "not rounded",
-            f"{100 * setup.noise.median:.2g} %, factor {_factor(setup.noise):.3g}",
+            f"{100 * setup.noise.median:.2g} %, factor {setup.noise.factor:.3g}",
         )
         for setup in board.setups
     )
     return Table("Setups", ("setup", "edges", "readings rounded to", "noise expected"), rows)
 
 
-def _factor(noise: Quantity) -> float:
-    return math.exp(noise.log_sd)
-
-
 def priors_table(prior: PriorCard) -> Table:
     """The prior card, with its sources."""
-    rows = tuple((name, _density(density), density.source) for name, density in prior.densities.items())
+    rows = tuple((name, _prior(stated.quantity), stated.source) for name, stated in prior.stated_constants.items())
     return Table(f"Prior card {prior.name}", ("constant", "density", "source"), rows)
 
 
-def _density(density: Density) -> str:
-    unit, factor = ("GPa", GPA) if density.median > 1e4 or density.upper > 1e4 else ("N m", 1.0)
-    if density.kind == "log-normal":
-        return f"log-normal, median {density.median * factor:.4g} {unit}, factor {density.factor:.3g}"
-    return f"log-uniform, {density.lower * factor:.4g} to {density.upper * factor:.4g} {unit}"
+def _prior(quantity: Quantity) -> str:
+    unit, factor = ("GPa", GPA) if quantity.median > 1e4 else ("N m", 1.0)
+    if quantity.kind == "log-normal":
+        return f"log-normal, median {quantity.median * factor:.4g} {unit}, factor {quantity.factor:.3g}"
+    return f"log-uniform, {quantity.lower * factor:.4g} to {quantity.upper * factor:.4g} {unit}"
 
 
 def modes_tables(summary: Mapping[str, Any]) -> list[Table]:

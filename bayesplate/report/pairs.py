@@ -85,7 +85,7 @@ def chosen(problem: Problem, draws: Draws) -> dict[str, Floats]:
     shares = input_shares(draws)
     largest = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
     for name in sorted(largest, key=lambda one: -largest[one])[: MOST - len(columns)]:
-        words, factor, unit = input_words(name, problem.board)
+        words, factor, unit = input_words(problem.board.parameter(name), problem.board)
         columns[f"{words}, {unit}" if unit else words] = draws.inputs[name].ravel() * factor
     return columns
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.effects import effects_of, is_effect_parameter
-from bayesplate.effects.words import effect_name
 from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.posterior.inference import Problem
 from bayesplate.quantities import Quantity
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, legend_below, plain_axes, short
@@ -31,15 +30,6 @@ _SHOWN = (0.001, 0.999)
 _BEYOND = 1.2
 _AS_BEFORE, _MOVED = 1.1, 0.25
 _LONGEST = 30
-INPUT_WORDS = {
-    "length_x": ("length along the grain", 1e3, "mm"),
-    "length_y": ("length across the grain", 1e3, "mm"),
-    "thickness": ("thickness", 1e3, "mm"),
-    "mass": ("mass", 1e3, "g"),
-    "density": ("density", 1.0, "kg/m³"),
-    "poisson_xy": ("Poisson ratio nu_xy", 1.0, ""),
-}
-"""Name, factor from SI, and unit of the inputs of a card, as people say them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,54 +74,29 @@ def compared(problem: Problem, draws: Draws) -> list[Compared]:
     found = []
     unit = {"E_x": ("GPa", 1e-9), "E_y": ("GPa", 1e-9), "G_xy": ("GPa", 1e-9)}
     constants = {**draws.moduli, **draws.rigidities}
-    for name, density in problem.prior.densities.items():
+    for name, stated in problem.prior.constants.items():
         told, factor = unit.get(name, ("N m", 1.0))
-        log_density = _scaled(density.log_density, factor)
-        prior = (density.log_mean + np.log(factor), density.log_sd)
-        found.append(_compared(name, told, constants[name] * factor, log_density, True, prior))
+        prior = (np.log(factor * stated.median), stated.log_sd)
+        found.append(_compared(name, told, constants[name] * factor, _of(stated.scaled(factor)), True, prior))
     for i, setup in enumerate(problem.board.setups):
         name = "noise" if len(problem.board.setups) == 1 else f"noise, {setup.name}"
         noise = setup.noise.scaled(100.0)
         prior = (np.log(noise.median), noise.log_sd)
         found.append(_compared(name, "%", 100.0 * draws.noise[..., i], _of(noise), True, prior))
-    for name, quantity in problem.board.uncertain_inputs.items():
-        words, factor, told = input_words(name, problem.board)
-        scaled = quantity.scaled(factor)
-        is_log = quantity.kind == "log-normal"
+    for one in problem.board.uncertain:
+        words, factor, told = input_words(one, problem.board)
+        scaled = one.prior.scaled(factor)
+        is_log = scaled.kind != "normal"
         prior = (np.log(scaled.median), scaled.log_sd) if is_log else (scaled.mean, scaled.sd)
-        found.append(_compared(words, told, draws.inputs[name] * factor, _of(scaled), is_log, prior))
+        found.append(_compared(words, told, draws.inputs[one.name] * factor, _of(scaled), is_log, prior))
     return found
 
 
-def input_words(name: str, board: Board) -> tuple[str, float, str]:
-    """What an input is called, the factor from SI, and its unit; parameters of effects keep their names."""
-    if name in INPUT_WORDS:
-        return INPUT_WORDS[name]
-    if is_effect_parameter(name):
-        effect, _, rest = name.partition(".")
-        parameter, _, setup = rest.rstrip("]").partition("[")
-        where = f" ({setup})" if setup and len(board.setups) > 1 else ""
-        factor, unit = people_use(_unit(name, board))
-        return f"{parameter} of {effect_name(effect)}{where}", factor, unit
-    if name.startswith("clamped_"):
-        edge, _, setup = name.removeprefix("clamped_").rstrip("]").partition("[")
-        return f"covered by the clamp on {edge} ({setup})", 1e3, "mm"
-    return name, 1.0, ""
-
-
-def people_use(unit: str) -> tuple[float, str]:
-    """Factor from an SI unit to the one that people use, and its name."""
-    return {"Pa": (1e-9, "GPa"), "m": (1e3, "mm"), "kg": (1e3, "g"), "1": (1.0, "")}.get(unit, (1.0, unit))
-
-
-def _unit(name: str, board: Board) -> str:
-    """SI unit of a parameter of a declared effect."""
-    for setup in board.setups:
-        for effect in effects_of(board, setup):
-            for parameter in effect.parameters():
-                if effect.key(parameter.name) == name:
-                    return parameter.unit
-    return "SI"
+def input_words(parameter: Parameter, board: Board) -> tuple[str, float, str]:
+    """What a parameter is called, the factor from SI, and its unit."""
+    factor, unit = unit_of_people(parameter.unit)
+    where = f" ({parameter.owner.name})" if parameter.owner.name and len(board.setups) > 1 else ""
+    return f"{parameter.words or parameter.key}{where}", factor, unit
 
 
 def priors_picture(problem: Problem, draws: Draws) -> Picture:
@@ -204,10 +169,8 @@ def _compared(
     return Compared(name, unit, flat, log_density, is_log, mean, sd, float(values.mean()), float(values.std()))
 
 
-def _scaled(log_density: Callable[[Floats], Floats], factor: float) -> Callable[[Floats], Floats]:
-    """A density of ln(value in SI) at values in another unit."""
-    return lambda value: np.asarray(log_density(np.log(value / factor)))
-
-
 def _of(quantity: Quantity) -> Callable[[Floats], Floats]:
-    return lambda value: np.asarray(quantity.log_prior(quantity.standard(value)))
+    """The density of what the panel draws: of the logarithm of a positive quantity, of the other ones themselves."""
+    if quantity.kind == "normal":
+        return quantity.log_density
+    return lambda value: quantity.log_density_of_log(np.log(value))

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesplate.plate.board import Board
 from bayesplate.results.draws import Draws
 
 LARGE_SHARE = 0.5
-_WORDS = {
-    "thickness": "the thickness",
-    "length_x": "the length along the grain",
-    "length_y": "the length across the grain",
-    "mass": "the mass",
-    "density": "the density",
-    "poisson_xy": "the Poisson ratio",
-}
-
 
 def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
-    """Share of the variance of the logarithm of each modulus that goes with each uncertain input, 0 to 1."""
+    """Share of the variance of the logarithm of each modulus that goes with each uncertain input, 0 to 1.
+
+    The squared correlation with the input itself: one centred on zero, a taper, has no logarithm, and that of a
+    positive one hardly differs over its few per cent.
+    """
     shares: dict[str, dict[str, float]] = {}
     for modulus, values in draws.moduli.items():
         log_modulus = np.log(values).ravel()
         shares[modulus] = {
-            name: float(np.corrcoef(log_modulus, np.log(np.abs(column)).ravel())[0, 1] ** 2)
+            name: float(np.corrcoef(log_modulus, column.ravel())[0, 1] ** 2)
             for name, column in draws.inputs.items()
         }
     return shares
 
 
-def input_remarks(draws: Draws) -> list[str]:
+def input_remarks(draws: Draws, board: Board) -> list[str]:
     """One sentence an input that makes more than half of the uncertainty of a modulus."""
     shares = input_shares(draws)
     sentences = []
@@ -39,7 +35,7 @@ def input_remarks(draws: Draws) -> list[str]:
             least, most = 100 * min(ruled.values()), 100 * max(ruled.values())
             share = f"{most:.0f} %" if most - least < 1 else f"{least:.0f} to {most:.0f} %"
             sentences.append(
-                f"{share} of the uncertainty (variance) of {', '.join(ruled)} comes from {_WORDS.get(name, name)}: "
-                "measure it better before anything else"
+                f"{share} of the uncertainty (variance) of {', '.join(ruled)} comes from the "
+                f"{board.parameter(name).words}: measure it better before anything else"
             )
     return sentences

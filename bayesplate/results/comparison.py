@@ -130,7 +130,7 @@ def theory_entry(
     return {
         "theory": problem.posterior.models[0].system.theory,
         "effects": list(board.effects),
-        "inputs": {name: float(q.mean) for name, q in board.inputs.items() if "." in name},
+        "inputs": {one.name: float(one.prior.mean) for one in board.parameters if one.is_of_effect},
         "coefficients": [
             {"setup": setup.name, **provenance(origin)}
             for setup, origin in zip(board.setups, system.origins, strict=True)

@@ -26,7 +26,7 @@ _COARSE_MESH = 12
 
 def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float64]]:
     """Constants at the median of the prior, and the nominal inputs: dict of float."""
-    medians = {name: np.asarray(np.exp(density.log_mean)) for name, density in prior.densities.items()}
+    medians = {name: np.asarray(density.median) for name, density in prior.constants.items()}
     return _with_rigidities({**board.nominal(), **medians})
 
 
@@ -51,7 +51,7 @@ def prior_bands(
     dict of (float, float)
         By label; labels beyond the beam functions are left out.
     """
-    drawn = {name: density.sample(rng, _N_DRAWS) for name, density in prior.densities.items()}
+    drawn = {name: density.sample(rng, _N_DRAWS) for name, density in prior.constants.items()}
     inputs = {name: quantity.value(rng.standard_normal(_N_DRAWS)) for name, quantity in board.inputs.items()}
     values = _with_rigidities({**inputs, **drawn})
     products = product_coefficients(thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH))

@@ -8,7 +8,6 @@ from bayesplate.cards import BoardCard, PriorCard, load_coefficients
 from bayesplate.effects import effects_of
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
-from bayesplate.quantities import Quantity
 
 PAPER = (
     "M. Ducceschi, S. Duran, H. Tahvanainen, L. Ausiello: A method to estimate the rectangular "
@@ -21,28 +20,7 @@ ELEMENT = (
     "use of interpolation formulas. Proc. Conf. Matrix Methods in Structural Mechanics, Wright-Patterson AFB, 397-443 "
     "(1965). [the plate's finite elements]"
 )
-THEORIES = {
-    "thin": (
-        "Kirchhoff's thin orthotropic plate, as in eq. (1) to (4) of Ducceschi et al. [the plate theory]",
-    ),
-    "shear-flexible": (
-        "E. Reissner: The effect of transverse shear deformation on the bending of elastic plates. J. Appl. Mech. 12, "
-        "A69-A77 (1945). [the plate theory]",
-        "R. D. Mindlin: Influence of rotatory inertia and shear on flexural motions of isotropic, elastic "
-        "plates. J. Appl. "
-        "Mech. 18, 31-38 (1951), doi:10.1115/1.4010217. [the plate theory]",
-        "M. Endo, N. Kimura: An alternative formulation of the boundary value problem for the Timoshenko "
-        "beam and Mindlin "
-        "plate. J. Sound Vib. 301, 355-373 (2007). [shear strains as unknowns]",
-    ),
-}  # fmt: skip
-EFFECTS_FROM = {
-    "grain_angle": (
-        "N. T. Mascia, F. A. R. Lahr: Remarks on orthotropic elastic models applied to wood. Materials Research 9, "
-        "301-310 (2006), doi:10.1590/S1516-14392006000300010. [the turned grain]",
-    ),
-}
-"""Of effects whose formulas are taken from print; the others are derived in their own files."""
+THIN = "Kirchhoff's thin orthotropic plate, as in eq. (1) to (4) of Ducceschi et al. [the plate theory]"
 COMPUTATION = (
     "C. R. Harris et al.: Array programming with NumPy. Nature 585, 357-362 (2020), doi:10.1038/s41586-020-2649-2. "
     "[arrays, small eigenvalue problems]",
@@ -86,9 +64,9 @@ def references(card: BoardCard, prior: PriorCard, board: Board) -> tuple[Section
     tuple of Section
         Model, computation, data, prior; nothing that the fit does not use.
     """
-    theories = dict.fromkeys(system_of(board, setup).theory for setup in board.setups)
-    theory = tuple(entry for name in theories for entry in THEORIES[name])
-    effects = tuple(entry for name in board.effects for entry in EFFECTS_FROM.get(name, ()))
+    systems = [system_of(board, setup) for setup in board.setups]
+    theory = (THIN,) if any(system.theory == "thin" for system in systems) else ()
+    effects = tuple(dict.fromkeys(entry for system in systems for one in system.effects for entry in one.references))
     return (
         Section("Model", (PAPER, *theory, ELEMENT, *effects)),
         Section("Computation", COMPUTATION),
@@ -110,12 +88,11 @@ def _priors(prior: PriorCard, board: Board) -> tuple[str, ...]:
     """Sources of the prior card that the fit uses, and of the priors of effects that the board card does not state."""
     used = {name: source for name, source in prior.sources.items() if _is_used(name, prior, board)}
     entries = [f"{name} ({prior.name}): {_one_line(source)}" for name, source in used.items()]
-    stated = _stated(board)
     for setup in board.setups:
         for effect in effects_of(board, setup):
             for parameter in effect.parameters():
-                if parameter.prior not in stated:
-                    entries.append(f"{parameter.name} ({effect.name}): {_one_line(parameter.source)}")
+                if parameter.source:
+                    entries.append(f"{parameter.key} ({effect.name}): {_one_line(parameter.source)}")
     return tuple(dict.fromkeys(entries))
 
 
@@ -127,13 +104,6 @@ def _is_used(name: str, prior: PriorCard, board: Board) -> bool:
         assert prior.noise_percent is not None
         return any(setup.noise == prior.noise_percent.scaled(1e-2) for setup in board.setups)
     return True
-
-
-def _stated(board: Board) -> list[Quantity | None]:
-    """Quantities of effects that the board card gives itself."""
-    attached = [item.mass for setup in board.setups for item in setup.attached]
-    air = [setup.air.density for setup in board.setups if setup.air is not None]
-    return [board.shear_xz, board.shear_yz, *attached, *air]
 
 
 def _one_line(text: str) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bayesplate.cards import Density
+from bayesplate.cards import StatedPrior
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.archive import write_archive
 from bayesplate.results.draws import Draws
@@ -56,7 +55,7 @@ def write_posterior(path: Path, inference: Inference, draws: Draws, summary: Sum
         attributes={
             "card": card_text,
             "prior": problem.prior.name,
-            "priors": json.dumps({name: _stated(density) for name, density in problem.prior.densities.items()}),
+            "priors": json.dumps({name: _stated(one) for name, one in problem.prior.stated_constants.items()}),
             "model": json.dumps(summary["model"]),
             "sampler": json.dumps(summary["sampler"]),
             "versions": json.dumps(summary["versions"]),
@@ -66,6 +65,8 @@ def write_posterior(path: Path, inference: Inference, draws: Draws, summary: Sum
     )
 
 
-def _stated(density: Density) -> dict[str, Any]:
-    """What a density is defined by; the limits and medians it does not have are no numbers, and JSON has none."""
-    return {name: v for name, v in vars(density).items() if not (isinstance(v, float) and not math.isfinite(v))}
+def _stated(prior: StatedPrior) -> dict[str, Any]:
+    """What a prior is defined by, and its source."""
+    quantity = prior.quantity
+    numbers = ("lower", "upper") if quantity.kind == "log-uniform" else ("median", "factor")
+    return {"kind": quantity.kind, **{name: getattr(quantity, name) for name in numbers}, "source": prior.source}

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.effects import is_effect_parameter
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
@@ -41,7 +40,6 @@ from bayesplate.results.modes import (
 
 FORMAT = 1
 _HIGH_EXACT_ERROR = 0.5
-_UNITS = {"length_x": "m", "length_y": "m", "thickness": "m", "mass": "kg", "density": "kg/m^3", "poisson_xy": "1"}
 
 Summary = dict[str, Any]
 
@@ -118,9 +116,7 @@ def summarise(
         "effects": _effects(problem, draws),
         "noise": {setup.name: spread(draws.noise[..., i], "1") for i, setup in enumerate(board.setups)},
         "inputs": {
-            name: spread(values, _UNITS.get(name, "m"))
-            for name, values in draws.inputs.items()
-            if not is_effect_parameter(name)
+            one.name: spread(draws.inputs[one.name], one.unit) for one in board.uncertain if not one.is_of_effect
         },
         "derived": {name: spread(item.values, item.unit) for name, item in draws.derived.items()},
         "least_squares": _paper_least_squares(system),
@@ -137,7 +133,7 @@ def summarise(
             "exact_law_worst_cents": worst_cents(problem.posterior.models),
         },
         "sampler": sampler_health(inference.chains, inference.convergence),
-        "identifiability": [*remarks(board, problem.identifiability), *input_remarks(draws)],
+        "identifiability": [*remarks(board, problem.identifiability), *input_remarks(draws, board)],
         "warnings": _warnings(inference, draws, found, linear_errors),
     }
 
@@ -145,11 +141,11 @@ def summarise(
 def _effects(problem: Problem, draws: Draws) -> Summary:
     """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
     result: Summary = {}
-    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
+    for model in problem.posterior.models:
         for effect in model.system.effects:
-            owner = result.setdefault(setup.name if effect.scope == "setup" else "board", {})
+            owner = result.setdefault(effect.owner.title, {})
             owner[effect.name] = {
-                parameter.name: spread(_values_of(effect.key(parameter.name), problem, draws), parameter.unit)
+                parameter.key: spread(_values_of(parameter.name, problem, draws), parameter.unit)
                 for parameter in effect.parameters()
             }
     return result

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import get_args
 
-from bayesplate.effects.transverse_shear import TransverseShear
+from bayesplate.effects import EFFECTS
 from bayesplate.errors import NotConvergedError
 from bayesplate.estimates.coefficients import CoefficientSource, aspect_ratio_of, fitting_table
 from bayesplate.estimates.paper import paper_system
@@ -26,7 +26,8 @@ FEWEST_DRAWS = 1000
 """With fewer effective draws left by the weights, the other law is sampled itself."""
 
 _FORMAT = 1
-_SHEAR = TransverseShear.name
+_SHEAR = tuple(name for name, effect in EFFECTS.items() if effect.theory == "shear-flexible")
+"""Effects that make the plate shear-flexible."""
 Tell = Callable[[Progress], None] | None
 
 
@@ -77,8 +78,8 @@ def compare(
     """
     files = require_new(Path(out), [COMPARISON], force=force) if out is not None else ()
     declared = prepare(card, effects).board.effects
-    others = [name for name in declared if name != _SHEAR]
-    asked = [others, [*others, _SHEAR]]
+    others = [name for name in declared if name not in _SHEAR]
+    asked = [others, [*others, *_SHEAR]]
     prepared = [prepare(card, names) for names in asked]
     if coefficients == "published":
         board = prepared[0].board

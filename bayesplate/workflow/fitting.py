@@ -118,12 +118,12 @@ def checkpoint_in(folder: Path, prepared: Prepared, problem: Problem) -> Checkpo
 
 def fingerprint(prepared: Prepared, problem: Problem) -> str:
     """Hash of everything besides the sampler's settings that decides the draws."""
-    prior = {name: repr(density) for name, density in problem.prior.densities.items()}
+    prior = {name: repr(density) for name, density in problem.prior.constants.items()}
     identity = {
         "card": prepared.card.sha256,
         "prior": prior,
         "noise": [repr(setup.noise) for setup in problem.board.setups],
-        "inputs": {name: repr(quantity) for name, quantity in problem.board.inputs.items()},
+        "parameters": [repr(parameter) for parameter in problem.board.parameters],
         "effects": list(problem.board.effects),
         "forms": [repr(effect) for effect in problem.board.chosen],
         "readings": [repr(setup.readings) for setup in problem.board.setups],

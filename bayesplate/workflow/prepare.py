@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from bayesplate.cards import BoardCard, PriorCard, load_board, load_prior, physical_faults
-from bayesplate.effects import declare, effect_faults, implied_effects
-from bayesplate.effects.attached_mass import ROUGH_ROVING, heaviest_roving
+from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import InputError
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board, board_from_card
@@ -62,30 +61,7 @@ def prepare(
     faults += [*label_faults(board), *effect_faults(board)]
     if faults:
         raise InputError(faults)
-    notes = (*board.notes, *_unused_profiles(board), *_roving(board))
-    return Prepared(read, prior, declare(replace(board, notes=notes)))
-
-
-def _unused_profiles(board: Board) -> list[str]:
-    """Readings at several places of which only the mean is used."""
-    profiled = {"thickness": "thickness_profile", "length_y": "outline_profile"}
-    return [
-        f"the {name} was read at several places: its mean is used, the {effect} is not part of this model"
-        for name, effect in profiled.items()
-        if board.inputs[name].has_profile and effect not in board.effects
-    ]
-
-
-def _roving(board: Board) -> list[str]:
-    """Things that roved and are heavy enough for the mean over their places to be rough."""
-    if "attached_mass" not in board.effects:
-        return []
-    return [
-        f"what roved in setup '{setup.name}' weighs {100.0 * share:.1f} % of the board: the mean over its places is "
-        f"right to first order in the mass only and may err by some cents; a setup for each place is exact"
-        for setup in board.setups
-        if (share := heaviest_roving(board, setup)) > ROUGH_ROVING
-    ]
+    return Prepared(read, prior, declare(replace(board, notes=(*board.notes, *notes(board)))))
 
 
 def _prior_is_at_fault(card: BoardCard) -> bool:

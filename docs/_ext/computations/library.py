@@ -74,15 +74,13 @@ def _parameters(name: str) -> Iterator[str]:
     """Parameters of an effect on the first shipped board that it can act on, as if the card stated none of them."""
     for card in _boards():
         board = replace(prepare(card, []).board, shear_xz=None, shear_yz=None)
-        for setup in board.setups:
-            forms = EFFECTS[name].candidates(board, setup)
-            if forms:
-                by_source: dict[str, list[str]] = {}
-                for parameter in forms[0].parameters():
-                    unit = "" if parameter.unit == "1" else f" in {parameter.unit}"
-                    by_source.setdefault(parameter.source, []).append(f"`{parameter.name}`{unit}")
-                yield from (f"{', '.join(names)} ({source})" for source, names in by_source.items())
-                return
+        for form in EFFECTS[name].forms(board):
+            by_source: dict[str, list[str]] = {}
+            for parameter in form.effects[0].parameters():
+                unit = "" if parameter.unit == "1" else f" in {parameter.unit}"
+                by_source.setdefault(parameter.source, []).append(f"`{parameter.key}`{unit}")
+            yield from (f"{', '.join(names)} ({source})" for source, names in by_source.items())
+            return
 
 
 def symbols(folder: Path) -> str:
@@ -104,7 +102,7 @@ def reference(folder: Path, name: str) -> str:
 def references(folder: Path) -> str:
     """Every reference that a fit may give."""
     entries = [cited.PAPER, cited.ELEMENT]
-    for group in (*cited.THEORIES.values(), *cited.EFFECTS_FROM.values(), cited.COMPUTATION):
+    for group in ((cited.THIN,), *(effect.references for effect in EFFECTS.values()), cited.COMPUTATION):
         entries += group
     return "\n".join(f"- {_unquoted(entry)}" for entry in dict.fromkeys(entries)) + "\n"
 
