@@ -114,7 +114,7 @@ def exact_inputs(card: str, seed: int) -> dict[str, float]:
     """Standard deviation of each constant, per cent, as if every input were exact: what the frequencies leave open."""
     prepared = prepare(card)
     sure = {name: replace(quantity, sd=0.0) for name, quantity in prepared.board.inputs.items()}
-    problem = pose(replace(prepared.board, inputs=sure), prepared.prior)
+    problem = pose(prepared.board.with_priors(sure), prepared.prior)
     draws = named_draws(infer(problem, SamplerSettings(seed=seed)), seed)
     return {name: 100 * float(np.std(np.log(values))) for name, values in draws.moduli.items()}
 
@@ -124,7 +124,7 @@ def widths(result: bayesplate.FitResult) -> dict[str, dict[str, float]]:
     problem, draws = result.inference.problem, result.draws
     (setup,) = problem.board.setups
     rows = {
-        name: {"before": 100 * problem.prior.densities[name].log_sd, "after": 100 * float(np.std(np.log(values)))}
+        name: {"before": 100 * problem.prior.constants[name].log_sd, "after": 100 * float(np.std(np.log(values)))}
         for name, values in draws.moduli.items()
     }
     rows["noise"] = {"before": 100 * setup.noise.log_sd, "after": 100 * float(np.std(np.log(draws.noise)))}

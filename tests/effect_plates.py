@@ -17,11 +17,13 @@ from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
 from bayesplate.modes.solve import Modes, solve
+from bayesplate.plate.parameter import Owner, shown_name
 from bayesplate.plate.setup import AttachedItem, Setup
 from bayesplate.posterior.inference import Problem, pose
 from bayesplate.workflow.prepare import prepare
 
 SETUP = "made"
+MADE = Owner("setup", SETUP)
 ALL_SUPPORTED = dict.fromkeys(EDGES, "supported")
 G_XZ, G_YZ = 0.62e9, 0.03e9
 SHEAR = {"transverse_shear.G_xz": G_XZ, "transverse_shear.G_yz": G_YZ}
@@ -39,7 +41,7 @@ def values_of(plate: Plate, parameters: Parameters) -> dict[str, np.ndarray]:
     """Constants and sizes of a plate, and parameters of effects; those of a setup without its name."""
     own = {"length_x": plate.L_x, "length_y": plate.L_y, "thickness": plate.h, "density": plate.rho}
     own |= {"D_x": plate.D_x, "D_y": plate.D_y, "D_s": plate.G_xy * plate.h**3 / 3.0, "poisson_xy": plate.nu_xy}
-    of_effects = {f"{n}[{SETUP}]" if _is_of_setup(n) else n: v for n, v in parameters.items()}
+    of_effects = {shown_name(n, MADE) if _is_of_setup(n) else n: v for n, v in parameters.items()}
     return {name: np.asarray(value) for name, value in (own | of_effects).items()}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from made_boards import setup_of
 
 from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.forms import Form, Free
+from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.laws import FormLaw
 from bayesplate.diagnosis.noise_grid import NoiseGrid
@@ -17,7 +17,8 @@ from bayesplate.diagnosis.search import Candidate, Ground
 from bayesplate.diagnosis.tables import Table, nothing
 from bayesplate.labels import Label
 from bayesplate.modes.naming import Place
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import made_board
+from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.setup import Reading, Setup
 from bayesplate.quantities import Quantity
 
@@ -51,7 +52,7 @@ def baseline(
     shares = rng.dirichlet(np.full(3, 0.7), size=n_modes)
     inputs = {"thickness": Quantity.exact(3e-3), "poisson_xy": Quantity.exact(0.4)}
     return Baseline(
-        board=Board("made", inputs, setups),
+        board=made_board("made", inputs, setups),
         values={name: np.asarray(v) for name, v in {"D_x": 30.0, "D_y": 2.0, "D_s": 5.0}.items()}
         | {name: np.asarray(q.mean) for name, q in inputs.items()},
         log_rigidities=np.log([30.0, 2.0, 5.0]),
@@ -114,7 +115,7 @@ def candidate(
     n_coarse: int = 9,
 ) -> Candidate:
     """An effect whose shift is a direction times its size, one parameter with a given prior."""
-    free = Free("size", "1", prior, (f"{name}.size",), prior.value(1.0))
+    free = Parameter("size", BOARD, prior, "1", 0.0, effect=name)
     law = FormLaw(Form(name, "", base.board, (free,)), ())
     fine, coarse = (_along(base, name, direction, prior, n) for n in (n_cells, n_coarse))
     shift = direction * float(prior.value(1.0))

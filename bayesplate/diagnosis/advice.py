@@ -169,7 +169,7 @@ def _carrying(board: Board, form: Form) -> Board:
 
 def _at_nominal(board: Board, form: Form, values: Values) -> dict[str, Floats]:
     there = {name: np.asarray(quantity.median) for name, quantity in form.board.inputs.items()} | dict(values)
-    nominal = {free.name: np.asarray(free.nominal) for free in form.free}
+    nominal = {free.key: np.asarray(free.nominal) for free in form.free}
     for setup in board.setups:
         for effect in system_of(board, setup).effects:
             for parameter in effect.parameters():

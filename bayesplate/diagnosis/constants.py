@@ -114,8 +114,8 @@ def _replaced_inputs(found: Found, index: int, cell: int) -> dict[str, float]:
         alone = len(hypothesis.members) == 1
         table, row = (hypothesis.table, cell) if alone else (candidate.coarse, _own_cell(found, index, cell, member))
         for i, free in enumerate(candidate.laws[int(table.form[row])].form.free):
-            own = float(free.prior.value(table.z[row, i]))
-            values |= {key: own for key in free.keys if key in baseline.board.inputs}
+            if free.replaces in baseline.board.inputs:
+                values[free.replaces] = float(free.prior.value(table.z[row, i]))
     return values
 
 

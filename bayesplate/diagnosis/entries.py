@@ -126,7 +126,7 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Entry | None:
     quantiles = np.interp([0.05, 0.5, 0.95], cumulated / share.sum(), z[order])
     low, middle, high = (float(free.prior.value(q)) for q in quantiles)
     return {
-        "parameter": free.name,
+        "parameter": free.key,
         "form": one.laws[best].form.detail,
         "q05": low,
         "q50": middle,

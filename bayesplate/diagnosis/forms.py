@@ -2,40 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from bayesplate.effects import EFFECTS, declare
-from bayesplate.effects.base import EffectForm, Floats
+from bayesplate.effects.base import EffectForm
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter
-from bayesplate.quantities import Quantity
-
-
-@dataclass(frozen=True)
-class Free:
-    """A free parameter of an effect.
-
-    Attributes
-    ----------
-    name, unit : str
-        SI.
-    prior : Quantity
-    keys : tuple of str
-        The board's parameters that take its value: one per owner. In the search it has one value for all of them; a
-        refit lets each have its own.
-    nominal : float
-        A representative size.
-    null : float
-        The value at which the effect is absent.
-    """
-
-    name: str
-    unit: str
-    prior: Quantity
-    keys: tuple[str, ...]
-    nominal: float
-    null: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +22,14 @@ class Form:
         What tells it from the effect's other forms; empty if there are none.
     board : Board
         The board with the effect declared.
-    free : tuple of Free
-        Parameters that have an uncertainty.
+    free : tuple of Parameter
+        Parameters that have an uncertainty, one per owner: two setups' masses are two.
     """
 
     effect: str
     detail: str
     board: Board
-    free: tuple[Free, ...]
+    free: tuple[Parameter, ...]
 
     @property
     def title(self) -> str:
@@ -82,25 +55,8 @@ def forms(board: Board) -> dict[str, tuple[Form, ...]]:
 
 def _form(board: Board, name: str, form: EffectForm) -> Form:
     declared = declare(replace(board, effects=(*board.effects, name), chosen=(*board.chosen, *form.effects)))
-    by_key: dict[str, list[Parameter]] = {}
-    for effect in form.effects:
-        for parameter in effect.parameters():
-            if not parameter.prior.is_exact:
-                by_key.setdefault(parameter.key, []).append(parameter)
-    return Form(name, form.detail, declared, tuple(_free(key, each) for key, each in by_key.items()))
-
-
-def _free(key: str, owned: Sequence[Parameter]) -> Free:
-    """One value for the parameters that share a key: the first one's prior stands for all."""
-    first = owned[0]
-    assert first.null is not None
-    keys = tuple(dict.fromkeys(parameter.name for parameter in owned))
-    return Free(key, first.unit, first.prior, keys, first.nominal, first.null)
-
-
-def sizes(form: Form, values: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Inputs of the board from values of the free parameters."""
-    return {key: values[free.name] for free in form.free for key in free.keys}
+    every = {one.name: one for effect in form.effects for one in effect.parameters()}
+    return Form(name, form.detail, declared, tuple(one for one in every.values() if not one.prior.is_exact))
 
 
 def with_forms(board: Board, added: Sequence[Form]) -> Board:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.following import Following
-from bayesplate.diagnosis.forms import Form, sizes
+from bayesplate.diagnosis.forms import Form
 from bayesplate.frequencies.laws import ExactLaw, log_frequency
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
@@ -49,11 +49,11 @@ class FormLaw:
             Whose inputs are taken.
         log_rigidities : (n, 3) array
         values : dict of (n,) array
-            The form's free parameters, SI.
+            The form's free parameters by name, SI.
         """
         inputs = _inputs(baseline, self.form)
         constants = dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))
-        there: Values = inputs | sizes(self.form, values) | constants
+        there: Values = inputs | dict(values) | constants
         followed = self.following or ((),) * len(self.models)
         parts = [_log_frequencies(model, each, there) for model, each in zip(self.models, followed, strict=True)]
         return np.concatenate(parts, axis=1)
@@ -98,7 +98,7 @@ class FormLaw:
 
     def _without(self, baseline: Baseline) -> Values:
         """Values of the baseline with the effect absent."""
-        nothing = {key: np.full(1, free.null) for free in self.form.free for key in free.keys}
+        nothing = {free.name: np.full(1, free.null) for free in self.form.free}
         constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities)[:, None], strict=True))
         return _inputs(baseline, self.form) | nothing | constants
 
@@ -143,7 +143,7 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
     board = form.board
     parameters = Parameters(board)
     values = dict(_inputs(baseline, form))
-    middle = {key: np.asarray(free.prior.median) for free in form.free for key in free.keys}
+    middle = {free.name: np.asarray(free.prior.median) for free in form.free}
     at_middle = {**values, **middle, **{n: baseline.values[n] for n in RIGIDITIES}}
     models = tuple(setup_model(system_of(board, setup), at_middle) for setup in board.setups)
     noise = np.array([setup.noise.median for setup in board.setups])

@@ -47,7 +47,8 @@ def excludes_zero(board: Board, forms: tuple[Form, ...], draws: Draws) -> bool:
     for form in forms:
         if not form.free:
             continue
-        values = [draws.inputs[key] for key in form.free[0].keys if key in draws.inputs]
+        first = [one.name for one in form.free if one.key == form.free[0].key]
+        values = [draws.inputs[name] for name in first if name in draws.inputs]
         if not any(_is_clear_of_zero(np.ravel(value)) for value in values):
             return False
     return True

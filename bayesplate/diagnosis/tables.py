@@ -22,10 +22,8 @@ from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 
-FINE = {0: 1, 1: 33, 2: 11, 3: 6, 4: 4}
-"""Cells along each parameter, by how many parameters there are."""
-COARSE = {0: 1, 1: 9, 2: 5, 3: 3, 4: 2}
-"""The same where two effects are combined."""
+FINE, COARSE = (33, 11, 256), (9, 5, 27)
+"""Cells along one parameter, along each of two, and at most in all of more; the second where effects are combined."""
 
 _REACH = 3.0
 _OVERLAP = 0.5
@@ -72,7 +70,7 @@ class Table:
         return int(self.weights.size)
 
 
-def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: dict[int, int] = FINE) -> Table:
+def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
     """Tabulate an effect over all its forms.
 
     Parameters
@@ -81,8 +79,8 @@ def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: dict
     name : str
     laws : sequence of FormLaw
         Of the effect's forms, equally probable.
-    cells : dict of int
-        Cells along a parameter by the number of parameters.
+    cells : tuple of int
+        `FINE` or `COARSE`.
 
     Returns
     -------
@@ -186,8 +184,8 @@ def nominal_shift(baseline: Baseline, law: FormLaw) -> tuple[Floats, Floats, Flo
     return raw, visible[0], moved[0]
 
 
-def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: dict[int, int]) -> Table:
-    axes = [_axis(free.prior, cells[len(law.form.free)]) for free in law.form.free]
+def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: tuple[int, int, int]) -> Table:
+    axes = [_axis(free.prior, cells_along(len(law.form.free), cells)) for free in law.form.free]
     sides = [axis[0].size for axis in axes]
     z = np.array(list(product(*(axis[0] for axis in axes)))).reshape(int(np.prod(sides)), len(axes))
     log_weights = np.zeros(len(z))
@@ -212,6 +210,12 @@ def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: dic
 
 
 _PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z")
+
+
+def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
+    """Cells along each of so many parameters; their product stays bounded, however many setups have one of their own."""
+    *few, most = cells
+    return few[n_parameters - 1] if n_parameters <= len(few) else int(most ** (1.0 / n_parameters) + 1e-9)
 
 
 def _axis(prior: Quantity, n: int) -> tuple[Floats, float]:

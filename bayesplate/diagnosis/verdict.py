@@ -166,7 +166,7 @@ def at_limit(found: Found, index: int) -> str:
                 order = np.argsort(z)
                 median = z[order][np.searchsorted(np.cumsum(shares[order]), 0.5 * shares.sum())]
                 if _is_extreme(free.prior, float(median)):
-                    return f"{free.name} = {float(free.prior.value(median)):.3g} {free.unit}".removesuffix(" 1")
+                    return f"{free.key} = {float(free.prior.value(median)):.3g} {free.unit}".removesuffix(" 1")
     return ""
 
 

@@ -128,7 +128,7 @@ def draw_truth(effect: str, asked: Prepared, place: Place, rng: np.random.Genera
     design = DESIGNS[CASES[effect].design]
     (setup,) = design.setups
     for redraws in range(MOST_REDRAWS):
-        values = {name: float(density.sample(rng, 1)[0]) for name, density in asked.prior.densities.items()}
+        values = {name: float(density.sample(rng, 1)[0]) for name, density in asked.prior.constants.items()}
         values |= {name: drawn(quantity, rng) for name, quantity in asked.board.uncertain_inputs.items()}
         noise = drawn(asked.board.setups[0].noise, rng)
         constants = {name: values[name] for name in MODULI}

@@ -28,7 +28,7 @@ from bayesplate.errors import BayesplateError
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.refit import design as sensitivities
 from bayesplate.estimates.refit import refit
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.plate.setup import DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
@@ -107,7 +107,7 @@ class Design:
     def board(self, hertz: Mapping[tuple[int, int], float], noise: Quantity = DEFAULT_NOISE) -> Board:
         """The board with readings by label."""
         setup = setup_of(EDGES[self.edges], hertz, name=self.edges, resolution=self.resolution, noise=noise)
-        return Board("simulated", self.inputs, (setup,), prior=self.prior)
+        return made_board("simulated", self.inputs, [setup], prior=self.prior)
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def prior_values(design: Design, prior: PriorCard, rng: np.random.Generator) -> 
     """Constants and inputs drawn from their joint prior, which is cut off where no material exists."""
     while True:
         values = {name: float(quantity.value(rng.standard_normal())) for name, quantity in design.inputs.items()}
-        constants = [float(prior.densities[name].sample(rng, 1)[0]) for name in MODULI]
+        constants = [float(prior.constants[name].sample(rng, 1)[0]) for name in MODULI]
         found = rigidities(*constants, values["thickness"], values["poisson_xy"])
         if np.isfinite(found.D_x):
             return values | {name: float(value) for name, value in zip(RIGIDITIES, found, strict=True)}
@@ -170,7 +170,7 @@ def _reference(design: Design) -> Problem:
     """The board at the medians of the prior: where the fixed linear law is made."""
     prior = load_prior(design.prior)
     inputs = {name: float(quantity.median) for name, quantity in design.inputs.items()}
-    found = rigidities(*(prior.densities[n].median for n in MODULI), inputs["thickness"], inputs["poisson_xy"])
+    found = rigidities(*(prior.constants[n].median for n in MODULI), inputs["thickness"], inputs["poisson_xy"])
     values = inputs | {name: float(value) for name, value in zip(RIGIDITIES, found, strict=True)}
     hertz, _ = _frequencies(replace(design, law="exact", generator="package"), values)
     return pose(replace(design, resolution=0.0).board(hertz), prior, law="linear")

@@ -59,10 +59,10 @@ def test_truth_and_card_share_their_priors(tmp_path):
         setup = DESIGNS[case.design].setups[0]
         board = prepared(tmp_path, effect, {setup.label(b): 100.0 for b in setup.beams}, (0.1, 0.1))
         (declared,) = (EFFECTS[effect].of(board.board, s) for s in board.board.setups)
-        keys = {declared.key(parameter.name) for parameter in declared.parameters()}
+        keys = {parameter.name for parameter in declared.parameters()}
         assert set(board.board.uncertain_inputs) == keys | {"poisson_xy"}
-        assert {n: (d.median, d.factor) for n, d in board.prior.densities.items()} == {
-            n: (pytest.approx(median), factor) for n, (median, factor) in MEDIANS.items()
+        assert {n: (d.median, d.factor) for n, d in board.prior.constants.items()} == {
+            n: (pytest.approx(median), pytest.approx(factor)) for n, (median, factor) in MEDIANS.items()
         }
         assert board.board.setups[0].noise.median == pytest.approx(0.003)
 

@@ -104,7 +104,7 @@ def test_the_free_boards(
 def test_a_shipped_prior_names_its_sources(name: str) -> None:
     card = load_prior(name)
 
-    assert list(card.densities) == ["E_x", "E_y", "G_xy"]
+    assert list(card.constants) == ["E_x", "E_y", "G_xy"]
     assert all(card.sources.values())
 
 

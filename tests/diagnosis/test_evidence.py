@@ -13,7 +13,7 @@ from bayesplate.diagnosis.evidence import Fold, Terms
 from bayesplate.diagnosis.folds import left_out, log_score, nested
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import made_board
 from bayesplate.quantities import Quantity
 
 _REACH, _STEP = 6.0, 1.0
@@ -121,7 +121,7 @@ def test_the_noise_levels_stand_for_the_log_normal_prior(n_setups, few, allowed)
     The levels cut the prior 2.5 sd below its median and 3.5 above, which holds all but 0.6 %.
     """
     setup = setup_of(FREE, {(i, 0): 50.0 + i for i in range(4)}, noise=Quantity.from_median(0.005, np.exp(0.5)))
-    board = Board("made", {}, tuple([setup] * n_setups))
+    board = made_board("made", {}, [setup] * n_setups)
     grid = noise_grid(board, few=few)
     fine = np.linspace(-5, 5, 401)
     prior = np.exp(-0.5 * fine**2)

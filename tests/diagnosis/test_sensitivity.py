@@ -11,13 +11,14 @@ from made_searches import bare, baseline, candidate, ground_of, one_level
 
 from bayesplate.diagnosis.constants import draw_constants
 from bayesplate.diagnosis.evidence import Fold, Terms
-from bayesplate.diagnosis.forms import Form, Free
+from bayesplate.diagnosis.forms import Form
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.null_control import gain, null_control, simulate_null
 from bayesplate.diagnosis.refits import excludes_zero
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.sensitivity import inclusion_with_width
+from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.quantities import Quantity
 
 
@@ -66,7 +67,7 @@ def test_constants_are_those_of_a_direct_regression():
     rng = np.random.default_rng(3)
     base = baseline(rng, n_inputs=1, resolution=1.0)
     thickness = Quantity.from_mean(3e-3, 3e-5)
-    base = replace(base, board=replace(base.board, inputs={**base.board.inputs, "thickness": thickness}))
+    base = replace(base, board=base.board.with_priors({"thickness": thickness}))
     one = candidate(base, "a", 0.02 * rng.standard_normal(6), n_cells=1)
     ground = ground_of(base, Hypothesis(("a",), 1.0, one.fine, one_level(base)), candidates={"a": one})
     residual = 0.01 * rng.standard_normal(6)
@@ -130,7 +131,8 @@ def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_ther
     ],
 )
 def test_a_size_is_clear_of_zero_only_if_its_interval_is(values, clear):
-    form = Form("a", "", None, (Free("size", "1", Quantity.from_mean(0.0, 1.0, "normal"), ("a.size",), 1.0),))
+    size = Parameter("size", BOARD, Quantity.from_mean(0.0, 1.0, "normal"), "1", 0.0, effect="a")
+    form = Form("a", "", None, (size,))
     draws = SimpleNamespace(inputs={"a.size": values.reshape(4, -1)})
     assert excludes_zero(None, (form,), draws) is clear
 

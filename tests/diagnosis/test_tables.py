@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from full_refits import full_refit
 
-from bayesplate.diagnosis.forms import sizes, with_forms
+from bayesplate.diagnosis.forms import with_forms
 from bayesplate.diagnosis.laws import form_law
 from bayesplate.diagnosis.signatures import signatures
 from bayesplate.diagnosis.tables import nominal_shift, refitted, tabulate
@@ -32,7 +32,7 @@ def random_place(form, rng):
 
 
 def values_at(form, z):
-    return sizes(form, {free.name: float(free.prior.value(z[0, i])) for i, free in enumerate(form.free)})
+    return {free.name: float(free.prior.value(z[0, i])) for i, free in enumerate(form.free)}
 
 
 def on_tangent(table, index, form, z):

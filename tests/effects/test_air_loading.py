@@ -8,7 +8,7 @@ import generator.effects
 import numpy as np
 import pytest
 import ritz
-from effect_plates import hertz_apart, modes_of, posed, setup_of, shifts
+from effect_plates import MADE, hertz_apart, modes_of, posed, setup_of, shifts
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from made_boards import board_of
 
@@ -24,7 +24,7 @@ WALL = {"air_loading.density": 1.2, "air_loading.baffle": 1.0}
 
 
 def air(plate, baffle=UNKNOWN_BAFFLE):
-    return AirLoading("made", plate.L_x / plate.L_y, baffle=baffle)
+    return AirLoading(MADE, plate.L_x / plate.L_y, baffle=baffle)
 
 
 def piston(aspect_ratio, is_baffled):
@@ -118,7 +118,7 @@ def test_takes_what_the_card_declares():
     board = board_of(ritz.FINNISH, [setup])
     declared = replace(setup, air=DeclaredAir(Quantity.exact(1.1), "full"))
 
-    assert AirLoading.of(board, setup) == AirLoading("made", 0.223 / 0.114, DEFAULT_DENSITY, UNKNOWN_BAFFLE)
+    assert AirLoading.of(board, setup) == AirLoading(MADE, 0.223 / 0.114, DEFAULT_DENSITY, UNKNOWN_BAFFLE)
     effect = AirLoading.of(board, declared)
     assert (effect.density.mean, effect.baffle) == (1.1, Quantity.exact(1.0))
     assert not AirLoading.is_implied(board)

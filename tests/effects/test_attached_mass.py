@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import ritz
 import scipy.optimize
-from effect_plates import SETUP, hertz, hertz_apart, modes_of, setup_of, shifts
+from effect_plates import MADE, hertz, hertz_apart, modes_of, setup_of, shifts
 from generator.designs import ALL_FREE
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from generator.plate import Plate
@@ -30,7 +30,7 @@ FREE_BEAMS = [(1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2)]
 
 def at(*places, radius=(0.0, 0.0)):
     """A thing at places, fractions of the sides."""
-    return AttachedMass(SETUP, (Item(Quantity.exact(1e-3), "", places, radius),))
+    return AttachedMass(MADE, (Item(Quantity.exact(1e-3), "", places, radius),))
 
 
 def on(plate, place, mass, radius=0.0):
@@ -82,8 +82,11 @@ def test_rotary_inertia_of_a_compact_solid():
         2 * AS_FREE.L_y
     )
     values = board.nominal() | {"attached_mass.mass[setup]": np.asarray(20e-3)}
-    energies = [field.ravel() @ kron_sum(t, *x.parts, *y.parts) @ field.ravel() for t in effect.masses(x, y)]
-    total = AS_FREE.rho * AS_FREE.h * AS_FREE.L_x * AS_FREE.L_y * np.dot(energies, effect.mass_weights(values, setup))
+    energies = [
+        field.ravel() @ kron_sum(one.matrix(x, y), *x.parts, *y.parts) @ field.ravel() * one.weight(values, setup)
+        for one in effect.contributions()
+    ]
+    total = AS_FREE.rho * AS_FREE.h * AS_FREE.L_x * AS_FREE.L_y * sum(energies)
     diameter = (4 * 20e-3 / (5000 * np.pi)) ** (1 / 3)
     deflection = 0.2007 + 2 * 0.0855
     assert base_diameter(20e-3) == pytest.approx(diameter)
@@ -170,7 +173,7 @@ def test_symmetry_that_the_places_keep():
     assert at((0.9, 0.3), (0.1, 0.3)).keeps_symmetry() == (True, False)
     mirrored = at((0.9, 0.3), (0.1, 0.3))
     mass = 0.02 * weight(FREE)
-    unsplit = AttachedMass(SETUP, (replace(mirrored.items[0], places=((0.9, 0.3), (0.1, 0.3 + 1e-5))),))
+    unsplit = AttachedMass(MADE, (replace(mirrored.items[0], places=((0.9, 0.3), (0.1, 0.3 + 1e-5))),))
     assert hertz(FREE, [mirrored], {MASS: mass}, 6) == pytest.approx(hertz(FREE, [unsplit], {MASS: mass}, 6), rel=1e-5)
 
 
@@ -193,7 +196,7 @@ def test_what_a_card_declares():
     assert item.mass is KNOWN.mass
     assert item.places[0] == pytest.approx((0.9, 0.75))
     listed = AttachedMass.of(replace(board, effects=("attached_mass",)), setup)
-    assert [p.name for p in listed.parameters()] == ["mass_1", "mass_2"]
+    assert [p.key for p in listed.parameters()] == ["mass_1", "mass_2"]
     assert not AttachedMass.is_implied(board_with(UNKNOWN)[0])
 
 
@@ -202,7 +205,8 @@ def test_candidates_of_a_search():
     (candidate,) = AttachedMass.candidates(*board_with(KNOWN, UNKNOWN))
     assert [len(item.places) for item in candidate.items] == [1, 2]
     assert AttachedMass.candidates(*board_with(KNOWN)) == ()
-    tried = [effect.items[0].places[0] for effect in AttachedMass.candidates(*board_with())]
+    board, _ = board_with()
+    tried = [form.effects[0].items[0].places[0] for form in AttachedMass.forms(board)]
     assert len(tried) == 12
     assert min(x for x, _ in tried) == 0.25
     assert max(y for _, y in tried) == 0.5

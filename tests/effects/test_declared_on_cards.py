@@ -228,7 +228,8 @@ def values_of(board: Board, case: Declared, parameters: Parameters, ideal: Plant
         if case.effect in board.effects and not EFFECTS[case.effect].refusal(board, setup):
             effect = EFFECTS[case.effect].of(board, setup)
             acts = float(RECIPES[case.effect].acts(drawn))  # what lies under the free board does not under the clamped
-            values |= {effect.key(name): acts * value for name, value in case.values(parameters, plate).items()}
+            named = {parameter.key: parameter.name for parameter in effect.parameters()}
+            values |= {named[key]: acts * value for key, value in case.values(parameters, plate).items()}
         found.append({name: np.asarray(value) for name, value in values.items()})
     return found
 

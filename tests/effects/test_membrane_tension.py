@@ -7,7 +7,7 @@ from dataclasses import replace
 import generator.effects
 import numpy as np
 import pytest
-from effect_plates import ALL_SUPPORTED, hertz_apart, modes_of, setup_of, shifts
+from effect_plates import ALL_SUPPORTED, MADE, hertz_apart, modes_of, setup_of, shifts
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 
 from bayesplate.effects.membrane_tension import MembraneTension
@@ -24,7 +24,7 @@ def test_supported_plate_has_a_closed_form(tension, axis):
     twist = 2 * plate.nu_xy * plate.D_y + plate.G_xy * plate.h**3 / 3
     pulled = (a**2 if axis != "y" else 0) + (b**2 if axis != "x" else 0)
     squared = (plate.D_x * a**4 + twist * a**2 * b**2 + plate.D_y * b**4 + tension * pulled) / (plate.rho * plate.h)
-    found = modes_of(plate, [MembraneTension("made", axis)], {N: tension}, 9).eigenvalues
+    found = modes_of(plate, [MembraneTension(MADE, axis)], {N: tension}, 9).eigenvalues
     assert 600 * np.log2(found / np.sort(squared.ravel())[:9]) == pytest.approx(0.0, abs=0.5)
 
 
@@ -47,7 +47,7 @@ def test_against_the_generator(tension, is_sheared):
 )
 def test_sizes_on_the_papers_clamped_board(axis, sizes):
     """physics.md 6: 500 N/m, printed as whole cents."""
-    assert shifts(FIEMME, [MembraneTension("made", axis)], {N: 500.0}, BEAMS["clamped"]) == pytest.approx(
+    assert shifts(FIEMME, [MembraneTension(MADE, axis)], {N: 500.0}, BEAMS["clamped"]) == pytest.approx(
         sizes, abs=0.6
     )
 

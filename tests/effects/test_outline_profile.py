@@ -17,6 +17,7 @@ from made_boards import board_of
 from bayesplate.effects.outline_profile import OutlineProfile
 from bayesplate.effects.stations import Stations
 from bayesplate.effects.thickness_profile import ThicknessProfile
+from bayesplate.plate.parameter import BOARD
 from bayesplate.posterior.region import worst_cents
 from bayesplate.quantities import Quantity
 
@@ -27,7 +28,7 @@ CUT = ((0.0, 0.25, 0.5, 0.75, 1.0), (1.0, 1.0, 1.0, 0.972, 0.899))
 
 def outline(plate, stations, widths):
     ends = plate.edges["y0"], plate.edges["y1"]
-    return OutlineProfile("", ends, stations=Stations(stations, (0.0,) * len(stations), widths))
+    return OutlineProfile(BOARD, ends, stations=Stations(stations, (0.0,) * len(stations), widths))
 
 
 def independent(plate, stations, widths):
@@ -100,7 +101,6 @@ def test_a_given_mass_is_kept():
     setup = setup_of(FREE)
     readings = Quantity.from_readings([0.217, 0.217, 0.195], 0.0, [0.0, 0.435, 0.58])
     board = board_of(ritz.FREE_SPRUCE, [setup], length_y=readings, mass=Quantity.exact(0.25))
-    board = replace(board, inputs={n: q for n, q in board.inputs.items() if n != "density"})
     values = board.nominal() | {n: v for n, v in values_of(FREE, {}).items() if n.startswith("D_")}
     adjusted = OutlineProfile.of(board, setup).adjusted(values)
 

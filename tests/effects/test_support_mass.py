@@ -7,13 +7,13 @@ from dataclasses import replace
 import generator.effects
 import numpy as np
 import pytest
-from effect_plates import ALL_SUPPORTED, SETUP, hertz, hertz_apart, setup_of, shifts
+from effect_plates import ALL_SUPPORTED, MADE, hertz, hertz_apart, setup_of, shifts
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 
 from bayesplate.effects.support_mass import SupportMass
 
 MASS = "support_mass.mass"
-EFFECT = SupportMass(SETUP)
+EFFECT = SupportMass(MADE)
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import generator.effects
 import pytest
-from effect_plates import SETUP, hertz_apart, modes_of
+from effect_plates import MADE, hertz_apart, modes_of
 from generator.known_boards import FIEMME, FINNISH, FREE
 
 from bayesplate.effects.support_stiffness import SupportStiffness
 from bayesplate.plate.setup import DEFAULT_NOISE, Setup
 
 STIFFNESS = "support_stiffness.stiffness"
-EFFECT = SupportStiffness(SETUP)
+EFFECT = SupportStiffness(MADE)
 
 
 @pytest.mark.parametrize("stiffness", [2e3, 2e4, 1e6])
@@ -34,5 +34,5 @@ def test_against_the_generator(plate, stiffness, is_sheared):
 
 def test_a_board_that_is_held_lies_on_nothing():
     free, held = ("free", "free"), ("clamped", "free")
-    assert SupportStiffness.refusal(None, Setup(SETUP, free, free, (), DEFAULT_NOISE)) == ""
-    assert "an edge is held" in SupportStiffness.refusal(None, Setup(SETUP, held, free, (), DEFAULT_NOISE))
+    assert SupportStiffness.refusal(None, Setup("made", free, free, (), DEFAULT_NOISE)) == ""
+    assert "an edge is held" in SupportStiffness.refusal(None, Setup("made", held, free, (), DEFAULT_NOISE))

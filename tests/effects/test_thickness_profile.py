@@ -113,7 +113,6 @@ def test_a_given_mass_is_kept():
     setup = setup_of(FINNISH)
     readings = Quantity.from_readings([0.0031, 0.0031, 0.0031, 0.0027], 0.0, [0.0, 0.01, 0.02, 0.223], [0.05] * 4)
     board = board_of(ritz.FINNISH, [setup], thickness=readings, mass=Quantity.exact(0.036))
-    board = replace(board, inputs={n: q for n, q in board.inputs.items() if n != "density"})
     values = board.nominal() | {n: v for n, v in values_of(FINNISH, {}).items() if n.startswith("D_")}
     system = System(setup, (ThicknessProfile.of(board, setup),))
 

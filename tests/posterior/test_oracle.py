@@ -15,8 +15,7 @@ from made_boards import CANTILEVER_LABELS, NARROW, board_of, setup_of, with_nois
 from scipy import stats
 from statistics_checks import Truth, differences, differences_from_normal
 
-from bayesplate.cards import load_prior
-from bayesplate.cards.prior import Density
+from bayesplate.cards import StatedPrior, load_prior
 from bayesplate.plate.board import Board
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import Problem, infer, pose
@@ -51,7 +50,7 @@ SLOPES = 0.5 * np.array(
 
 
 def rigidity_prior(medians=PRIOR_MEDIANS, factors=PRIOR_FACTORS):
-    densities = [Density("log-normal", m, f) for m, f in zip(medians, factors, strict=True)]
+    densities = [StatedPrior(Quantity.from_median(m, f), "") for m, f in zip(medians, factors, strict=True)]
     stated = dict(zip(("D_x", "D_y", "D_s"), densities, strict=True)) | dict.fromkeys(("E_x", "E_y", "G_xy"))
     return load_prior("weakly-informative").model_copy(update=stated)
 
@@ -220,7 +219,7 @@ def _columns(problem):
 
 def _log_prior(problem, log_D):
     """Log-normal densities of the moduli, in ln E, of equal volume with ln D."""
-    plate, density = ritz.FINNISH, problem.prior.E_x
+    plate, density = ritz.FINNISH, problem.prior.constants["E_x"]
     log_factor = np.log1p(-(plate.nu_xy**2) * np.exp(log_D[..., 1] - log_D[..., 0]))
     log_E = log_D + np.log(np.array([12.0, 12.0, 3.0]) / plate.h**3)
     log_E[..., :2] += log_factor[..., None]

@@ -10,11 +10,11 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, swapped, with_noise
 from scipy import stats
 
-from bayesplate.cards import load_prior
-from bayesplate.cards.prior import Density
+from bayesplate.cards import StatedPrior, load_prior
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.plate.material import moduli
+from bayesplate.plate.parameter import BOARD
 from bayesplate.posterior.inference import pose
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
@@ -75,7 +75,8 @@ def problem(prior):
 
 def with_uncertain_poisson(mean, sd, density):
     setup = setup_of(ritz.CANTILEVER, dict.fromkeys(CANTILEVER_LABELS, 100.0))
-    prior = load_prior("weakly-informative").model_copy(update=dict.fromkeys(("E_x", "E_y", "G_xy"), density))
+    stated = StatedPrior(density, "")
+    prior = load_prior("weakly-informative").model_copy(update=dict.fromkeys(("E_x", "E_y", "G_xy"), stated))
     board = board_of(ritz.FINNISH, [setup], poisson_xy=Quantity.from_mean(mean, sd, "normal"))
     return Posterior(board, prior, (), "linear")
 
@@ -98,7 +99,7 @@ def test_logarithms_of_moduli_and_of_rigidities_have_the_same_volume():
 
 def test_the_prior_of_the_constants_is_normalised_over_the_materials_that_exist():
     """Drawn from a wider normal distribution in ln D and weighted; nu_xy = 0.9 with E_y unbounded cuts a tenth off."""
-    density = Density("log-normal", median=3e9, factor=2.0)
+    density = Quantity.from_median(3e9, 2.0)
     posterior = with_uncertain_poisson(0.9, 1e-6, density)
     n, spread = 400_000, 1.0
     rng = np.random.default_rng(4)
@@ -120,10 +121,10 @@ def test_the_prior_of_the_constants_is_normalised_over_the_materials_that_exist(
     log_G = np.log(moduli(*np.exp(theta[inside, :3]).T, h, 0.9).G_xy)
     mean = np.average(log_G, weights=weights[inside])
     error_of_mean = np.std(weights[inside] * (log_G - mean)) * np.sqrt(inside.sum()) / weights.sum()
-    assert mean == pytest.approx(density.log_mean, abs=4 * error_of_mean)
+    assert mean == pytest.approx(np.log(density.median), abs=4 * error_of_mean)
 
     # control: with D = E h^3 / 12, as if there were no Poisson factor, the same sum comes to one
-    without = sum(density.log_density(theta[:, i] + np.log(f / h**3)) for i, f in enumerate((12.0, 12.0, 3.0)))
+    without = sum(density.log_density_of_log(theta[:, i] + np.log(f / h**3)) for i, f in enumerate((12.0, 12.0, 3.0)))
     assert np.exp(without - log_proposal).mean() > exists + 20 * error
 
 
@@ -133,10 +134,7 @@ def test_a_prior_on_moduli_is_the_same_prior_on_rigidities_where_nothing_couples
     h = ritz.FINNISH.h
     scales = {"D_x": ("E_x", h**3 / 12), "D_y": ("E_y", h**3 / 12), "D_s": ("G_xy", h**3 / 3)}
     stated = {
-        **{
-            name: replace(getattr(prior, e), median=getattr(prior, e).median * factor)
-            for name, (e, factor) in scales.items()
-        },
+        **{name: StatedPrior(prior.constants[e].scaled(factor), "") for name, (e, factor) in scales.items()},
         **dict.fromkeys(("E_x", "E_y", "G_xy"), None),
     }
     theta = np.random.default_rng(1).normal(size=(30, 5))
@@ -146,7 +144,7 @@ def test_a_prior_on_moduli_is_the_same_prior_on_rigidities_where_nothing_couples
 
 
 def test_outside_nu_xy_nu_yx_below_one_there_is_nothing(prior):
-    posterior = with_uncertain_poisson(0.5, 0.1, prior.E_x)
+    posterior = with_uncertain_poisson(0.5, 0.1, prior.constants["E_x"])
     limit = 2 * np.log(1 / 0.5)  # of ln(D_y / D_x) at nu_xy = 0.5
     theta = np.zeros((2, posterior.parameters.n_dim))
     theta[:, 1] = limit + np.array([-1e-9, 1e-9])
@@ -173,16 +171,12 @@ def test_the_likelihood_is_a_sum_over_setups(problem, prior):
     both = problem.posterior
     for i, part in enumerate((slice(0, 6), slice(6, None))):
         setup = both.board.setups[i]
-        kept = {k: v for k, v in both.board.inputs.items() if not k.startswith("clamped") or k in _clamped(setup)}
-        alone = Posterior(replace(both.board, setups=(setup,), inputs=kept), prior, (both.models[i],), "exact")
+        kept = tuple(one for one in both.board.parameters if one.owner in (BOARD, setup.owner))
+        alone = Posterior(replace(both.board, setups=(setup,), parameters=kept), prior, (both.models[i],), "exact")
         columns = [0, 1, 2, 3 + i]
         assert alone.log_likelihood(theta[:, columns]) == pytest.approx(both.log_likelihood(theta)[:, part], rel=EXACT)
     total = both.log_prior(theta) + both.log_likelihood(theta).sum(axis=1)
     assert both(theta) == pytest.approx(total, rel=1e-13)
-
-
-def _clamped(setup):
-    return [setup.input_name(edge) for edge in setup.clamped]
 
 
 @pytest.mark.parametrize("law", ["linear", "exact"])
@@ -234,7 +228,7 @@ def test_exchanging_x_and_y_takes_the_other_poisson_ratio_along(prior):
     point = np.log([D_x, D_y, D_s, 0.008, 0.003])
     nu_yx = float(board.inputs["poisson_xy"].mean * D_y / D_x)
     exchanged = swapped(board)
-    right = replace(exchanged, inputs={**exchanged.inputs, "poisson_xy": Quantity.exact(nu_yx)})
+    right = exchanged.with_priors({"poisson_xy": Quantity.exact(nu_yx)})
     models = [models_at(b, D) for b, D in ((board, (D_x, D_y, D_s)), (right, (D_y, D_x, D_s)))]
     wrong = models_at(exchanged, (D_y, D_x, D_s))
     first = Posterior(board, prior, models[0], "linear")(point[None, :])
@@ -247,7 +241,7 @@ def test_exchanging_x_and_y_takes_the_other_poisson_ratio_along(prior):
 @pytest.mark.parametrize("factor", [2.0, 0.1])
 def test_a_denser_board_is_as_much_stiffer(problem, prior, factor):
     board = problem.board
-    heavy = replace(board, inputs={**board.inputs, "density": Quantity.exact(ritz.FINNISH.rho * factor)})
+    heavy = board.with_priors({"density": Quantity.exact(ritz.FINNISH.rho * factor)})
     estimate = weighted_least_squares(heavy)
     assert estimate.rigidities == pytest.approx(factor * problem.estimate.rigidities, rel=EXACT)
     found = identifiability(estimate.sensitivities, estimate.scales)
@@ -262,8 +256,10 @@ def test_a_denser_board_is_as_much_stiffer(problem, prior, factor):
 def test_the_same_readings_twice_halve_the_variance(problem):
     board = problem.board
     again = tuple(replace(setup, name=f"{setup.name} again") for setup in board.setups)
-    inputs = {**board.inputs, "clamped_x0[cantilever again]": board.inputs["clamped_x0[cantilever]"]}
-    estimate = weighted_least_squares(replace(board, setups=(*board.setups, *again), inputs=inputs))
+    twice = replace(board, setups=(*board.setups, *again))
+    estimate = weighted_least_squares(
+        twice.with_parameters(one for setup in again for one in setup.clamped_parameters)
+    )
     found = identifiability(estimate.sensitivities, estimate.scales)
     assert estimate.rigidities == pytest.approx(problem.estimate.rigidities, rel=EXACT)
     assert 2 * found.covariance == pytest.approx(problem.identifiability.covariance, rel=1e-8)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
 import runs
 from click.testing import CliRunner
 
-from bayesplate.cards.words import EFFECT_NAMES
 from bayesplate.cli import main
-from bayesplate.results.references import EFFECTS_FROM, THEORIES
+from bayesplate.effects import EFFECTS
 from bayesplate.workflow.cite import cite, cite_text
 
 CARD = """\
@@ -87,7 +85,9 @@ def test_plain_text_and_json_hold_the_same():
     assert [s.title for s in sections] == ["Model", "Computation", "Data", "Prior"]
 
 
-@pytest.mark.parametrize("name", EFFECTS_FROM)
-def test_references_of_effects_are_of_effects(name):
-    assert name in EFFECT_NAMES
-    assert set(THEORIES) == {"thin", "shear-flexible"}
+def test_references_of_effects_are_cited_with_them():
+    for name, effect in EFFECTS.items():
+        for entry in effect.references:
+            others = [other for other, one in EFFECTS.items() if other != name and entry in one.references]
+            assert not others, f"{entry} stands in the files of {name} and {others}"
+    assert "Mascia" in cited("finnish-spruce-cantilever", "--effects", "grain_angle")

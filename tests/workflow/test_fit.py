@@ -241,7 +241,7 @@ def test_the_attributes_hold_card_priors_versions_and_seed(archive, summaries):
     assert archive.attrs["seed"] == "1"
     assert archive.attrs["prior"] == "weakly-informative"
     assert read_json(archive.attrs["versions"]) == summaries["fiemme"]["versions"]
-    assert set(read_json(archive.attrs["priors"])) == set(load_prior("weakly-informative").densities)
+    assert set(read_json(archive.attrs["priors"])) == set(load_prior("weakly-informative").constants)
 
 
 def test_the_table_gives_every_mean_with_its_sd(finnish):
