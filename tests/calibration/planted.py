@@ -118,9 +118,10 @@ def drawn(quantity: Quantity, rng: np.random.Generator) -> float:
             return value
 
 
-def short_names(values: Values) -> dict[str, float]:
+def short_names(values: Values, board: Board) -> dict[str, float]:
     """Values by the effect's own names: compliance for clamp_rotation.compliance[cantilever]."""
-    return {name.split("[")[0].split(".")[-1]: value for name, value in values.items()}
+    keys = {parameter.name: parameter.key for parameter in board.parameters}
+    return {keys.get(name, name): value for name, value in values.items()}
 
 
 def draw_truth(effect: str, asked: Prepared, place: Place, rng: np.random.Generator) -> Truth:
@@ -133,7 +134,7 @@ def draw_truth(effect: str, asked: Prepared, place: Place, rng: np.random.Genera
         noise = drawn(asked.board.setups[0].noise, rng)
         constants = {name: values[name] for name in MODULI}
         plate = design.plate(setup, {**constants, "nu_xy": values["poisson_xy"]})
-        acting = CASES[effect].make(short_names(values), plate, place)
+        acting = CASES[effect].make(short_names(values, asked.board), plate, place)
         exact, correlation = frequencies(plate, [acting], setup.beams, CASES[effect].n)
         if correlation >= LEAST_CORRELATION:
             read = {setup.label(b): f * float(np.exp(noise * rng.standard_normal())) for b, f in exact.items()}

@@ -1,0 +1,98 @@
+"""A board written as a card and read again is the same board."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesplate.cards import card_names, read_board_text
+from bayesplate.labels import Label
+from bayesplate.plate.board import board_from_card, made_board
+from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup
+from bayesplate.plate.writing import card_text
+from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
+
+
+def numbers(thing):
+    """Every number of a nested thing of dataclasses, tuples and dicts, and every text, in order."""
+    if isinstance(thing, float | int | np.ndarray) and not isinstance(thing, bool):
+        return [float(thing)]
+    if isinstance(thing, dict):
+        return [n for key, value in thing.items() for n in (*numbers(key), *numbers(value))]
+    if isinstance(thing, list | tuple):
+        return [n for value in thing for n in numbers(value)]
+    return numbers(vars(thing)) if hasattr(thing, "__dict__") else [thing]
+
+
+def assert_same(one, other):
+    first, second = numbers(one), numbers(other)
+    assert len(first) == len(second)
+    for a, b in zip(first, second, strict=True):
+        assert a == (pytest.approx(b, rel=1e-11, nan_ok=True) if isinstance(b, float) else b)
+
+
+def again(board):
+    return board_from_card(read_board_text(card_text(board), board.name))
+
+
+def comparable(board):
+    """Without what a card does not hold: notes on what it left out, and parameters of effects, which it names."""
+    own = tuple(one for one in board.parameters if not one.is_of_effect)
+    return {**{k: v for k, v in vars(board).items() if k in board.__dataclass_fields__}, "notes": (), "parameters": own}
+
+
+@pytest.mark.parametrize("name", card_names("boards"))
+def test_every_shipped_board_comes_back(name):
+    board = prepare(name).board
+    assert_same(comparable(again(board)), comparable(board))
+
+
+def everything():
+    """A board that uses every key of a card."""
+    places = Quantity.from_readings([3.0e-3, 2.9e-3], 1e-4, [0.01, 0.2], [0.05, 0.05])
+    held = Setup(
+        name="held",
+        ends_x=("clamped", "free"),
+        ends_y=("free", "free"),
+        readings=(
+            Reading(Label(1, 0), (0, 0), Quantity.from_readings([52.0, 53.0], 1.0), "+"),
+            Reading(Label(1, 1), (0, 1), Quantity.exact(98.0)),
+            Reading(Label(2, 0), (1, 0), Quantity.from_mean(310.0, 2.0), "-"),
+        ),
+        noise=Quantity.from_median(0.004, 1.7),
+        clamped={"x0": Quantity.from_mean(0.03, 0.0005)},
+        resolution=0.5,
+        unlabelled=(448.8, 594.1),
+        first_label=Label(1, 0),
+        attached=(
+            AttachedItem("accelerometer", ((0.2, 0.02),), Quantity.from_mean(0.6e-3, 0.1e-3)),
+            AttachedItem("weight", ((0.1, 0.02), (0.2, 0.1))),
+        ),
+        hammer=(0.02, 0.02),
+        air=DeclaredAir(Quantity.exact(1.2), "none"),
+    )
+    free = Setup("free", ("free", "free"), ("free", "free"), (), Quantity.from_median(0.003, 1.65))
+    inputs = {
+        "length_x": Quantity.exact(0.253),
+        "length_y": Quantity.from_readings([0.114, 0.1138], 0.0, [0.0, 0.2]),
+        "thickness": places,
+        "mass": Quantity.from_mean(0.041, 0.0002),
+        "poisson_xy": Quantity.from_mean(0.4, 0.1, "normal"),
+    }
+    more = {"title": 'Fichte, "quer" – ÄÖÜ', "source": "line\nbreak", "effects": ("grain_angle",), "prior": "spruce"}
+    setups = (replace(free, readings=(Reading(Label(1, 1), (1, 1), Quantity.exact(134.0)),)), held)
+    return made_board("whole", inputs, setups, shear_xz=Quantity.exact(0.6e9), shear_yz=Quantity.exact(3e7), **more)
+
+
+def test_every_key_comes_back():
+    assert_same(comparable(again(everything())), comparable(everything()))
+
+
+def test_a_changed_number_does_not_come_back_as_the_same():
+    board = everything()
+    thicker = board.with_priors({"thickness": board.inputs["thickness"].scaled(1.0 + 1e-9)})
+    with pytest.raises(AssertionError):
+        assert_same(comparable(again(thicker)), comparable(board))
