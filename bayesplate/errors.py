@@ -2,7 +2,7 @@
 
 BayesplateError            anything a user can meet; carries the exit code
 ├── InputError             3   a card, a file or an option value that cannot be used (also a ValueError)
-├── NotIdentifiableError   4   the data cannot tell a constant
+├── NotIdentifiableError   4   the data cannot tell a constant, or contradict a prior
 ├── NotConvergedError      5   the sampler did not pass its gate
 ├── CheckpointError        6   a checkpoint that cannot be resumed
 └── BatchError             7   some boards of a batch failed
@@ -62,7 +62,7 @@ class InputError(BayesplateError, ValueError):
 
 
 class NotIdentifiableError(BayesplateError):
-    """The data cannot tell a constant; names the direction and what would help."""
+    """The data cannot tell a constant, or contradict a prior; names which and what would help."""
 
     exit_code = 4
 

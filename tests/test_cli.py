@@ -73,6 +73,21 @@ BAD_CARDS = {
                ["my-board.toml line 19: wanted TOML", "(a number has a decimal point, not a comma)"]),
     "effect": ([('name = "my-board"', 'name = "my-board"\neffects = ["transverse_sheer"]')],
                ['effects 1: wanted "transverse_shear"', "(did you mean transverse_shear?)"]),
+    "a table of other boards": ([('name = "free"', 'name = "free"\npublished_coefficients = "paper-cantilever"'),
+                                 ("mass_g = 41", "mass_g = 0.041"), ('"(1,1)" = 150', '"(0,0)" = 150')],
+                                ["[setup] published_coefficients: wanted a table for the edges x0 free, x1 free",
+                                 "got paper-cantilever, made for x0 clamped, x1 free",
+                                 "[setup] published_coefficients: wanted a table of aspect ratio 2.219, got "
+                                 "paper-cantilever, made for 1.956",
+                                 "[setup] published_coefficients: wanted a table with the labels (0,0), (0,2), got",
+                                 "[plate] mass_g: wanted a density from 20 to 25000 kg/m3",
+                                 'frequencies_hz "(0,0)": wanted a mode of a plate']),
+    "cards that are not there": ([('name = "free"', 'name = "free"\npublished_coefficients = "./mine.toml"'),
+                                  ("poisson_xy = 0.4", 'prior = "spruse"'), ("mass_g = 41", "mass_g = 0.041"),
+                                  ('"(1,1)" = 150', '"(0,0)" = 150')],
+                                 ["[setup] published_coefficients -> mine.toml: wanted a card, got no such file",
+                                  "did you mean spruce?", "[plate] mass_g: wanted a density from 20 to 25000 kg/m3",
+                                  'frequencies_hz "(0,0)": wanted a mode of a plate']),
 }  # fmt: skip
 BAD_FILES = {
     "empty": (b"", "my-board.toml: wanted a card, got an empty file"),

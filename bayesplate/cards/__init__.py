@@ -2,6 +2,7 @@
 
 from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, load_board, read_board_text
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
+from bayesplate.cards.named import NamedCards, load_named
 from bayesplate.cards.physical import physical_faults, plate_mass_g
 from bayesplate.cards.prior import PriorCard, StatedPrior, load_prior
 from bayesplate.cards.setup import AirSection, AttachedItem, Edges, HammerSection, SetupSection
@@ -19,6 +20,7 @@ __all__ = [
     "Edges",
     "HammerSection",
     "MaterialSection",
+    "NamedCards",
     "PlateSection",
     "PriorCard",
     "SetupSection",
@@ -26,6 +28,7 @@ __all__ = [
     "card_names",
     "load_board",
     "load_coefficients",
+    "load_named",
     "load_prior",
     "physical_faults",
     "plate_mass_g",

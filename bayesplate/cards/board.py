@@ -98,11 +98,13 @@ class BoardCard(Section):
     )
     _path: Path | None = PrivateAttr(None)
     _sha256: str = PrivateAttr("")
+    _text: str = PrivateAttr("")
 
     def model_post_init(self, context: Any) -> None:
         """Keep where the card comes from."""
         self._path = (context or {}).get("path")
         self._sha256 = (context or {}).get("sha256", "")
+        self._text = (context or {}).get("text", "")
 
     @property
     def path(self) -> Path | None:
@@ -113,6 +115,11 @@ class BoardCard(Section):
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the file's bytes."""
         return self._sha256
+
+    @property
+    def text(self) -> str:
+        """The file as it was read: in UTF-8 it is the bytes that `sha256` is of, whatever the file holds by now."""
+        return self._text
 
     def setup(self, name: str) -> SetupSection:
         """The setup of a name."""
@@ -154,6 +161,7 @@ def _read_board(data: bytes, file: str, stem: str, path: Path | None, may_lack_f
     context = {
         "path": path,
         "sha256": hashlib.sha256(data).hexdigest(),
+        "text": data.decode("utf-8"),
         "may_lack_frequencies": may_lack_frequencies,
     }
     return validated(BoardCard, table, file, context, faults)

@@ -6,11 +6,9 @@ import itertools
 from collections.abc import Iterator
 
 from bayesplate.cards.board import BoardCard
-from bayesplate.cards.coefficients import load_coefficients
-from bayesplate.cards.prior import load_prior
 from bayesplate.cards.setup import SetupSection
-from bayesplate.cards.words import plain
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import plain, setup_places
+from bayesplate.errors import Fault
 from bayesplate.labels import Label
 from bayesplate.quantities import Quantity
 
@@ -28,19 +26,17 @@ def physical_faults(card: BoardCard) -> list[Fault]:
     Returns
     -------
     list of Fault
-        Empty if there is none. Labels that no mode of the board has are found where modes are computed, effects that
-        cannot act where effects are known, not here.
+        Empty if there is none. Cards that it names and that cannot be read are found where they are read, labels that
+        no mode of the board has where modes are computed, effects that cannot act where effects are known, not here.
     """
     file = plain(card.path.name) if card.path else f"{card.name}.toml"
-    faults = [*_plate_faults(card, file), *_prior_faults(card, file)]
-    for index, setup in enumerate(card.setups):
-        where = f"{file} [setup]" if len(card.setups) == 1 else f'{file} [[setup]] {index + 1} "{setup.name}"'
+    faults = [*_plate_faults(card, file)]
+    for setup, where in zip(card.setups, setup_places(file, [setup.name for setup in card.setups]), strict=True):
         faults += [
             *_clamp_faults(card, setup, where),
             *_label_faults(setup, where),
             *_place_faults(card, setup, where),
             *_mass_faults(card, setup, where),
-            *_reference_faults(card, setup, where),
         ]
     return faults
 
@@ -87,33 +83,6 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
                 if not 0 <= value <= limits[axis]:
                     wanted = f"a place on the board, 0 to {limits[axis]:g} mm"
                     yield Fault(f"{file} [plate] {key}.{axis} {number}", wanted, f"{value:g} mm")
-
-
-def _prior_faults(card: BoardCard, file: str) -> Iterator[Fault]:
-    try:
-        load_prior(card.material.prior, beside=card.path.parent if card.path else None)
-    except InputError as error:
-        yield from _through(f"{file} [material] prior", error)
-
-
-def _reference_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
-    if setup.published_coefficients is None:
-        return
-    place = f"{where} published_coefficients"
-    try:
-        table = load_coefficients(setup.published_coefficients, beside=card.path.parent if card.path else None)
-    except InputError as error:
-        yield from _through(place, error)
-        return
-    if table.edges != setup.edges:
-        wanted = f"a table for the edges {setup.edges.letters}"
-        yield Fault(place, wanted, f"{table.name}, made for {table.edges.letters}", "letters in the order x0 y0 x1 y1")
-
-
-def _through(place: str, error: InputError) -> Iterator[Fault]:
-    """The faults of another card, with the place where it was named."""
-    for fault in error.faults:
-        yield Fault(f"{place} -> {fault.place}", fault.wanted, fault.got, fault.remedy)
 
 
 def _free_span(length: Quantity, clamped: dict[str, float], start: str, end: str) -> tuple[float, float]:

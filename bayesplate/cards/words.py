@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 
 EDGE_NAMES = ("x0", "x1", "y0", "y1")
@@ -105,3 +105,10 @@ def listed(words: Iterable[str]) -> str:
     """Words in quotes: "a", "b" or "c"."""
     *most, last = (f'"{word}"' for word in words)
     return f"{', '.join(most)} or {last}" if most else last
+
+
+def setup_places(file: str, names: Sequence[str]) -> list[str]:
+    """Where each setup of a card stands: "my-board.toml [setup]", 'my-board.toml [[setup]] 2 "free"'."""
+    if len(names) == 1:
+        return [f"{file} [setup]"]
+    return [f'{file} [[setup]] {number} "{name}"' for number, name in enumerate(names, start=1)]

@@ -9,19 +9,22 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import CoefficientCard, load_coefficients
+from bayesplate.cards import CoefficientCard
+from bayesplate.cards.words import setup_places
 from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
 from bayesplate.modes.naming import find
 from bayesplate.modes.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
-from bayesplate.plate.board import Values, vibrating_lengths
+from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.material import moduli
 from bayesplate.plate.setup import Setup
 
 CoefficientSource = Literal["sensitivity", "training", "published"]
 SOURCES: tuple[CoefficientSource, ...] = get_args(CoefficientSource)
+SAME_ASPECT = 0.01
+"""Relative difference up to which a table counts as made for the aspect ratio of a board."""
 _GPA = 1e9
 
 
@@ -87,7 +90,7 @@ def coefficient_rows(
     Raises
     ------
     InputError
-        If a table is asked for and none is named, or the named one does not fit the setup.
+        If a table is asked for and none is named.
     NotIdentifiableError
         If a mode is recognised in fewer than three training plates.
     """
@@ -131,9 +134,9 @@ def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingCons
     """Plate in the middle of the training: that of the named table, else the estimate itself."""
     setup = model.setup
     if setup.published_coefficients is not None:
-        printed = _constants_of(load_coefficients(setup.published_coefficients))
+        printed = _constants_of(setup.published_coefficients)
         if printed is not None and (not _has_shear(model) or (printed.G_xz and printed.G_yz)):
-            return printed, f"those of {setup.published_coefficients}"
+            return printed, f"those of {setup.published_coefficients.name}"
     E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     there = model.system.adjusted(values)
     shear = {name: float(there[name]) for name in ("G_xz", "G_yz") if _has_shear(model)}
@@ -156,7 +159,7 @@ def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
 
 def _published(board_name: str, model: SetupModel, values: Values, compared: bool) -> CoefficientRows:
     setup = model.setup
-    card = fitting_table(board_name, setup, aspect_ratio_of(values, setup))
+    card = named_table(board_name, setup)
     rows = np.array([card.table[label] for label in setup.labels])
     distances = _distances(card, setup, rows, _thickness_ratio(values, setup)) if compared else {}
     theory = min(distances.items(), key=lambda item: item[1])[0] if distances else "not stated"
@@ -168,32 +171,55 @@ def _published(board_name: str, model: SetupModel, values: Values, compared: boo
     return CoefficientRows("published", rows, np.zeros(len(rows)), card.aspect_ratio, theory, sentence, r_squared)
 
 
-def fitting_table(board_name: str, setup: Setup, aspect_ratio: float) -> CoefficientCard:
+def named_table(board_name: str, setup: Setup) -> CoefficientCard:
     """The table that a setup names.
 
     Raises
     ------
     InputError
-        If it names none, or one that is not of the setup's edges, aspect ratio and labels.
+        If it names none.
     """
-    place = f"{board_name} [setup] published_coefficients"
     if setup.published_coefficients is None:
+        place = f"{board_name} [setup] published_coefficients"
         raise InputError(Fault(place, "the name of a table", "nothing", "take --coefficients sensitivity or training"))
-    card = load_coefficients(setup.published_coefficients)
+    return setup.published_coefficients
+
+
+def coefficient_faults(board: Board) -> list[Fault]:
+    """Tables that are not of their setup's edges, aspect ratio and labels.
+
+    Parameters
+    ----------
+    board : Board
+
+    Returns
+    -------
+    list of Fault
+        Every one of every setup; empty where no table is named.
+    """
+    places = setup_places(f"{board.name}.toml", [setup.name for setup in board.setups])
+    faults = []
+    for setup, where in zip(board.setups, places, strict=True):
+        if setup.published_coefficients is not None:
+            faults += _misfits(setup.published_coefficients, setup, board, f"{where} published_coefficients")
+    return faults
+
+
+def _misfits(card: CoefficientCard, setup: Setup, board: Board, place: str) -> list[Fault]:
     faults = []
     if card.edges.words != setup.edges:
-        faults.append(
-            Fault(place, f"a table for the edges {_words(setup.edges)}", f"{card.name} for {_words(card.edges.words)}")
-        )
-    if abs(card.aspect_ratio / aspect_ratio - 1.0) > 0.01:
-        faults.append(Fault(place, f"a table of aspect ratio {aspect_ratio:.4g}", f"{card.aspect_ratio:.4g}"))
+        wanted = f"a table for the edges {_words(setup.edges)}"
+        faults.append(Fault(place, wanted, f"{card.name}, made for {_words(card.edges.words)}"))
+    length_x, length_y = (float(side) for side in vibrating_lengths(board.nominal(), setup))
+    is_board = min(length_x, length_y) > 0.0  # nothing left by the clamps is a fault of its own
+    if is_board and abs(card.aspect_ratio * length_y / length_x - 1.0) > SAME_ASPECT:
+        wanted = f"a table of aspect ratio {length_x / length_y:.4g}"
+        faults.append(Fault(place, wanted, f"{card.name}, made for {card.aspect_ratio:.4g}"))
     missing = [str(label) for label in setup.labels if label not in card.table]
     if missing:
         known = ", ".join(str(label) for label in card.table)
         faults.append(Fault(place, f"a table with the labels {', '.join(missing)}", f"{card.name} with {known}"))
-    if faults:
-        raise InputError(faults)
-    return card
+    return faults
 
 
 def _distances(

@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import BoardCard, PriorCard, SetupSection
+from bayesplate.cards import BoardCard, CoefficientCard, PriorCard, SetupSection
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE, AttachedItem, DeclaredAir, Reading, Setup
 from bayesplate.quantities import Quantity
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
+
+NO_TABLES: Mapping[str, CoefficientCard] = MappingProxyType({})
 
 _MILLI = 1e-3
 
@@ -134,7 +137,9 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
     return Board(name, (*stated, *covered), tuple(setups), **more)
 
 
-def board_from_card(card: BoardCard, prior: PriorCard | None = None) -> Board:
+def board_from_card(
+    card: BoardCard, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] = NO_TABLES
+) -> Board:
     """Take a board card to SI units.
 
     Parameters
@@ -142,12 +147,14 @@ def board_from_card(card: BoardCard, prior: PriorCard | None = None) -> Board:
     card : BoardCard
     prior : PriorCard, optional
         Its noise and Poisson ratio stand where it states them and the board card does not.
+    tables : dict of CoefficientCard
+        By setup, those that the card names: see `bayesplate.cards.load_named`.
 
     Returns
     -------
     Board
     """
-    setups = tuple(_setup(section, prior) for section in card.setups)
+    setups = tuple(_setup(section, prior, tables.get(section.name)) for section in card.setups)
     inputs = {
         "length_x": card.plate.length_x_mm.scaled(_MILLI).with_places_scaled(_MILLI),
         "length_y": card.plate.length_y_mm.scaled(_MILLI).with_places_scaled(_MILLI),
@@ -205,7 +212,7 @@ def _noise(section: SetupSection, prior: PriorCard | None) -> Quantity:
     return CLAMPED_NOISE if "clamped" in section.edges.words.values() else DEFAULT_NOISE
 
 
-def _setup(section: SetupSection, prior: PriorCard | None) -> Setup:
+def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCard | None) -> Setup:
     edges, first = section.edges, section.first_label
     return Setup(
         name=section.name,
@@ -220,7 +227,7 @@ def _setup(section: SetupSection, prior: PriorCard | None) -> Setup:
         unlabelled=tuple(peak.mean for peak in section.unlabelled_hz),
         noise=_noise(section, prior),
         first_label=first,
-        published_coefficients=section.published_coefficients,
+        published_coefficients=table,
         attached=tuple(
             AttachedItem(
                 item.kind,

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.cards import CoefficientCard
 from bayesplate.labels import Label
 from bayesplate.plate.parameter import Owner, Parameter, shown_name
 from bayesplate.quantities import Quantity
@@ -78,7 +79,8 @@ class Setup:
     noise : Quantity
         Relative noise of a frequency (log-normal).
     first_label : Label
-    published_coefficients : str or None
+    published_coefficients : CoefficientCard or None
+        Table of the paper's least squares and percentile method, and of nothing else.
     attached : tuple of AttachedItem
     hammer : tuple of float or None, m
     air : DeclaredAir or None
@@ -94,7 +96,7 @@ class Setup:
     resolution: float = 0.0
     unlabelled: tuple[float, ...] = ()
     first_label: Label = NO_OFFSET
-    published_coefficients: str | None = None
+    published_coefficients: CoefficientCard | None = None
     attached: tuple[AttachedItem, ...] = ()
     hammer: tuple[float, float] | None = None
     air: DeclaredAir | None = None

@@ -58,7 +58,7 @@ def _setup(setup: Setup) -> Iterator[str]:
     if setup.resolution:
         yield f"resolution_hz = {_number(setup.resolution)}"
     if setup.published_coefficients is not None:
-        yield f"published_coefficients = {_text(str(setup.published_coefficients))}"
+        yield f"published_coefficients = {_text(setup.published_coefficients.name)}"
     if setup.unlabelled:
         yield f"unlabelled_hz = {_list(_number(peak) for peak in setup.unlabelled)}"
     noise = {"median": _number(100.0 * setup.noise.median), "factor": _number(setup.noise.factor)}

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
+from bayesplate.errors import InputError
+from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.identifiability import (
     Identifiability,
     identifiability,
@@ -19,6 +21,7 @@ from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
+from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.region import Region, find_region, linearisation_errors
@@ -99,9 +102,14 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
 
     Raises
     ------
+    InputError
+        If a published table is not of its setup's edges, aspect ratio and labels.
     NotIdentifiableError
-        If the labelled modes leave a constant open.
+        If the labelled modes leave a constant open, the prior excludes what they tell, or the declared noise does.
     """
+    faults = coefficient_faults(board)
+    if faults:
+        raise InputError(faults)
     require_labels(board)
     estimate = weighted_least_squares(board)
     found = identifiability(estimate.sensitivities, estimate.scales)
@@ -116,6 +124,8 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
         errors = linearisation_errors(board, region.models, draws)
         law = "linear" if linear_suffices(board, errors, [s.noise.median for s in board.setups]) else "exact"
     posterior = Posterior(board, prior, region.models, law, robust)
+    require_reachable(posterior, region.centre, region.covariance)
+    require_possible_noise(posterior, region.centre)
     return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesplate.cards import BoardCard, PriorCard, load_coefficients
+from bayesplate.cards import BoardCard, PriorCard
 from bayesplate.effects import effects_of
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
@@ -77,11 +77,9 @@ def references(card: BoardCard, prior: PriorCard, board: Board) -> tuple[Section
 
 def _data(card: BoardCard, board: Board) -> tuple[str, ...]:
     entries = [f"board {card.name}: {_one_line(card.source) or 'the card states no source'}"]
-    tables = dict.fromkeys(s.published_coefficients for s in board.setups if s.published_coefficients is not None)
-    for name in tables:
-        table = load_coefficients(name, card.path.parent if card.path else None)
-        entries.append(f"coefficients {table.name}: {_one_line(table.source)}")
-    return tuple(entries)
+    tables = [setup.published_coefficients for setup in board.setups if setup.published_coefficients is not None]
+    entries += [f"coefficients {table.name}: {_one_line(table.source)}" for table in tables]
+    return tuple(dict.fromkeys(entries))
 
 
 def _priors(prior: PriorCard, board: Board) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import get_args
 
 from bayesplate.effects import EFFECTS
 from bayesplate.errors import NotConvergedError
-from bayesplate.estimates.coefficients import CoefficientSource, aspect_ratio_of, fitting_table
+from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.inference import Inference, Problem, infer, pose
@@ -84,7 +84,7 @@ def compare(
     if coefficients == "published":
         board = prepared[0].board
         for setup in board.setups:
-            fitting_table(board.name, setup, aspect_ratio_of(board.nominal(), setup))
+            named_table(board.name, setup)
     problems = [pose(one.board, one.prior, law="exact") for one in prepared]
     systems = [paper_system(problem.board, problem.estimate, coefficients) for problem in problems]
     theories = []

@@ -6,9 +6,10 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from bayesplate.cards import BoardCard, PriorCard, load_board, load_prior, physical_faults
+from bayesplate.cards import BoardCard, PriorCard, load_board, load_named, physical_faults
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import InputError
+from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board, board_from_card
 
@@ -24,7 +25,7 @@ class Prepared:
     @property
     def card_text(self) -> str:
         """The card as it was read."""
-        return "" if self.card.path is None else self.card.path.read_text(encoding="utf-8-sig")
+        return self.card.text
 
 
 def prepare(
@@ -51,22 +52,12 @@ def prepare(
         Every schema fault at once; if there is none, every physical fault at once.
     """
     read = load_board(card, may_lack_frequencies=may_lack_frequencies)
-    faults = physical_faults(read)
-    if faults and _prior_is_at_fault(read):
-        raise InputError(faults)
-    prior = load_prior(read.material.prior, read.path.parent if read.path else None)
-    board = board_from_card(read, prior)
+    named = load_named(read)
+    board = board_from_card(read, named.prior, named.tables)
     listed = (*board.effects, *implied_effects(board)) if effects is None else effects
     board = replace(board, effects=tuple(dict.fromkeys(listed)))
-    faults += [*label_faults(board), *effect_faults(board)]
-    if faults:
+    faults = [*physical_faults(read), *named.faults]
+    faults += [*label_faults(board), *effect_faults(board), *coefficient_faults(board)]
+    if faults or named.prior is None:
         raise InputError(faults)
-    return Prepared(read, prior, declare(replace(board, notes=(*board.notes, *notes(board)))))
-
-
-def _prior_is_at_fault(card: BoardCard) -> bool:
-    try:
-        load_prior(card.material.prior, card.path.parent if card.path else None)
-    except InputError:
-        return True
-    return False
+    return Prepared(read, named.prior, declare(replace(board, notes=(*board.notes, *notes(board)))))

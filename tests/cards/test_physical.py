@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
-from bayesplate.cards import load_board, physical_faults, read_board_text
+from bayesplate.cards import physical_faults, read_board_text
 from bayesplate.errors import Fault
 
 Spoil = Callable[..., str]
@@ -38,9 +37,6 @@ CASES = [
      "[plate] thickness_mm.at_x_mm 2", "a place on the board, 0 to 253 mm", "254 mm", ""),
     ("length_y_mm = 114", "length_y_mm = { readings = [114, 113], at_x_mm = [-1, 9] }", "[plate] length_y_mm.at_x_mm 1",
      "a place on the board, 0 to 253 mm", "-1 mm", ""),
-    ("resolution_hz = 1\n", 'resolution_hz = 1\npublished_coefficients = "paper-clamped"\n',
-     "[setup] published_coefficients", "a table for the edges CFFF", "paper-clamped, made for CCCC",
-     "letters in the order x0 y0 x1 y1"),
 ]  # fmt: skip
 
 
@@ -57,31 +53,6 @@ def test_one_fault(spoiled: Spoil, old: str, new: str, place: str, wanted: str, 
     expected = Fault(f"my-board.toml {place}", wanted, got, remedy)
 
     assert expected in faults_of(spoiled(old, new))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "place"),
-    [
-        ("poisson_xy = 0.51", 'prior = "spruse"', 'my-board.toml [material] prior -> "spruse"'),
-        ("resolution_hz = 1\n", 'resolution_hz = 1\npublished_coefficients = "paper"\n',
-         'my-board.toml [setup] published_coefficients -> "paper"'),
-    ],
-)  # fmt: skip
-def test_cards_that_are_not_there(spoiled: Spoil, old: str, new: str, place: str) -> None:
-    (fault,) = faults_of(spoiled(old, new))
-
-    assert fault.place == place
-
-
-def test_a_prior_is_found_beside_the_board(board_file: Path, spoiled: Spoil) -> None:
-    board_file.write_text(spoiled("poisson_xy = 0.51", 'prior = "./mine.toml"'), encoding="utf-8")
-    missing = physical_faults(load_board(board_file))
-    flat = 'distribution = "log-uniform"\nlower_gpa = 1\nupper_gpa = 2\nsource = "-"\n'
-    prior = 'format = 1\nname = "mine"\n' + "".join(f"[{name}]\n{flat}" for name in ("E_x", "E_y", "G_xy"))
-    (board_file.parent / "mine.toml").write_text(prior, encoding="utf-8")
-
-    assert [fault.got for fault in missing] == ["no such file"]
-    assert physical_faults(load_board(board_file)) == []
 
 
 def test_all_faults_at_once(spoiled: Spoil) -> None:

@@ -7,9 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.cards import load_prior
+from bayesplate.cards.shelf import shelf_folder
 from bayesplate.errors import InputError
+from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import paper_system
+from bayesplate.labels import Label
+from bayesplate.posterior.inference import pose
+from bayesplate.results.references import references
 from bayesplate.workflow.prepare import prepare
 
 FINNISH, FIEMME = "finnish-spruce-cantilever", "fiemme-spruce-clamped"
@@ -63,6 +69,45 @@ def test_sensitivity_inverts_its_own_plate(estimates, effects):
 
     np.testing.assert_allclose(system.solve(), estimate.rigidities, rtol=1e-6)
     assert system.origins[0].rest.any() == bool(effects)
+
+
+def test_a_table_beside_the_card_is_read_once_from_there(estimates, tmp_path, monkeypatch):
+    """Wherever the program was started, and whatever becomes of the file; its numbers are those of the shipped one."""
+    (shipped,) = prepare(FINNISH).card.setups
+    text = (shelf_folder("coefficients") / f"{shipped.published_coefficients}.toml").read_text(encoding="utf-8")
+    table = tmp_path / "cards" / "mine.toml"
+    table.parent.mkdir()
+    table.write_text(text.replace('"paper-cantilever"', '"mine"'), encoding="utf-8")
+    card = (shelf_folder("boards") / f"{FINNISH}.toml").read_text(encoding="utf-8")
+    own = table.with_name(f"{FINNISH}.toml")
+    own.write_text(card.replace('"paper-cantilever"', '"./mine.toml"'), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    prepared = prepare(own)
+    table.unlink()
+    board, estimate = estimates[FINNISH, ()]
+
+    found = paper_system(prepared.board, weighted_least_squares(prepared.board), compared=False)
+
+    np.testing.assert_array_equal(found.coefficients, paper_system(board, estimate, compared=False).coefficients)
+    assert "mine" in found.origins[0].sentence
+    data = references(prepared.card, prepared.prior, prepared.board)[2]
+    assert any(entry.startswith("coefficients mine:") for entry in data.entries)
+
+
+def test_a_table_must_fit_a_board_made_without_a_card(estimates):
+    """The aspect ratio may differ by one per cent, as it does between measured sides and nominal ones."""
+    board, _ = estimates[FINNISH, ()]
+    width = board.inputs["length_y"]
+    close, far = (replace(board, inputs={**board.inputs, "length_y": width.scaled(s)}) for s in (1.0098, 1.0102))
+    readings = board.setups[0].readings
+    other = replace(readings[0], label=Label(5, 7))
+    renamed = replace(far, setups=(replace(board.setups[0], readings=(other, *readings[1:])),))
+
+    assert coefficient_faults(board) == coefficient_faults(close) == []
+    assert [fault.wanted for fault in coefficient_faults(far)] == ["a table of aspect ratio 1.936"]
+    assert [fault.wanted for fault in coefficient_faults(renamed)][1:] == ["a table with the labels (5,7)"]
+    with pytest.raises(InputError, match=r"published_coefficients: wanted a table of aspect ratio 1\.936"):
+        pose(far, load_prior("weakly-informative"))
 
 
 def test_a_board_without_a_table_has_no_published_coefficients(estimates):

@@ -1,0 +1,61 @@
+"""The cards that a board card names: its prior, and the coefficient table of each setup that names one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from bayesplate.cards.board import BoardCard
+from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
+from bayesplate.cards.prior import PriorCard, load_prior
+from bayesplate.cards.words import plain, setup_places
+from bayesplate.errors import Fault, InputError
+
+Card = TypeVar("Card", PriorCard, CoefficientCard)
+
+
+@dataclass(frozen=True)
+class NamedCards:
+    """What a board card names, each read once; a relative path starts from the folder of the board card.
+
+    Attributes
+    ----------
+    prior : PriorCard or None
+        None if it cannot be read.
+    tables : dict of CoefficientCard
+        By setup, those that can be read.
+    faults : tuple of Fault
+        Of the cards that cannot, with the place where each was named.
+    """
+
+    prior: PriorCard | None
+    tables: Mapping[str, CoefficientCard]
+    faults: tuple[Fault, ...]
+
+
+def load_named(card: BoardCard) -> NamedCards:
+    """Read every card that a board card names."""
+    file = plain(card.path.name) if card.path else f"{card.name}.toml"
+    beside = card.path.parent if card.path else None
+    faults: list[Fault] = []
+    prior = _read(load_prior, card.material.prior, beside, f"{file} [material] prior", faults)
+    tables: dict[str, CoefficientCard] = {}
+    for setup, where in zip(card.setups, setup_places(file, [setup.name for setup in card.setups]), strict=True):
+        if setup.published_coefficients is not None:
+            place = f"{where} published_coefficients"
+            table = _read(load_coefficients, setup.published_coefficients, beside, place, faults)
+            tables |= {} if table is None else {setup.name: table}
+    return NamedCards(prior, tables, tuple(faults))
+
+
+def _read(
+    load: Callable[[str, Path | None], Card], name: str, beside: Path | None, place: str, faults: list[Fault]
+) -> Card | None:
+    """One card; if it cannot be read its faults join the others."""
+    try:
+        return load(name, beside)
+    except InputError as error:
+        faults += [Fault(f"{place} -> {one.place}", one.wanted, one.got, one.remedy) for one in error.faults]
+        return None

@@ -1,0 +1,259 @@
+"""Effects together: their order changes nothing, three of them at zero size leave the bare plate, pairs are known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations, permutations
+from types import MappingProxyType
+
+import generator.effects
+import made_boards
+import numpy as np
+import pytest
+from generator.designs import ALL_FREE
+from generator.known_boards import FIEMME, FINNISH, FREE
+from generator.plate import EDGES, Plate
+from generator.plate import solve as solve_generator
+
+import bayesplate.frequencies.system
+from bayesplate.effects import EFFECTS, declare
+from bayesplate.frequencies.system import system_of
+from bayesplate.modes.solve import solve
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import AttachedItem, DeclaredAir
+from bayesplate.quantities import Quantity
+
+PLATES = {
+    "CFFF": FINNISH,
+    "CCCC": FIEMME,
+    "FFFF": FREE,
+    "SSSS": replace(FIEMME, edges=dict.fromkeys(EDGES, "supported")),
+}
+N_MODES = 6
+COARSE = (4, 4)
+"""Elements along x and y: frequencies of one mesh are compared, so a coarse one serves."""
+PLACE = (0.86, 0.34)
+
+NOTHING = {
+    "transverse_shear": 1e12,
+    "attached_mass": 0.0,
+    "clamp_rotation": 0.0,
+    "clamp_translation": 0.0,
+    "membrane_tension": 0.0,
+    "support_mass": 1e9,
+    "support_stiffness": 0.0,
+    "air_loading": 0.0,
+    "thickness_profile": 0.0,
+    "outline_profile": 0.0,
+    "density_gradient": 0.0,
+    "grain_angle": 0.0,
+    "poisson_ratio": FREE.nu_xy,
+}
+"""The value of an effect's parameters, SI, at which it does nothing to a board whose nu_xy is that of FREE."""
+KINDS = {
+    "stiffness": {"clamp_rotation", "clamp_translation", "membrane_tension", "support_stiffness"},
+    "mass": {"attached_mass"},
+    "projected mass": {"air_loading", "support_mass"},
+    "field": {"thickness_profile", "outline_profile", "density_gradient"},
+    "theory": {"transverse_shear"},
+    "material": {"grain_angle", "poisson_ratio"},
+}
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plates on a coarse mesh."""
+    monkeypatch.setattr(bayesplate.frequencies.system, "mesh", lambda *_: COARSE)
+
+
+def board_like(
+    plate: Plate, spread: float = 0.01, kind: str = "weight", share: float = 0.02, is_tapered: bool = True
+) -> Board:
+    """A board with a thing of a share of its mass, and widths at three stations that differ by a spread.
+
+    Its thickness has free tapers, or was read at the same stations.
+    """
+    mass = Quantity.exact(share * plate.rho * plate.h * plate.L_x * plate.L_y)
+    item = AttachedItem(kind, ((PLACE[0] * plate.L_x, PLACE[1] * plate.L_y),), mass)
+    setup = replace(made_boards.setup_of(plate.edges, {(2, 2): 1.0}), attached=(item,))
+    widths = tuple(plate.L_y * (1.0 + spread * step) for step in (1.0, 0.0, -1.0))
+    at_x = (0.0, 0.5 * plate.L_x, plate.L_x)
+    inputs = {"length_y": Quantity(plate.L_y, readings=widths, at_x=at_x)}
+    if not is_tapered:
+        depths = tuple(plate.h * width / plate.L_y for width in widths)
+        inputs["thickness"] = Quantity(plate.h, readings=depths, at_x=at_x, at_y=(0.5 * plate.L_y,) * 3)
+    return made_boards.board_of(plate, [setup], **inputs)
+
+
+def allowed(board: Board) -> list[str]:
+    return [name for name, effect in EFFECTS.items() if not effect.refusal(board, board.setups[0])]
+
+
+def sized(quantity: Quantity) -> float:
+    """A usual size of a parameter: the median, or one standard deviation above nothing."""
+    if quantity.is_exact or quantity.kind == "log-normal":
+        return quantity.median
+    return float(np.clip(quantity.value(1.0), quantity.lower, quantity.upper))
+
+
+def hertz(
+    plate: Plate, board: Board, effects: Sequence[str], sizes: Mapping[str, float] = MappingProxyType({})
+) -> np.ndarray:
+    """The lowest frequencies with effects declared in this order; sizes: of an effect's parameters, else usual ones."""
+    declared = declare(replace(board, effects=tuple(effects)))
+    values = {name: sized(quantity) for name, quantity in declared.inputs.items()}
+    for name in values:
+        effect = "poisson_ratio" if name == "poisson_xy" else name.split(".")[0]
+        values[name] = sizes.get(effect, values[name]) if effect in effects else values[name]
+    values |= {"D_x": plate.D_x, "D_y": plate.D_y, "D_s": plate.G_xy * plate.h**3 / 3.0}
+    at = {name: np.asarray(value) for name, value in values.items()}
+    system = system_of(declared, declared.setups[0])
+    squares = solve(system.plate(at), system.weights(at).at(0), N_MODES).eigenvalues
+    return np.sqrt(squares) / (2.0 * np.pi)
+
+
+BOARDS = {edges: board_like(plate, is_tapered=edges != "CFFF") for edges, plate in PLATES.items()}
+TOGETHER = {edges: allowed(board) for edges, board in BOARDS.items()}
+ORDER = tuple(PLATES)
+PAIRS = {
+    edges: [pair for pair in combinations(names, 2) if all(not set(pair) <= set(TOGETHER[e]) for e in before)]
+    for (edges, names), before in zip(TOGETHER.items(), (ORDER[:i] for i in range(len(ORDER))), strict=True)
+}
+"""Every pair on the first of the boards that allows it."""
+
+
+def test_every_effect_meets_every_other_that_an_edge_condition_allows():
+    """45 pairs on a cantilever, those of a stretched board and of its frame, those of a foundation."""
+    assert {edges: len(names) for edges, names in TOGETHER.items()} == {"CFFF": 10, "CCCC": 11, "FFFF": 9, "SSSS": 9}
+    assert set().union(*TOGETHER.values()) == set(EFFECTS) == set(NOTHING) == set().union(*KINDS.values())
+    assert {edges: len(pairs) for edges, pairs in PAIRS.items()} == {"CFFF": 45, "CCCC": 9 + 10, "FFFF": 8, "SSSS": 0}
+
+
+@pytest.mark.parametrize("edges", ["CFFF", "CCCC", "FFFF"])
+@pytest.mark.usefixtures("coarse")
+def test_two_effects_in_either_order_give_the_same_frequencies(edges):
+    """To 1e-9: the eigen-solver's own digits."""
+    assert differing(PLATES[edges], BOARDS[edges], PAIRS[edges]) == {}
+
+
+@pytest.mark.usefixtures("coarse")
+def test_tapers_and_another_field_in_either_order_give_the_same_frequencies():
+    """A free taper is a sum of fields, each of which meets those of the other effect."""
+    assert differing(FINNISH, board_like(FINNISH), combinations(sorted(KINDS["field"]), 2)) == {}
+
+
+def differing(plate: Plate, board: Board, pairs: Iterable[tuple[str, str]]) -> dict[tuple[str, str], float]:
+    """Pairs whose two orders differ, and how much."""
+    apart = {pair: hertz(plate, board, pair) / hertz(plate, board, pair[::-1]) - 1.0 for pair in pairs}
+    return {pair: float(np.abs(one).max()) for pair, one in apart.items() if not np.abs(one).max() < 1e-9}
+
+
+@pytest.mark.usefixtures("coarse")
+def test_three_masses_in_any_order_give_the_same_frequencies():
+    """A sensor, the air and a frame: sparse matrices and projected ones by turns."""
+    orders = permutations(("attached_mass", "air_loading", "support_mass"))
+    found = np.array([hertz(FIEMME, BOARDS["CCCC"], order) for order in orders])
+
+    assert np.abs(found / found[0] - 1.0).max() < 1e-9
+
+
+def left_at_nothing(plate: Plate, effects: Sequence[str]) -> float:
+    """Largest relative change of a frequency that effects leave where they do nothing.
+
+    A clamp keeps a compliance of 1e-5: as if the board were longer by that fraction at each of two clamps, and f goes
+    with L^-2. One that gives way keeps D / (k L^3) = 1e-7: first order is 2 b^2 of it at each end of a clamped beam of
+    cos b cosh b = 1, the third of which has b = 11. A stiff shear-flexible plate keeps its rotary inertia, h^2 k^2 / 24
+    with at most three and a half half waves along either side of the board; G = 1e12 Pa leaves E / (5/6 G), not two
+    per cent, of that again. Stiff shear strains and integrals over fields cost the solver half its digits.
+    """
+    shorter = min(plate.L_x, plate.L_y)
+    allowance = {
+        "clamp_rotation": 2 * 2 * 1e-5,
+        "clamp_translation": 2 * 2 * 11.0**2 * 1e-7,
+        "transverse_shear": 1.02 * plate.h**2 / 24.0 * 2.0 * (3.5 * np.pi / shorter) ** 2,
+    }
+    return 1e-7 + sum(allowance.get(name, 0.0) for name in effects)
+
+
+def triples() -> dict[tuple[str, ...], str]:
+    """For every effect and every two other kinds one triple that some board allows, with that board."""
+    kind = {name: kind for kind, names in KINDS.items() for name in names}
+    meets = {
+        (edges, *triple): {(name, *sorted({kind[n] for n in triple} - {kind[name]})) for name in triple}
+        for edges in PLATES
+        for triple in combinations(TOGETHER[edges], 3)
+        if len({kind[name] for name in triple}) == 3
+    }
+    missing = set().union(*meets.values())
+    found = {}
+    while missing:
+        edges, *triple = max(meets, key=lambda one: len(meets[one] & missing))
+        found[tuple(triple)] = edges
+        missing -= meets[edges, *triple]
+    return found
+
+
+TRIPLES = triples()
+PAPER_THIN = 0.1
+"""Of the boards' thickness: rotary inertia falls with its square."""
+
+
+def test_every_effect_stands_beside_every_two_other_kinds():
+    """Five other kinds make ten twos, and some board allows each of them."""
+    kind = {name: kind for kind, names in KINDS.items() for name in names}
+    met = {(name, *sorted({kind[n] for n in triple} - {kind[name]})) for triple in TRIPLES for name in triple}
+
+    assert len(met) == 10 * len(EFFECTS)
+
+
+@pytest.mark.parametrize("edges", sorted(set(TRIPLES.values())))
+@pytest.mark.usefixtures("coarse")
+def test_three_effects_that_do_nothing_leave_the_bare_plate(edges):
+    plate = replace(PLATES[edges], h=PAPER_THIN * PLATES[edges].h, nu_xy=FREE.nu_xy)
+    board = board_like(plate, spread=0.0, is_tapered=edges != "CFFF")
+    bare = hertz(plate, board, ())
+    wrong = {}
+    for triple in (triple for triple, home in TRIPLES.items() if home == edges):
+        worst = float(np.abs(hertz(plate, board, triple, NOTHING) / bare - 1.0).max())
+        if not worst < left_at_nothing(plate, triple):
+            wrong[triple] = worst
+
+    assert wrong == {}
+
+
+KNOWN_PAIRS = {
+    "a sensor and the air on a free board": (
+        replace(FINNISH, L_x=0.253, edges=ALL_FREE),
+        ("attached_mass", "air_loading"),
+        0.07,
+    ),
+    "a frame and a sensor on a clamped board": (FIEMME, ("support_mass", "attached_mass"), 0.02),
+}
+
+
+@pytest.mark.parametrize("which", KNOWN_PAIRS)
+def test_a_pair_against_the_generator(which):
+    """Both orders against an independent solver; a point mass leaves its polynomials an error of the square of n."""
+    plate, effects, share = KNOWN_PAIRS[which]
+    board = board_like(plate, kind="shaker", share=share)
+    if "air_loading" in effects:
+        board = replace(board, setups=(replace(board.setups[0], air=DeclaredAir(baffle="none")),))
+    mass = share * plate.rho * plate.h * plate.L_x * plate.L_y
+    independent = {
+        "attached_mass": generator.effects.AttachedMass(mass, ((PLACE[0] * plate.L_x, PLACE[1] * plate.L_y),)),
+        "air_loading": generator.effects.AirLoading(1.2, 0.0),
+        "support_mass": generator.effects.SupportMass(2.0),
+    }
+    n_rigid = 3 if plate.edges == ALL_FREE else 0
+    few, many = (
+        solve_generator(plate, [independent[name] for name in effects], N_MODES + n_rigid, (n, n)).frequencies[n_rigid:]
+        for n in (16, 22)
+    )
+    expected = many + (many - few) / ((22 / 16) ** 2 - 1)
+    sizes = {"support_mass": 2.0}
+    alone = [1200.0 * np.log2(hertz(plate, board, (name,), sizes) / expected) for name in effects]
+
+    for order in permutations(effects):
+        assert 1200.0 * np.log2(hertz(plate, board, order, sizes) / expected) == pytest.approx(0.0, abs=0.5), order
+    assert min(np.abs(one).max() for one in alone) > 5.0  # control: each of the two matters
