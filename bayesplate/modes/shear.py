@@ -20,7 +20,8 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
-from bayesplate.modes.fields import Fabric, Group, Measure, Products, layout
+from bayesplate.modes.element import Products
+from bayesplate.modes.fields import Fabric, Group, Measure, layout
 from bayesplate.modes.hermite import end_products, even_and_odd, kept_unknowns, products, slopes_as_values
 from bayesplate.modes.line import Line, line
 from bayesplate.modes.plate import (
