@@ -57,7 +57,7 @@ def spring_weights(
         D / (k L^(4 - power)) of the first side that has a clamped edge; k is the same along all of them. Taken as 0
         where it is negative: a normal approximation of the posterior may ask for that.
     stiffest : float
-        Added to the compliance: with too stiff a spring the modal matrices lose digits.
+        Added to the compliance: with too stiff a spring the reduced-order model loses digits.
     power : int
         A spring of stiffness k has the weight k / (rho h L^power): 3 if it holds the slope, 1 if the deflection.
     values : dict of array

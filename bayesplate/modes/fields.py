@@ -70,6 +70,10 @@ class Fabric:
         return (uniform,) if factor is None else _over_rectangle(x, y, factor)
 
 
+UNIFORM = Fabric()
+"""The same properties everywhere, the grain along x."""
+
+
 def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[int, int]]:
     """Which of the plate's own terms takes which field: every term with its first field first, then with the others.
 

@@ -12,9 +12,10 @@ from scipy.linalg import eigh
 
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
-from bayesplate.modes.plate import Weights, thin_plate
+from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import assemble_shear_flexible
 from bayesplate.modes.solve import solve, solve_class
+from bayesplate.modes.thin import thin_plate
 
 SQUARE = ritz.Plate.isotropic(0.3, ritz.ALL_FREE)
 SUPPORTS = {
