@@ -30,8 +30,8 @@ from bayesplate.estimates.refit import design, refit
 from bayesplate.frequencies.columns import inverse_lambda
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import thin_plate
 from bayesplate.modes.shear import shear_flexible_plate
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, moduli, rigidities
 from bayesplate.posterior.inference import Problem, pose

@@ -72,8 +72,8 @@ class FormLaw:
             keeps = symmetry_of([model])[0] == baseline.symmetry[i]
             places = of_base if keeps else self._by_frequency(baseline, model, of_base, slice(first, first + n))
             assert model.exact is not None
-            matrices = replace(model.exact.matrices, places=places)
-            models.append(replace(model, places=places, exact=ExactLaw(matrices)))
+            reduced = replace(model.exact.reduced, places=places)
+            models.append(replace(model, places=places, exact=ExactLaw(reduced)))
             following.append(() if keeps else self._followed(baseline, models[-1], of_base))
             first += n
         return replace(self, models=tuple(models), following=tuple(following))
@@ -83,7 +83,7 @@ class FormLaw:
         assert model.exact is not None
         weights = model.system.weights(self._without(baseline))
         result = []
-        for block in model.exact.matrices.blocks:
+        for block in model.exact.reduced.blocks:
             rows = np.flatnonzero([place.parity == block.parity for place in model.places])
             classes: dict[object, list[int]] = {}
             for position, row in enumerate(rows):
@@ -112,7 +112,7 @@ class FormLaw:
         found = []
         for place, target in zip(of_base, wanted, strict=True):
             best: tuple[float, Place] | None = None
-            for block in model.exact.matrices.blocks:
+            for block in model.exact.reduced.blocks:
                 kept = zip(symmetry, block.parity, place.parity, strict=True)
                 if any(is_kept and one != other for is_kept, one, other in kept):
                     continue

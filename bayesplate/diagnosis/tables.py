@@ -213,7 +213,7 @@ _PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z")
 
 
 def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
-    """Cells along each of so many parameters; their product stays bounded, however many setups have one of their own."""
+    """Cells along each of so many parameters; their product stays bounded, however many setups have one each."""
     *few, most = cells
     return few[n_parameters - 1] if n_parameters <= len(few) else int(most ** (1.0 / n_parameters) + 1e-9)
 

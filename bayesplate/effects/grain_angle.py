@@ -8,7 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from bayesplate.effects.base import Effect, Scope
-from bayesplate.modes.plate import THIN_TERMS, Weights
+from bayesplate.modes.plate import Weights
+from bayesplate.modes.thin import THIN_TERMS
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup

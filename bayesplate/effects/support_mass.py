@@ -58,14 +58,5 @@ class SupportMass(Effect):
 
 
 def _mean_products(x: Line, y: Line, deflections: Floats) -> Floats:
-    means_x, means_y = (_integral(side) for side in (x, y))
-    means = np.einsum("i,kij,j->k", means_x, deflections, means_y)
+    means = np.einsum("i,kij,j->k", x.integrals, deflections, y.integrals)
     return -np.outer(means, means)
-
-
-def _integral(side: Line) -> Floats:
-    """Integrals of the functions of a line: the load vector of a constant."""
-    points, weights = np.polynomial.legendre.leggauss(4)
-    lengths = np.diff(side.nodes)
-    at = (side.nodes[:-1, None] + 0.5 * lengths[:, None] * (1.0 + points)).ravel()
-    return np.asarray((0.5 * lengths[:, None] * weights).ravel() @ side.shapes(at))

@@ -16,7 +16,7 @@ from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.frequencies.terms import rigidity_columns
 from bayesplate.modes.naming import product_coefficients
-from bayesplate.modes.plate import thin_plate
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.setup import Setup

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.modes.fields import Fabric, Field, Group, layout
-from bayesplate.modes.plate import Weights, thin_groups
+from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import shear_groups
+from bayesplate.modes.thin import thin_groups
 from bayesplate.plate.board import Values
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.plate import Weights
-from bayesplate.modes.reduced import ModalMatrices
+from bayesplate.modes.reduced import ReducedOrderModel
 
 LawName = Literal["linear", "exact"]
 
@@ -46,14 +46,14 @@ class LinearLaw:
 
 @dataclass(frozen=True, eq=False)
 class ExactLaw:
-    """omega^2 as eigenvalues of small modal matrices."""
+    """omega^2 as eigenvalues of a reduced-order model."""
 
-    matrices: ModalMatrices
+    reduced: ReducedOrderModel
     name: LawName = "exact"
 
     def squared(self, weights: Weights) -> NDArray[np.float64]:
         """omega^2 in s^-2: (n_draws, n_modes) array."""
-        return self.matrices.eigenvalues(weights)
+        return self.reduced.eigenvalues(weights)
 
 
 def log_frequency(squared: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_f
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import Place, find
 from bayesplate.modes.plate import PlateMatrices
-from bayesplate.modes.reduced import modal_matrices
+from bayesplate.modes.reduced import reduced_order_model
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
 
@@ -103,11 +103,11 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
 
 def with_exact(model: SetupModel, centre: Values, around: Sequence[Values], held_out: Sequence[Values]) -> SetupModel:
     """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`."""
-    matrices = modal_matrices(
+    reduced = reduced_order_model(
         model.plate,
         model.places,
         model.system.weights(centre).at(0),
         [model.system.weights(values).at(0) for values in around],
         [model.system.weights(values).at(0) for values in held_out],
     )
-    return replace(model, exact=ExactLaw(matrices))
+    return replace(model, exact=ExactLaw(reduced))

@@ -17,8 +17,9 @@ from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes.hermite import Hold, Holds
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
-from bayesplate.modes.plate import PlateMatrices, Weights, assemble, thin_masses, thin_terms
+from bayesplate.modes.plate import PlateMatrices, Weights
 from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, assemble_shear_flexible
+from bayesplate.modes.thin import assemble, thin_masses, thin_terms
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.setup import Ends, Setup
 

@@ -22,7 +22,7 @@ def term_weights(values: Values, setup: Setup) -> Weights:
     Returns
     -------
     Weights
-        (n_draws, 4) stiffness weights in the order of `bayesplate.modes.plate.THIN_TERMS`, and 1 for the mass.
+        (n_draws, 4) stiffness weights in the order of `bayesplate.modes.thin.THIN_TERMS`, and 1 for the mass.
 
     References
     ----------

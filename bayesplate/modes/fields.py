@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.element import Products, assembled, element_products, gauss_points
 from bayesplate.modes.hermite import products
 from bayesplate.modes.line import Line
 
@@ -28,12 +29,11 @@ Outline = Callable[[Floats], tuple[Floats, Floats]]
 Group = Literal["bending", "shear", "mass", "rotary"]
 """Terms of a plate that take the same field."""
 
-Products = Mapping[tuple[int, int], Any]
 Measure = tuple[tuple[Products, Products], ...]
 """Integrals along x and along y by orders of derivatives, on the functions of the free lines; summed over the pairs."""
 
-_POINTS, _GAUSS = (np.polynomial.legendre.leggauss(6)[0] + 1.0) / 2.0, np.polynomial.legendre.leggauss(6)[1] / 2.0
-_ORDERS = tuple((i, j) for i in range(3) for j in range(3))
+_POINTS = 6
+"""Gauss points an element: a product of two cubics with a field of degree five is exact."""
 _NEGLIGIBLE = 1e-12
 
 _GHOST: dict[Group, float] = {"bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
@@ -70,6 +70,10 @@ class Fabric:
         return (uniform,) if factor is None else _over_rectangle(x, y, factor)
 
 
+UNIFORM = Fabric()
+"""The same properties everywhere, the grain along x."""
+
+
 def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[int, int]]:
     """Which of the plate's own terms takes which field: every term with its first field first, then with the others.
 
@@ -95,12 +99,12 @@ def _times(share: float, integrals: Products) -> Products:
 
 def _over_rectangle(x: Line, y: Line, factor: Field) -> Measure:
     """Integrals of a field: a sum of products, one for each singular value of the field that counts."""
-    (at_x, ahead), (at_y, across) = (_gauss_points(side.nodes[:-1], np.diff(side.nodes)) for side in (x, y))
+    (at_x, ahead), (at_y, across) = (gauss_points(side.nodes[:-1], np.diff(side.nodes), _POINTS) for side in (x, y))
     left, values, right = np.linalg.svd(factor(at_x.reshape(-1, 1), at_y.ravel()), full_matrices=False)
     return tuple(
         (
-            _assembled(_element_products(x.nodes, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
-            _assembled(_element_products(y.nodes, at_y, across * right[r].reshape(at_y.shape))),
+            assembled(element_products(x.nodes, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
+            assembled(element_products(y.nodes, at_y, across * right[r].reshape(at_y.shape))),
         )
         for r in np.flatnonzero(values > _NEGLIGIBLE * values[0])
     )
@@ -108,69 +112,22 @@ def _over_rectangle(x: Line, y: Line, factor: Field) -> Measure:
 
 def _inside(x: Line, y: Line, factor: Field | None, outline: Outline) -> Measure:
     """The same within an outline, from the integrals across the plate at every point along it."""
-    at_x, ahead = _gauss_points(x.nodes[:-1], np.diff(x.nodes))
+    at_x, ahead = gauss_points(x.nodes[:-1], np.diff(x.nodes), _POINTS)
     low, high = (limit[..., None] for limit in outline(at_x))
     # Elements across the plate, cut at its outline: (elements along x, points, elements across).
     starts = np.clip(y.nodes[:-1], low, high)
-    at_y, across = _gauss_points(starts, np.clip(y.nodes[1:], low, high) - starts)
+    at_y, across = gauss_points(starts, np.clip(y.nodes[1:], low, high) - starts, _POINTS)
     if factor is not None:
         across = across * factor(at_x[..., None, None], at_y)
-    local = _element_products(y.nodes, at_y, across)
+    local = element_products(y.nodes, at_y, across)
     # Every entry counts alike: what an outline leaves of a small element is small, and must not drown in rounding.
     scales = np.abs(local).max(axis=(0, 1))
     scales[scales == 0.0] = 1.0
     left, values, right = np.linalg.svd((local / scales).reshape(at_x.size, -1), full_matrices=False)
     return tuple(
         (
-            _assembled(_element_products(x.nodes, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
-            _assembled(scales * right[r].reshape(scales.shape)),
+            assembled(element_products(x.nodes, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
+            assembled(scales * right[r].reshape(scales.shape)),
         )
         for r in np.flatnonzero(values > _NEGLIGIBLE * values[0])
     )
-
-
-def _gauss_points(starts: Floats, lengths: Floats) -> tuple[Floats, Floats]:
-    """Gauss points and weights of elements, on one axis more."""
-    return starts[..., None] + lengths[..., None] * _POINTS, lengths[..., None] * _GAUSS
-
-
-def _element_products(nodes: Floats, points: Floats, weights: Floats) -> Floats:
-    """Weighted sums over the points of each element of the products of its four functions' derivatives.
-
-    Parameters
-    ----------
-    nodes : (n_elements + 1,) array
-    points, weights : (..., n_elements, n_points) arrays
-
-    Returns
-    -------
-    (..., n_elements, 9, 4, 4) array
-        By element, and by the orders of the two derivatives as in `_ORDERS`.
-    """
-    lengths = np.diff(nodes)[:, None]
-    t = (points - nodes[:-1, None]) / lengths
-    one = np.ones_like(t)
-    unit = (
-        (1 - 3 * t**2 + 2 * t**3, t - 2 * t**2 + t**3, 3 * t**2 - 2 * t**3, t**3 - t**2),
-        (6 * t**2 - 6 * t, 1 - 4 * t + 3 * t**2, 6 * t - 6 * t**2, 3 * t**2 - 2 * t),
-        (12 * t - 6, 6 * t - 4, 6 - 12 * t, 6 * t - 2),
-    )
-    scales = (one, lengths * one, one, lengths * one)
-    functions = [
-        np.stack([f * s for f, s in zip(row, scales, strict=True)], axis=-1) / lengths[..., None] ** order
-        for order, row in enumerate(unit)
-    ]
-    return np.stack(
-        [np.einsum("...g,...gi,...gj->...ij", weights, functions[i], functions[j]) for i, j in _ORDERS], axis=-3
-    )
-
-
-def _assembled(local: Floats) -> Products:
-    """Element matrices (n_elements, 9, 4, 4) summed into sparse matrices on the functions of the free line."""
-    from scipy.sparse import coo_array
-
-    n = len(local)
-    unknowns = 2 * np.arange(n)[:, None] + np.arange(4)
-    entries = np.repeat(unknowns, 4, axis=1).ravel(), np.tile(unknowns, 4).ravel()
-    shape = (2 * (n + 1), 2 * (n + 1))
-    return {orders: coo_array((local[:, k].ravel(), entries), shape=shape).tocsr() for k, orders in enumerate(_ORDERS)}

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.element import Products, assembled, uniform_products
 from bayesplate.plate.setup import Ends
 
 Hold = Literal["clamped", "supported", "guided", "free"]
@@ -22,16 +23,8 @@ _LAYER = (1 / 4, 1 / 16)
 
 
 @lru_cache(maxsize=64)
-def hermite_basis(nodes: tuple[float, ...]) -> Any:
-    """Scikit-fem's basis on given nodes; four points an element integrate any product of two functions exactly."""
-    from skfem import Basis, ElementLineHermite, MeshLine
-
-    return Basis(MeshLine.init_tensor(np.array(nodes)), ElementLineHermite(), intorder=6)
-
-
-@lru_cache(maxsize=64)
-def products(nodes: tuple[float, ...]) -> dict[tuple[int, int], Any]:
-    """Integrals of one function's i-th derivative (rows) times another's j-th (columns), i and j from 0 to 2.
+def products(nodes: tuple[float, ...]) -> Products:
+    """Integrals of products of derivatives over the free line.
 
     Parameters
     ----------
@@ -41,41 +34,9 @@ def products(nodes: tuple[float, ...]) -> dict[tuple[int, int], Any]:
     Returns
     -------
     dict of (n_unknowns, n_unknowns) sparse array
-        By (i, j).
+        By the orders of the two derivatives.
     """
-    from scipy.sparse import coo_array
-
-    lengths = np.diff(nodes)
-    n_unknowns = 2 * len(nodes)
-    units = np.column_stack([np.ones_like(lengths), lengths] * 2)
-    unknowns = 2 * np.arange(lengths.size)[:, None] + np.arange(4)
-    rows, columns = np.repeat(unknowns, 4, axis=1).ravel(), np.tile(unknowns, 4).ravel()
-    result = {}
-    for (i, j), reference in _unit_products().items():
-        elements = lengths[:, None, None] ** (1 - i - j) * units[:, :, None] * reference * units[:, None, :]
-        result[i, j] = coo_array((elements.ravel(), (rows, columns)), shape=(n_unknowns, n_unknowns)).tocsr()
-    return result
-
-
-@lru_cache(maxsize=1)
-def _unit_products() -> dict[tuple[int, int], NDArray[np.float64]]:
-    """The same on one element of unit length.
-
-    Scaled to size they are exact; assembled in place, short elements far from the origin would lose digits to
-    scikit-fem's powers of the coordinate.
-    """
-    from skfem import BilinearForm
-
-    basis = hermite_basis((0.0, 1.0))
-
-    def derivative(u: Any, order: int) -> Any:
-        return (u, u.grad[0], u.hess[0][0])[order]
-
-    def product(i: int, j: int) -> NDArray[np.float64]:
-        form = BilinearForm(lambda u, v, _: derivative(v, i) * derivative(u, j))
-        return np.asarray(form.assemble(basis).toarray())
-
-    return {(i, j): product(i, j) for i in range(3) for j in range(3)}
+    return assembled(uniform_products(np.diff(nodes)))
 
 
 def graded_nodes(ends: Holds, n_elements: int) -> NDArray[np.float64]:
@@ -165,7 +126,7 @@ def even_and_odd(ends: Ends, n_elements: int, kept: NDArray[np.intp]) -> tuple[A
     return tuple(parts)
 
 
-def end_products(n_elements: int, at: tuple[bool, bool]) -> dict[tuple[int, int], Any]:
+def end_products(n_elements: int, at: tuple[bool, bool]) -> Products:
     """Like `products`, but a sum over the ends that are asked for, of derivatives up to the first.
 
     Parameters

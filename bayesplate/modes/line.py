@@ -7,7 +7,6 @@ terms.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -15,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.element import function_values
 from bayesplate.modes.hermite import (
     Holds,
     end_products,
     even_and_odd,
     graded_nodes,
-    hermite_basis,
     kept_unknowns,
     products,
     values_held,
@@ -114,36 +113,18 @@ class Line:
 
     def shapes(self, points: NDArray[np.float64]) -> Any:
         """Values of the element functions at points of [0, 1]: (n_points, n_dof) sparse array."""
-        basis = hermite_basis(tuple(self.nodes))
-        return basis.probes(np.asarray(points, dtype=float)[None, :]).tocsr()[:, self.kept]
+        return function_values(self.nodes, np.asarray(points, dtype=np.float64))[:, self.kept]
+
+    @cached_property
+    def integrals(self) -> NDArray[np.float64]:
+        """Integral of each function over [0, 1], the load vector of a uniform load: (n_dof,) array."""
+        # The constant 1 is itself a function of the free line: unit values, no slopes.
+        one = np.tile([1.0, 0.0], self.nodes.size)
+        return np.asarray(products(tuple(self.nodes))[0, 0][self.kept] @ one)
 
     def at_ends(self, at: tuple[bool, bool], order: int) -> Any:
         """Products of values (order 0) or slopes (1), summed over the ends asked for: (n_dof, n_dof) sparse array."""
         return end_products(self.n_elements, at)[order, order][self.kept][:, self.kept]
-
-
-def weighted(along: Line, factor: Callable[[NDArray[np.float64]], NDArray[np.float64]], i: int, j: int) -> Any:
-    """Integral of factor(x) times the i-th derivative of one function (rows) and the j-th of another (columns).
-
-    Parameters
-    ----------
-    along : Line
-    factor : callable
-        Of points in [0, 1]; integrated with four points an element, exact if it is linear there.
-    i, j : int
-        0, 1 or 2.
-
-    Returns
-    -------
-    (n_dof, n_dof) sparse array
-    """
-    from skfem import BilinearForm
-
-    def derivative(u: Any, order: int) -> Any:
-        return (u, u.grad[0], u.hess[0][0])[order]
-
-    form = BilinearForm(lambda u, v, w: factor(w.x[0]) * derivative(v, i) * derivative(u, j))
-    return form.assemble(hermite_basis(tuple(along.nodes))).tocsr()[along.kept][:, along.kept]
 
 
 def rigid_degrees(ends: Ends) -> tuple[int, ...]:

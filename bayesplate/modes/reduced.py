@@ -1,8 +1,7 @@
-"""Modal matrices: every stiffness and mass term projected on the modes at the estimate and at points around it.
+"""The reduced-order model: all stiffness and mass terms projected on the modes at the estimate and at points around it.
 
-The eigenvalues of these few small matrices are the exact frequencies to a few hundredths of a cent, thousands of times
-faster than a full solve; the diagonal at the centre is the linear law. `ModalMatrices` is checked against full solves
-it has not seen when it is built.
+Its eigenvalues are the exact frequencies to a few hundredths of a cent, thousands of times faster than a full solve;
+its diagonal at the centre is the linear law. It is checked against full solves it has not seen when it is built.
 """
 
 from __future__ import annotations
@@ -103,8 +102,8 @@ def _weighted(weights: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArr
 
 
 @dataclass(frozen=True, eq=False)
-class ModalMatrices:
-    """Small matrices of the classes that hold the wanted modes.
+class ReducedOrderModel:
+    """The plate on a basis of few vectors in each class that holds wanted modes.
 
     Attributes
     ----------
@@ -128,13 +127,13 @@ class ModalMatrices:
         return values
 
 
-def modal_matrices(
+def reduced_order_model(
     plate: PlateMatrices,
     places: Sequence[Place],
     centre: Weights,
     around: Iterable[Weights],
     held_out: Sequence[Weights],
-) -> ModalMatrices:
+) -> ReducedOrderModel:
     """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
 
     While the error there exceeds a tenth of a cent, held-out points join the basis, in their order and at most half of
@@ -153,7 +152,7 @@ def modal_matrices(
 
     Returns
     -------
-    ModalMatrices
+    ReducedOrderModel
     """
     ranks: dict[Parity, int] = {}
     for place in places:
@@ -165,7 +164,7 @@ def modal_matrices(
         block, error = _reduce(plate.block(parity), n_modes, training, held_out)
         blocks.append(block)
         worst = max(worst, error)
-    return ModalMatrices(tuple(places), tuple(blocks), worst)
+    return ReducedOrderModel(tuple(places), tuple(blocks), worst)
 
 
 def _reduce(

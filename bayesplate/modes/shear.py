@@ -20,12 +20,11 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
-from bayesplate.modes.fields import Fabric, Group, Measure, Products, layout
+from bayesplate.modes.element import Products
+from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.hermite import end_products, even_and_odd, kept_unknowns, products, slopes_as_values
 from bayesplate.modes.line import Line, line
 from bayesplate.modes.plate import (
-    THIN_TERMS,
-    UNIFORM,
     Block,
     EdgeTurn,
     KronSum,
@@ -37,6 +36,7 @@ from bayesplate.modes.plate import (
     kron_sum,
 )
 from bayesplate.modes.sparse import on_one_pattern
+from bayesplate.modes.thin import THIN_TERMS
 from bayesplate.plate.setup import Ends
 
 SHEAR_TERMS = (*THIN_TERMS, "shear_x", "shear_y")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,14 +64,14 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
     # A shift below zero keeps a free plate's rigid motions from making the shifted matrix singular. Its scale is the
     # lowest Rayleigh quotient of a single unknown: the lowest modes lie far below it, so the shift stays small, and
     # stiff shear or short elements cannot raise it.
-    shift = -1e-9 * float((stiffness.diagonal() / mass.diagonal()).min()) if block.n_rigid else 0.0
+    shift = -1e-6 * float((stiffness.diagonal() / mass.diagonal()).min()) if block.n_rigid else 0.0
     factors = splu(
         stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
     n_bare = n_modes + _SPARE_FOR_PROJECTED if block.projected else n_modes
     n_wanted = min(n_bare + block.n_rigid, block.n_dof - 1)
     start = np.random.default_rng(0).standard_normal(block.n_dof)
-    values, vectors = eigsh(
+    _, vectors = eigsh(
         stiffness,
         k=n_wanted,
         M=mass,
@@ -79,25 +80,28 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
         v0=start,
         ncv=min(block.n_dof, max(2 * n_wanted + 1, 20)),
     )
-    order = np.argsort(values)
-    values, vectors = values[order], vectors[:, order]
-    if block.projected:
-        values, vectors = _with_projected_masses(block, weights, values, vectors)
+    values, vectors = _ritz(block, weights, stiffness, mass, vectors)
     n_last = block.n_rigid + n_modes
     return ClassModes(
         block, values[block.n_rigid : n_last], vectors[:, block.n_rigid : n_last], vectors[:, : block.n_rigid]
     )
 
 
-def _with_projected_masses(
-    block: Block, weights: Weights, values: NDArray[np.float64], vectors: NDArray[np.float64]
+def _ritz(
+    block: Block, weights: Weights, stiffness: Any, mass: Any, vectors: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Modes with the projected masses joined, as combinations of the modes without them, rigid ones included."""
+    """Modes on the span of the solver's vectors, with the projected masses joined; rigid ones included, lowest first.
+
+    The solver's own values carry the rounding of a nearly singular factorisation where the plate can move as a whole.
+    """
     from scipy.linalg import eigh
 
-    masses = np.tensordot(weights.mass, block.project_masses(vectors), axes=1)
-    joined, combinations = eigh(np.diag(np.maximum(values, 0.0)), masses)
-    return joined, vectors @ combinations
+    if block.projected:
+        small_mass = np.tensordot(weights.mass, block.project_masses(vectors), axes=1)
+    else:
+        small_mass = vectors.T @ (mass @ vectors)
+    values, combinations = eigh(vectors.T @ (stiffness @ vectors), small_mass)
+    return values, vectors @ combinations
 
 
 def solve_classes(plate: PlateMatrices, weights: Weights, n_modes: Mapping[Parity, int]) -> dict[Parity, ClassModes]:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import Beams, PlateMatrices, Weights, thin_plate
+from bayesplate.modes.plate import Beams, PlateMatrices, Weights
 from bayesplate.modes.shear import SHEAR_CORRECTION, SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
 from bayesplate.modes.solve import Modes, solve
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.setup import Ends
 

@@ -186,7 +186,7 @@ def exact_models(
 
 def worst_cents(models: Sequence[SetupModel]) -> float:
     """Largest error of the exact laws against full solves that they were not trained on, cents."""
-    return max(model.exact.matrices.worst_cents for model in models if model.exact is not None)
+    return max(model.exact.reduced.worst_cents for model in models if model.exact is not None)
 
 
 def linearisation_errors(board: Board, models: Sequence[SetupModel], theta: Floats) -> Floats:

@@ -12,7 +12,7 @@ from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.line import N_BEAMS
 from bayesplate.modes.naming import product_coefficients
-from bayesplate.modes.plate import thin_plate
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
 from bayesplate.plate.setup import Setup

@@ -17,8 +17,9 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes import line
 from bayesplate.modes.mesh import mesh
-from bayesplate.modes.plate import Weights, thin_plate
+from bayesplate.modes.plate import Weights
 from bayesplate.modes.solve import solve, solve_classes
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.setup import Ends
 from bayesplate.posterior.inference import Problem, pose
 from bayesplate.workflow.prepare import prepare

@@ -126,7 +126,7 @@ def test_takes_what_the_card_declares():
 
 
 @pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
-def test_modal_matrices_are_exact(card):
+def test_reduced_order_model_is_exact(card):
     assert worst_cents(posed(card, ["air_loading"]).posterior.models) < 0.5
 
 

@@ -45,5 +45,5 @@ def test_a_rectangle_alike_at_both_ends_does_not_know_the_sign():
     np.testing.assert_allclose(up, down, rtol=1e-8)
 
 
-def test_modal_matrices_are_exact():
+def test_reduced_order_model_is_exact():
     assert worst_cents(posed("finnish-spruce-cantilever", ["density_gradient"]).posterior.models) < 0.5

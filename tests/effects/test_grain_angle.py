@@ -82,5 +82,5 @@ def test_a_material_alike_both_ways_has_no_grain():
         pytest.param("finnish-spruce-cantilever", ["transverse_shear", "grain_angle"], marks=pytest.mark.slow),
     ],
 )
-def test_modal_matrices_are_exact(card, effects):
+def test_reduced_order_model_is_exact(card, effects):
     assert worst_cents(posed(card, effects).posterior.models) < 0.5

@@ -120,5 +120,5 @@ def test_refuses_what_it_cannot_do():
 
 
 @pytest.mark.parametrize("effects", [["outline_profile"], ["outline_profile", "thickness_profile", "grain_angle"]])
-def test_modal_matrices_are_exact(effects):
+def test_reduced_order_model_is_exact(effects):
     assert worst_cents(posed("spruce-free-1R", effects).posterior.models) < 0.5

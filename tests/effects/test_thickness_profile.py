@@ -126,6 +126,6 @@ def test_a_given_mass_is_kept():
 
 
 @pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
-def test_modal_matrices_are_exact(card):
+def test_reduced_order_model_is_exact(card):
     """The second card has readings at places, the first tapers."""
     assert worst_cents(posed(card, ["thickness_profile"]).posterior.models) < 0.5

@@ -11,8 +11,9 @@ import ritz
 
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import CERTAIN, find, name_modes, product_coefficients
-from bayesplate.modes.plate import Weights, is_rigid, thin_plate
+from bayesplate.modes.plate import Weights, is_rigid
 from bayesplate.modes.solve import solve
+from bayesplate.modes.thin import thin_plate
 
 # Beam products in the order of the frequencies, (0, 0) the lowest beam function of each side.
 ORDER = {

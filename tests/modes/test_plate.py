@@ -9,7 +9,8 @@ import pytest
 from scipy.linalg import eigh
 from skfem import Basis, BilinearForm, ElementQuadBFS, MeshQuad
 
-from bayesplate.modes.plate import THIN_TERMS, Parity, Weights, thin_plate
+from bayesplate.modes.plate import Parity, Weights
+from bayesplate.modes.thin import THIN_TERMS, thin_plate
 
 ENDS = list(product(("clamped", "supported", "free"), repeat=2))
 EDGES = [pytest.param(x, y, id="".join(end[0] for end in x + y)) for x, y in product(ENDS, ENDS)]

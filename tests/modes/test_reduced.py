@@ -1,4 +1,4 @@
-"""Modal matrices: held-out accuracy, an honest check value, homogeneity, draws together and one by one, the tangent."""
+"""The reduced-order model: held-out accuracy, an honest check value, homogeneity, many draws at once, the tangent."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ import ritz
 from bayesplate.frequencies.laws import ExactLaw, LinearLaw
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import Weights, thin_plate
-from bayesplate.modes.reduced import modal_matrices
+from bayesplate.modes.plate import Weights
+from bayesplate.modes.reduced import reduced_order_model
 from bayesplate.modes.solve import solve_class
+from bayesplate.modes.thin import thin_plate
 
 WANTED = {
     "cantilever": (ritz.FINNISH, [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2)]),
@@ -43,7 +44,7 @@ def cents(eigenvalues, expected):
 
 @cache
 def prepared(name):
-    """A plate, its modes found by name at the centre, and modal matrices for a box around it."""
+    """A plate, its modes found by name at the centre, and the reduced-order model for a box around it."""
     board, names = WANTED[name]
     centre = weights_at(board, np.zeros(3))
     plate = thin_plate(*board.ends, *mesh(centre))
@@ -51,7 +52,7 @@ def prepared(name):
     corners = [weights_at(board, np.array(signs)) for signs in product((-1.0, 1.0), repeat=3)]
     held_out = [weights_at(board, p) for p in np.random.default_rng(5).uniform(-1.0, 1.0, (6, 3))]
     places = [found[beams].place for beams in names]
-    return plate, found, modal_matrices(plate, places, centre, corners, held_out)
+    return plate, found, reduced_order_model(plate, places, centre, corners, held_out)
 
 
 @cache
@@ -78,30 +79,30 @@ def test_frequencies_hold_within_half_a_cent_where_nothing_was_trained(name):
 def test_reported_error_is_honest(name):
     """Sixteen other points may hold a worse one than the few that were held out, but not by more than a factor of 3."""
     draws, exact = trial(name)
-    matrices = prepared(name)[2]
+    reduced = prepared(name)[2]
 
-    worst = np.abs(cents(matrices.eigenvalues(draws), exact)).max()
+    worst = np.abs(cents(reduced.eigenvalues(draws), exact)).max()
 
-    assert worst < 3.0 * matrices.worst_cents
+    assert worst < 3.0 * reduced.worst_cents
 
 
 def test_reported_error_is_the_true_one_where_the_basis_is_poor():
-    """The negative control: trained at the centre alone, the matrices fail the bar at a corner and say by how much."""
+    """The negative control: trained at the centre alone, the model fails the bar at a corner and says by how much."""
     board, names = WANTED["cantilever"]
     plate, found, _ = prepared("cantilever")
     places = [found[beams].place for beams in names]
     centre, outside = weights_at(board, np.zeros(3)), weights_at(board, np.array([1.0, -1.0, 1.0]))
     exact = [solve_class(plate.block(p.parity), outside, p.rank + 1).eigenvalues[-1] for p in places]
 
-    matrices = modal_matrices(plate, places, centre, [], [outside])
+    reduced = reduced_order_model(plate, places, centre, [], [outside])
 
-    assert matrices.worst_cents > 0.5
-    errors = np.abs(cents(matrices.eigenvalues(together([outside])), [exact]))
-    assert matrices.worst_cents == pytest.approx(errors.max(), rel=1e-6)
+    assert reduced.worst_cents > 0.5
+    errors = np.abs(cents(reduced.eigenvalues(together([outside])), [exact]))
+    assert reduced.worst_cents == pytest.approx(errors.max(), rel=1e-6)
 
 
 @pytest.mark.parametrize("name", WANTED)
-def test_matrices_never_lie_below_the_full_solve(name):
+def test_model_never_lies_below_the_full_solve(name):
     """A Ritz value on fewer vectors is an upper bound."""
     draws, exact = trial(name)
 
@@ -109,32 +110,32 @@ def test_matrices_never_lie_below_the_full_solve(name):
 
 
 @pytest.mark.parametrize("name", WANTED)
-def test_matrices_are_exact_at_the_centre(name):
-    _, found, matrices = prepared(name)
+def test_model_is_exact_at_the_centre(name):
+    _, found, reduced = prepared(name)
     centre = together([weights_at(WANTED[name][0], np.zeros(3))])
     expected = [[mode.eigenvalue for mode in found.values()]]
 
     # Directions of less than 1e-8 of the basis are dropped, so that even a training point is not met to rounding.
-    assert np.abs(cents(matrices.eigenvalues(centre), expected)).max() < 0.01
+    assert np.abs(cents(reduced.eigenvalues(centre), expected)).max() < 0.01
 
 
 @pytest.mark.parametrize("name", WANTED)
 def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness(name):
     draws, _ = trial(name)
-    matrices = prepared(name)[2]
+    reduced = prepared(name)[2]
 
-    scaled = matrices.eigenvalues(Weights(2.7 * draws.stiffness, 1.3 * draws.mass))
+    scaled = reduced.eigenvalues(Weights(2.7 * draws.stiffness, 1.3 * draws.mass))
 
-    np.testing.assert_allclose(scaled, matrices.eigenvalues(draws) * 2.7 / 1.3, rtol=1e-11)
+    np.testing.assert_allclose(scaled, reduced.eigenvalues(draws) * 2.7 / 1.3, rtol=1e-11)
 
 
 @pytest.mark.parametrize("name", WANTED)
 def test_many_draws_are_the_draws_one_by_one(name):
     draws, _ = trial(name)
-    matrices = prepared(name)[2]
-    one_by_one = [matrices.eigenvalues(together([draws.at(i)]))[0] for i in range(len(draws.stiffness))]
+    reduced = prepared(name)[2]
+    one_by_one = [reduced.eigenvalues(together([draws.at(i)]))[0] for i in range(len(draws.stiffness))]
 
-    np.testing.assert_allclose(matrices.eigenvalues(draws), one_by_one, rtol=1e-12)
+    np.testing.assert_allclose(reduced.eigenvalues(draws), one_by_one, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", WANTED)
@@ -142,7 +143,7 @@ def test_many_draws_are_the_draws_one_by_one(name):
 def test_linear_law_is_the_tangent_of_the_exact_law(name, term):
     """By a central difference of the exact law at the centre."""
     board, names = WANTED[name]
-    _, found, matrices = prepared(name)
+    _, found, reduced = prepared(name)
     linear = LinearLaw(np.stack([found[n].stiffness for n in names]), np.stack([found[n].mass for n in names]))
     centre = weights_at(board, np.zeros(3))
 
@@ -153,4 +154,4 @@ def test_linear_law_is_the_tangent_of_the_exact_law(name, term):
 
     # As shares of the mode's energy; the tolerance is the directions that the basis drops and the step's square.
     eigenvalues = np.array([found[n].eigenvalue for n in names])
-    np.testing.assert_allclose(slope(ExactLaw(matrices)) / eigenvalues, slope(linear) / eigenvalues, atol=2e-5)
+    np.testing.assert_allclose(slope(ExactLaw(reduced)) / eigenvalues, slope(linear) / eigenvalues, atol=2e-5)

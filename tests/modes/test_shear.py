@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import Weights, thin_plate
+from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import (
     SHEAR_ELEMENTS_PER_SIDE,
     SHEAR_MASSES,
@@ -22,6 +22,7 @@ from bayesplate.modes.shear import (
     shear_flexible_plate,
 )
 from bayesplate.modes.solve import solve
+from bayesplate.modes.thin import thin_plate
 
 SUPPORTS = {
     "clamped": ritz.ALL_CLAMPED,

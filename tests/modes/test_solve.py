@@ -10,9 +10,12 @@ import pytest
 import ritz
 from scipy.linalg import eigh
 
+from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
-from bayesplate.modes.plate import Weights, thin_plate
+from bayesplate.modes.plate import Weights
+from bayesplate.modes.shear import assemble_shear_flexible
 from bayesplate.modes.solve import solve, solve_class
+from bayesplate.modes.thin import thin_plate
 
 SQUARE = ritz.Plate.isotropic(0.3, ritz.ALL_FREE)
 SUPPORTS = {
@@ -230,3 +233,31 @@ def test_one_class_is_solved_for_as_many_modes_as_it_is_asked():
         modes = solve_class(block, weights_of(SQUARE), 5)
         assert modes.eigenvalues.shape == (5,)
         assert np.all(modes.eigenvalues > 100.0), "13.47^2 is the lowest elastic eigenvalue: no rigid motion is left"
+
+
+def mean_products(x, y, deflections):
+    """Mass terms of the mean deflections, as a support that moves with the board has."""
+    means = np.einsum("i,kij,j->k", x.integrals, deflections, y.integrals)
+    return np.outer(means, means)
+
+
+@pytest.mark.parametrize("projected", [(), (mean_products,)], ids=["board alone", "projected mass"])
+def test_free_plate_answers_for_its_rounding_alone(projected):
+    """Rigid motions make the factorised matrix nearly singular; no eigenvalue may carry that.
+
+    Stored entries moved by one unit in the last place move an eigenvalue by that times the largest energy of an entry
+    against its own, here some 1e8. The control: values taken as the solver gives them at a shift a thousandth of this
+    one move by 5e-3.
+    """
+    side = line(("free", "free"), 8, is_sheared=True, is_split=False)
+    plate = assemble_shear_flexible(side, side, projected=projected)
+    mass = np.array([1.0, 1e-4, 1e-4, *(0.3 for _ in projected)])
+    weights = Weights(np.array([1.0, 0.1, 0.05, 0.3, 4e3, 2e2]), mass)
+    modes = solve(plate, weights, 6)
+    (block,) = plate.blocks
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], block.terms.shape)
+    moved = replace(plate, blocks=(replace(block, terms=block.terms * (1.0 + np.finfo(float).eps * signs)),))
+
+    np.testing.assert_allclose(solve(moved, weights, 6).eigenvalues, modes.eigenvalues, rtol=1e-7)
+    quotients = (modes.coefficients @ weights.stiffness) / (modes.mass_coefficients @ weights.mass)
+    np.testing.assert_allclose(quotients, modes.eigenvalues, rtol=1e-7)

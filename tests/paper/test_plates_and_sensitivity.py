@@ -14,8 +14,8 @@ from bayesplate.frequencies.shear_terms import shear_term_weights
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import thin_plate
 from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.setup import CLAMPED_NOISE, Setup
 

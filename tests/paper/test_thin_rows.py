@@ -9,7 +9,7 @@ import ritz
 from bayesplate.frequencies.terms import paper_coefficients, term_weights
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import thin_plate
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.setup import CLAMPED_NOISE, Setup
 

@@ -9,7 +9,7 @@ from bayesplate.errors import NotIdentifiableError
 from bayesplate.frequencies.terms import paper_coefficients
 from bayesplate.modes import training
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import thin_plate
+from bayesplate.modes.thin import thin_plate
 from bayesplate.modes.training import REFERENCE, TrainingConstants, train, training_weights
 
 CANTILEVER = (("clamped", "free"), ("free", "free"), 223 / 114, 3 / 223)

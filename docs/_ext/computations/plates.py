@@ -8,8 +8,8 @@ import numpy as np
 
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.modes.plate import thin_plate
 from bayesplate.modes.solve import solve
+from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.material import rigidities
 from bayesplate.posterior.inference import pose
 from bayesplate.workflow.prepare import prepare

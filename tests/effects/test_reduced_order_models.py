@@ -1,4 +1,4 @@
-"""Modal matrices of shipped boards with effects: as exact as they say, over the whole range of the effects' priors."""
+"""Reduced-order models of shipped boards with effects: as exact as they say, over the whole range of the priors."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def errors(problem):
     "theory", ["", pytest.param(" transverse_shear", marks=pytest.mark.slow)], ids=["thin", "shear-flexible"]
 )
 @pytest.mark.parametrize(("card", "effects"), CASES)
-def test_modal_matrices_are_exact(card, effects, theory):
+def test_reduced_order_model_is_exact(card, effects, theory):
     attached = SENSOR if (card, effects) == (CANTILEVER, "attached_mass") else None
     problem = posed(card, (effects + theory).split(), attached)
     assert worst_cents(problem.posterior.models) < ACCEPTED_CENTS

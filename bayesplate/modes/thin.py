@@ -1,0 +1,142 @@
+"""The thin plate: four stiffness terms and a mass on the unit square.
+
+    omega^2 = phi' (theta_xx K_xx + theta_yy K_yy + theta_mix K_mix + theta_xy K_xy) phi / mu phi' M phi
+
+with K_xx = int w_xx^2, K_yy = int w_yy^2, K_mix = 2 int w_xx w_yy (the 2 is inside, once) and K_xy = int w_xy^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache, partial
+
+from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
+from bayesplate.modes.line import Line, line
+from bayesplate.modes.plate import (
+    Beams,
+    Block,
+    EdgeTurn,
+    KronSum,
+    Parity,
+    PlateMatrices,
+    Projection,
+    Term,
+    count_rigid,
+    kron_sum,
+)
+from bayesplate.modes.sparse import on_one_pattern
+from bayesplate.plate.setup import Ends
+
+THIN_TERMS = ("xx", "yy", "mix", "xy")
+
+
+@lru_cache(maxsize=16)
+def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> PlateMatrices:
+    """Assemble the thin plate from two lines; the result is shared, so it must not be changed.
+
+    Parameters
+    ----------
+    ends_x, ends_y : tuple of str
+        Condition at the two ends of each side: (x0, x1) and (y0, y1).
+    n_x, n_y : int
+        Numbers of elements along x and y.
+
+    Returns
+    -------
+    PlateMatrices
+        Stiffness terms in the order of `THIN_TERMS`.
+
+    References
+    ----------
+    Ducceschi et al., eq. (1) and (2), as energies.
+    """
+    x, y = line(ends_x, n_x), line(ends_y, n_y)
+    return assemble(x, y, thin_terms(x, y), thin_masses(x, y))
+
+
+def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
+    """Group of each stiffness and of each mass term that is the thin plate's own."""
+    stiffness: tuple[Group, ...] = ("bending", "bending", "bending", "bending")
+    coupling: tuple[Group, ...] = ("bending", "bending") if is_turned else ()
+    return stiffness + coupling, ("mass",)
+
+
+def thin_terms(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
+    """The bending terms of the thin plate.
+
+    Parameters
+    ----------
+    x, y : Line
+    fabric : Fabric
+        Varying properties repeat the terms in the order of `bayesplate.modes.fields.layout`.
+
+    Returns
+    -------
+    tuple of KronSum
+        The four of `THIN_TERMS`; 4 int w_xx w_xy and 4 int w_yy w_xy follow where the grain runs at an angle.
+    """
+    measures = fabric.measures("bending", x, y)
+    stiffness, _ = thin_groups(fabric.is_turned)
+
+    def both(measure: Measure, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:
+        """Integral of the product of two derivatives of the deflection, symmetric."""
+        return (*_integral(measure, x, y, a, b, factor), *_integral(measure, x, y, b, a, factor))
+
+    def own(measure: Measure) -> tuple[KronSum, ...]:
+        return (
+            _integral(measure, x, y, (2, 0), (2, 0)),
+            _integral(measure, x, y, (0, 2), (0, 2)),
+            both(measure, (2, 0), (0, 2)),
+            _integral(measure, x, y, (1, 1), (1, 1)),
+            both(measure, (2, 0), (1, 1), 2.0),
+            both(measure, (0, 2), (1, 1), 2.0),
+        )
+
+    made = [own(measure) for measure in measures]
+    return tuple(made[k][term] for term, k in layout(stiffness, {"bending": len(measures)}))
+
+
+def thin_masses(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
+    """The board's own mass, once for each field that it takes."""
+    return tuple(_integral(measure, x, y, (0, 0), (0, 0)) for measure in fabric.measures("mass", x, y))
+
+
+def _integral(measure: Measure, x: Line, y: Line, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:
+    """Integral of one derivative of the deflection (orders along x and y; rows) times another (columns)."""
+    return tuple(
+        (factor * along_x[a[0], b[0]][x.kept][:, x.kept], along_y[a[1], b[1]][y.kept][:, y.kept])
+        for along_x, along_y in measure
+    )
+
+
+def assemble(
+    x: Line, y: Line, stiffness: Sequence[Term], masses: Sequence[KronSum], projected: Sequence[Projection] = ()
+) -> PlateMatrices:
+    """A thin plate from any terms, class by class.
+
+    Parameters
+    ----------
+    x, y : Line
+        Unsplit along a side on which a term is not symmetric.
+    stiffness : sequence of Term
+    masses : sequence of KronSum
+        The first is the board's own.
+    projected : sequence of Projection
+        Further mass terms.
+
+    Returns
+    -------
+    PlateMatrices
+    """
+    blocks = []
+    terms = [*(term.on_slopes(x, y) if isinstance(term, EdgeTurn) else term for term in stiffness), *masses]
+    for i, part_x in enumerate(x.parts):
+        for j, part_y in enumerate(y.parts):
+            matrices = [kron_sum(term, part_x, part_y) for term in terms]
+            stored, indices, indptr = on_one_pattern(matrices)
+            n = len(stiffness)
+            parity = Parity(i, j)
+            on_deflections = tuple(partial(term, x, y) for term in projected)
+            rigid = count_rigid(parity, x, y)
+            blocks.append(Block(parity, stored[:n], stored[n:], indices, indptr, part_x, part_y, rigid, on_deflections))
+    return PlateMatrices(x, y, tuple(blocks))
