@@ -4,6 +4,7 @@ from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, loa
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.physical import physical_faults, plate_mass_g
 from bayesplate.cards.prior import Density, PriorCard, load_prior
+from bayesplate.cards.remarks import remarks
 from bayesplate.cards.setup import AirSection, AttachedItem, Edges, HammerSection, SetupSection
 from bayesplate.cards.shelf import card_names
 from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
@@ -30,4 +31,5 @@ __all__ = [
     "physical_faults",
     "plate_mass_g",
     "read_board_text",
+    "remarks",
 ]

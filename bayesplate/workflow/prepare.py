@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from bayesplate.cards import BoardCard, PriorCard, load_board, load_prior, physical_faults
+from bayesplate.cards import BoardCard, PriorCard, load_board, load_prior, physical_faults, remarks
 from bayesplate.effects import declare, effect_faults, implied_effects
 from bayesplate.effects.attached_mass import ROUGH_ROVING, heaviest_roving
 from bayesplate.errors import InputError
@@ -62,7 +62,7 @@ def prepare(
     faults += [*label_faults(board), *effect_faults(board)]
     if faults:
         raise InputError(faults)
-    notes = (*board.notes, *_unused_profiles(board), *_roving(board))
+    notes = (*board.notes, *remarks(read, board.effects), *_unused_profiles(board), *_roving(board))
     return Prepared(read, prior, declare(replace(board, notes=notes)))
 
 
