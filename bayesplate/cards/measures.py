@@ -12,7 +12,7 @@ from bayesplate.cards.repeated import are_alike, comma_complaint, scatter_compla
 from bayesplate.cards.values import Complaint, Number, Refusal, Whole, read_each, read_list, read_table, refuse
 from bayesplate.cards.words import quoted, shown
 from bayesplate.errors import InputError
-from bayesplate.labels import HIGHEST_INDEX, Label
+from bayesplate.labels import HIGHEST_FIRST, Label
 from bayesplate.quantities import Kind, Quantity
 
 T = TypeVar("T")
@@ -171,7 +171,7 @@ def read_first_label(value: object) -> Label:
     """The laboratory's label of the lowest beam indices, [m, n]."""
     if not isinstance(value, list) or len(value) != 2:
         raise Refusal(Complaint("two whole numbers, [1, 0]", shown(value)))
-    return Label(*read_each(enumerate(value), Whole(0, HIGHEST_INDEX)))
+    return Label(*read_each(enumerate(value), Whole(0, HIGHEST_FIRST)))
 
 
 def read_place(value: object) -> Place:
