@@ -157,7 +157,14 @@ def fit(
 @click.argument("card")
 @_options("out", "seed", "effects", "force", "json", "quiet", "debug")
 def modes(
-    card: str, out: str | None, seed: int, effects: list[str] | None, force: bool, as_json: bool, quiet: bool, debug: bool
+    card: str,
+    out: str | None,
+    seed: int,
+    effects: list[str] | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    debug: bool,
 ) -> None:
     """Table of the lowest modes of CARD, and a sheet of Chladni figures."""
     with reporting(as_json=as_json, debug=debug):

@@ -6,10 +6,22 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from bayesplate.cards import BoardCard, PriorCard, load_board, load_prior, physical_faults, remarks
+import numpy as np
+
+from bayesplate.cards import (
+    BoardCard,
+    PriorCard,
+    load_board,
+    load_coefficients,
+    load_prior,
+    physical_faults,
+    remarks,
+)
 from bayesplate.effects import declare, effect_faults, implied_effects
 from bayesplate.effects.attached_mass import ROUGH_ROVING, heaviest_roving
-from bayesplate.errors import InputError
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.estimates.coefficients import aspect_ratio_of
+from bayesplate.estimates.plausibility import unit_faults
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board, board_from_card
 
@@ -49,7 +61,10 @@ def prepare(
     Raises
     ------
     InputError
-        Every schema fault at once; if there is none, every physical fault at once.
+        Every schema fault at once; if there is none, every physical fault at once; if there is none, what all
+        frequencies together say of their unit.
+    NotIdentifiableError
+        If the sides are those of the printed table that the card names, exchanged.
     """
     read = load_board(card, may_lack_frequencies=may_lack_frequencies)
     faults = physical_faults(read)
@@ -60,10 +75,31 @@ def prepare(
     listed = (*board.effects, *implied_effects(board)) if effects is None else effects
     board = replace(board, effects=tuple(dict.fromkeys(listed)))
     faults += [*label_faults(board), *effect_faults(board)]
+    faults = faults or unit_faults(board, prior, np.random.default_rng(0))
     if faults:
         raise InputError(faults)
+    _refuse_exchanged(read, board)
     notes = (*board.notes, *remarks(read, board.effects), *_unused_profiles(board), *_roving(board))
     return Prepared(read, prior, declare(replace(board, notes=notes)))
+
+
+_SAME_RATIO = 0.02
+
+
+def _refuse_exchanged(card: BoardCard, board: Board) -> None:
+    """Refuse a board that has the aspect ratio of its printed table only with its sides exchanged."""
+    nominal = board.nominal()
+    exchanged = {**nominal, "length_x": nominal["length_y"], "length_y": nominal["length_x"]}
+    for section, setup in zip(card.setups, board.setups, strict=True):
+        if section.published_coefficients is None:
+            continue
+        table = load_coefficients(section.published_coefficients, card.path.parent if card.path else None)
+        ratio, other = (aspect_ratio_of(values, setup) / table.aspect_ratio for values in (nominal, exchanged))
+        if abs(other - 1.0) < _SAME_RATIO < abs(ratio - 1.0):
+            place = f"{board.name}.toml setup '{setup.name}' published_coefficients"
+            wanted = f"the aspect ratio L_x / L_y of {table.name}, {table.aspect_ratio:.3g}"
+            remedy = "are length_x_mm and length_y_mm exchanged? x is along the grain"
+            raise NotIdentifiableError(Fault(place, wanted, f"{ratio * table.aspect_ratio:.3g}", remedy))
 
 
 def _unused_profiles(board: Board) -> list[str]:
