@@ -28,16 +28,32 @@ class Commands(click.Group):
             raise click.UsageError(error.message + hint, ctx) from None
 
 
+def _names(context: click.Context, option: click.Parameter, effects: str | None) -> list[str] | None:
+    """Effects from a comma-separated list; none at all from "none"."""
+    if effects is None:
+        return None
+    names = [name.strip() for name in effects.split(",") if name.strip()]
+    _refuse_both("none" in names, len(names) > 1, "--effects none declares nothing and a name declares an effect")
+    return [] if "none" in names else names
+
+
+def _refuse_both(one: bool, other: bool, why: str) -> None:
+    if one and other:
+        raise click.UsageError(f"{why}: give one of them.")
+
+
 def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """The shared options that a command takes, in one order."""
     known = {
         "out": click.option("--out", type=click.Path(), help="Output folder (default results/NAME)."),
         "seed": click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Random seed."),
         "effects": click.option(
-            "--effects", help="Declared effects, comma separated, in place of the card's; or none."
+            "--effects",
+            callback=_names,
+            help="Declared effects, comma separated, in place of the card's; or none.",
         ),
-        "law": click.option("--linear", "law", flag_value="linear", help="Force the linear frequency law."),
-        "exact": click.option("--exact", "law", flag_value="exact", help="Force the exact frequency law."),
+        "linear": click.option("--linear", is_flag=True, help="Force the linear frequency law."),
+        "exact": click.option("--exact", is_flag=True, help="Force the exact frequency law."),
         "robust": click.option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say."),
         "coefficients": click.option(
             "--coefficients",
@@ -78,13 +94,13 @@ def main() -> None:
 @main.command()
 @click.argument("card")
 @_options("effects", "json", "quiet", "debug")
-def check(card: str, effects: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
+def check(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug: bool) -> None:
     """Every fault of CARD, or what would be fitted and what it can identify."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.check import check as run
         from bayesplate.workflow.shown import show_check
 
-        report = run(card, effects=_names(effects))
+        report = run(card, effects=effects)
         if as_json:
             print_json(report)
         elif not quiet:
@@ -93,13 +109,14 @@ def check(card: str, effects: str | None, as_json: bool, quiet: bool, debug: boo
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "law", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
 def fit(
     card: str,
     out: str | None,
     seed: int,
-    effects: str | None,
-    law: Any,
+    effects: list[str] | None,
+    linear: bool,
+    exact: bool,
     robust: bool,
     report: bool,
     force: bool,
@@ -109,8 +126,8 @@ def fit(
     debug: bool,
 ) -> None:
     """Posterior of the elastic constants of CARD: report.html, summary.json, posterior.nc."""
-    if force and resume:
-        raise click.UsageError("--force starts anew and --resume continues: give one of them.")
+    _refuse_both(force, resume, "--force starts anew and --resume continues")
+    _refuse_both(linear, exact, "--linear and --exact force different laws")
     with reporting(as_json=as_json, debug=debug, resumable=True):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.fit import fit as run
@@ -119,8 +136,8 @@ def fit(
                 card,
                 out=out,
                 seed=seed,
-                effects=_names(effects),
-                law=law,
+                effects=effects,
+                law="linear" if linear else "exact" if exact else None,
                 robust=robust,
                 report=report,
                 force=force,
@@ -140,14 +157,21 @@ def fit(
 @click.argument("card")
 @_options("out", "seed", "effects", "force", "json", "quiet", "debug")
 def modes(
-    card: str, out: str | None, seed: int, effects: str | None, force: bool, as_json: bool, quiet: bool, debug: bool
+    card: str,
+    out: str | None,
+    seed: int,
+    effects: list[str] | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    debug: bool,
 ) -> None:
     """Table of the lowest modes of CARD, and a sheet of Chladni figures."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.modes import modes as run
         from bayesplate.workflow.shown import show_modes
 
-        result = run(card, out=out, seed=seed, effects=_names(effects), force=force)
+        result = run(card, out=out, seed=seed, effects=effects, force=force)
         if as_json:
             print_json(result.report)
         elif not quiet:
@@ -162,7 +186,7 @@ def compare(
     coefficients: Any,
     out: str | None,
     seed: int,
-    effects: str | None,
+    effects: list[str] | None,
     force: bool,
     as_json: bool,
     quiet: bool,
@@ -177,7 +201,7 @@ def compare(
                 card,
                 coefficients=coefficients,
                 seed=seed,
-                effects=_names(effects),
+                effects=effects,
                 out=out,
                 force=force,
                 progress=tell,
@@ -197,7 +221,7 @@ def diagnose(
     card: str,
     out: str | None,
     seed: int,
-    effects: str | None,
+    effects: list[str] | None,
     force: bool,
     resume: bool,
     as_json: bool,
@@ -205,13 +229,12 @@ def diagnose(
     debug: bool,
 ) -> None:
     """Trace the residual of CARD to an effect, add it, and report the error before and after."""
-    if force and resume:
-        raise click.UsageError("--force starts anew and --resume continues: give one of them.")
+    _refuse_both(force, resume, "--force starts anew and --resume continues")
     with reporting(as_json=as_json, debug=debug, resumable=True):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.diagnose import diagnose as run
 
-            result = run(card, out=out, seed=seed, effects=_names(effects), force=force, resume=resume, progress=tell)
+            result = run(card, out=out, seed=seed, effects=effects, force=force, resume=resume, progress=tell)
         if as_json:
             print_json(result.diagnosis)
         elif not quiet:
@@ -224,24 +247,17 @@ def diagnose(
 @main.command()
 @click.argument("card")
 @_options("effects", "json", "quiet", "debug")
-def cite(card: str, effects: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
+def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug: bool) -> None:
     """References of exactly what a fit of CARD uses."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.cite import cite as run
         from bayesplate.workflow.cite import cite_text
 
-        sections = run(card, effects=_names(effects))
+        sections = run(card, effects=effects)
         if as_json:
             print_json({section.title.lower(): list(section.entries) for section in sections})
         elif not quiet:
             click.echo(cite_text(sections), nl=False)
-
-
-def _names(effects: str | None) -> list[str] | None:
-    """Effects from a comma-separated list; none at all from "none"."""
-    if effects is None:
-        return None
-    return [name.strip() for name in effects.split(",") if name.strip() not in ("", "none")]
 
 
 if __name__ == "__main__":

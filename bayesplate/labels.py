@@ -7,7 +7,14 @@ from typing import NamedTuple
 
 from bayesplate.errors import Fault, InputError
 
-HIGHEST_INDEX = 40
+HIGHEST_ORDER = 9
+"""Nodal lines one way that the production mesh resolves: within 6 cents where the plate bends alike both ways, within
+12 where the wavelengths along its sides differ by up to 1.4."""
+
+HIGHEST_FIRST = 2
+"""Largest number of a laboratory's first label: where two held edges are counted as nodal lines, labels begin there."""
+
+HIGHEST_INDEX = HIGHEST_ORDER + HIGHEST_FIRST
 _GRAMMAR = re.compile(r"[ \t]*\([ \t]*(0|[1-9][0-9]?)[ \t]*,[ \t]*(0|[1-9][0-9]?)[ \t]*\)[ \t]*")
 
 
@@ -35,7 +42,7 @@ class Label(NamedTuple):
         Parameters
         ----------
         text : str
-            Two whole numbers from 0 to 40 in round brackets, parted by a comma.
+            Two whole numbers from 0 to 11 in round brackets, parted by a comma.
 
         Returns
         -------

@@ -5,6 +5,7 @@ from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.named import NamedCards, load_named
 from bayesplate.cards.physical import physical_faults, plate_mass_g
 from bayesplate.cards.prior import PriorCard, StatedPrior, load_prior
+from bayesplate.cards.remarks import remarks
 from bayesplate.cards.setup import AirSection, AttachedItem, Edges, HammerSection, SetupSection
 from bayesplate.cards.shelf import card_names
 from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
@@ -33,4 +34,5 @@ __all__ = [
     "physical_faults",
     "plate_mass_g",
     "read_board_text",
+    "remarks",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,6 +13,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, PrivateAttr
 
 from bayesplate.cards.measures import QuantityReader
 from bayesplate.cards.reading import read_file, read_table
+from bayesplate.cards.repeated import CALIPER, FURTHEST_SIZES, RULE, SCALES
 from bayesplate.cards.schema import Section, place, validated
 from bayesplate.cards.setup import SetupSection
 from bayesplate.cards.shelf import find
@@ -32,27 +34,25 @@ DEFAULT_PRIOR = "weakly-informative"
 DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
 LARGEST_POISSON = 1.5
 MOST_SETUPS = 20
-_LENGTH = Number(1, 100_000, "mm")
+_LENGTH = Number(1, 100_000, "mm", too_small="in mm: 1 m is 1000 mm, 1 cm is 10 mm")
 _THICKNESS = Number(0.01, 1000, "mm")
 _MASS = Number(1e-3, 1e8, "g")
 _DENSITY = Number(1, 30_000, "kg/m3", "in kg/m3: 1 g/cm3 is 1000 kg/m3")
+_SIZE = partial(QuantityReader, furthest=FURTHEST_SIZES)
+_LENGTH_X = _SIZE(_LENGTH, places=("at_y_mm",), resolution=RULE)
+_LENGTH_Y = _SIZE(_LENGTH, places=("at_x_mm",), resolution=RULE)
+_THICKNESSES = _SIZE(_THICKNESS, places=("at_x_mm", "at_y_mm"), resolution=CALIPER)
 _SHEAR = QuantityReader(Number(1e-4, 1000, "GPa"))
 
 
 class PlateSection(Section):
     """The whole board before clamping: lengths in mm; its mass in g or its density in kg/m3, one of the two."""
 
-    length_x_mm: Annotated[Quantity, PlainValidator(QuantityReader(_LENGTH, places=("at_y_mm",)))] = Field(
-        description="the length along the grain in mm"
-    )
-    length_y_mm: Annotated[Quantity, PlainValidator(QuantityReader(_LENGTH, places=("at_x_mm",)))] = Field(
-        description="the length across the grain in mm"
-    )
-    thickness_mm: Annotated[Quantity, PlainValidator(QuantityReader(_THICKNESS, places=("at_x_mm", "at_y_mm")))] = (
-        Field(description="the thickness in mm")
-    )
-    mass_g: Annotated[Quantity | None, PlainValidator(QuantityReader(_MASS))] = None
-    density_kg_m3: Annotated[Quantity | None, PlainValidator(QuantityReader(_DENSITY))] = None
+    length_x_mm: Annotated[Quantity, PlainValidator(_LENGTH_X)] = Field(description="the length along the grain in mm")
+    length_y_mm: Annotated[Quantity, PlainValidator(_LENGTH_Y)] = Field(description="the length across the grain in mm")
+    thickness_mm: Annotated[Quantity, PlainValidator(_THICKNESSES)] = Field(description="the thickness in mm")
+    mass_g: Annotated[Quantity | None, PlainValidator(_SIZE(_MASS, resolution=SCALES))] = None
+    density_kg_m3: Annotated[Quantity | None, PlainValidator(_SIZE(_DENSITY))] = None
 
 
 class MaterialSection(Section):
@@ -88,6 +88,7 @@ class BoardCard(Section):
     name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
     title: Annotated[str, PlainValidator(read_text)] = ""
     source: Annotated[str, PlainValidator(read_text)] = ""
+    notes: Annotated[str, PlainValidator(read_text)] = ""
     effects: Annotated[
         tuple[str, ...], PlainValidator(lambda value: read_words(value, "names of effects", EFFECT_NAMES))
     ] = ()
@@ -96,15 +97,22 @@ class BoardCard(Section):
     setups: Annotated[tuple[SetupSection, ...], BeforeValidator(_as_list)] = Field(
         alias="setup", description="a [setup] table, or several [[setup]]"
     )
+    _written: Mapping[str, Any] = PrivateAttr({})
     _path: Path | None = PrivateAttr(None)
     _sha256: str = PrivateAttr("")
     _text: str = PrivateAttr("")
 
     def model_post_init(self, context: Any) -> None:
         """Keep where the card comes from."""
+        self._written = (context or {}).get("written", {})
         self._path = (context or {}).get("path")
         self._sha256 = (context or {}).get("sha256", "")
         self._text = (context or {}).get("text", "")
+
+    @property
+    def written(self) -> Mapping[str, Any]:
+        """The table that the card's file holds: what was stated, before anything was assumed."""
+        return self._written
 
     @property
     def path(self) -> Path | None:
@@ -159,6 +167,7 @@ def _read_board(data: bytes, file: str, stem: str, path: Path | None, may_lack_f
     table = read_table(data, file)
     faults = [*name_faults(table, file, stem), *_mass_faults(table, file), *_setup_name_faults(table, file)]
     context = {
+        "written": table,
         "path": path,
         "sha256": hashlib.sha256(data).hexdigest(),
         "text": data.decode("utf-8"),

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bayesplate.cards.values import Complaint, Number, Refusal, Whole, read_each, read_list, read_table
+from bayesplate.cards.repeated import are_alike, comma_complaint, scatter_complaint
+from bayesplate.cards.values import Complaint, Number, Refusal, Whole, read_each, read_list, read_table, refuse
 from bayesplate.cards.words import quoted, shown
 from bayesplate.errors import InputError
-from bayesplate.labels import HIGHEST_INDEX, Label
+from bayesplate.labels import HIGHEST_FIRST, Label
 from bayesplate.quantities import Kind, Quantity
 
 T = TypeVar("T")
@@ -27,16 +29,20 @@ _ROUNDING = "the number alone if it is exact; a reading rounded to r has sd = r 
 class QuantityReader:
     """Reads a quantity: a number, { mean, sd }, a list of readings, or { readings, resolution, at_x_mm, at_y_mm }.
 
-    `places` names the coordinates that readings of this quantity may (and then must) have.
+    `places` names the coordinates that readings of this quantity may (and then must) have; `furthest` is the ratio up
+    to which readings without places may lie apart; `resolution` is assumed where all readings are alike and none is
+    stated.
     """
 
     number: Number
     kind: Kind = "log-normal"
     places: tuple[str, ...] = ()
+    furthest: float = math.inf
+    resolution: float = 0.0
 
     def __call__(self, value: object) -> Quantity:
         if isinstance(value, list):
-            return Quantity.from_readings(self._readings(value), kind=self.kind)
+            return self._of(self._together(value), {})
         if not isinstance(value, dict):
             return Quantity.exact(self.number(value))
         if "readings" in value:
@@ -58,7 +64,7 @@ class QuantityReader:
 
     def _from_readings(self, table: dict[str, Any]) -> Quantity:
         readers: dict[str, Callable[[object], Any]] = {
-            "readings": self._readings,
+            "readings": self._readings if any(key in table for key in self.places) else self._together,
             "resolution": Number(0, self.number.high, self.number.unit),
             **dict.fromkeys(self.places, _read_coordinates),
         }
@@ -71,12 +77,25 @@ class QuantityReader:
         if wrong:
             wanted = f"{count} places, one a reading"
             raise Refusal(*(Complaint(wanted, str(len(read[key])), inside=(key,)) for key in wrong))
-        return Quantity.from_readings(
-            read["readings"], read.get("resolution", 0.0), read.get("at_x_mm", ()), read.get("at_y_mm", ()), self.kind
-        )
+        return self._of(read["readings"], read)
+
+    def _of(self, readings: list[float], read: dict[str, Any]) -> Quantity:
+        """The quantity of readings that are in order, and what the card says of them."""
+        assumed = self.resolution if are_alike(readings) else 0.0
+        resolution, at_x, at_y = read.get("resolution", assumed), read.get("at_x_mm", ()), read.get("at_y_mm", ())
+        return Quantity.from_readings(readings, resolution, at_x, at_y, self.kind)
 
     def _readings(self, value: object) -> list[float]:
-        return read_each(enumerate(read_list(value, "readings", MOST_READINGS)), self.number)
+        """Readings of a field: they may lie apart."""
+        items = read_list(value, "readings", MOST_READINGS)
+        refuse(comma_complaint(items, self.furthest))
+        return read_each(enumerate(items), self.number)
+
+    def _together(self, value: object) -> list[float]:
+        """Readings of one thing."""
+        readings = self._readings(value)
+        refuse(scatter_complaint(readings, self.furthest))
+        return readings
 
 
 def read_whole_table(table: dict[str, Any], readers: dict[str, Callable[[object], Any]]) -> dict[str, Any]:
@@ -152,7 +171,7 @@ def read_first_label(value: object) -> Label:
     """The laboratory's label of the lowest beam indices, [m, n]."""
     if not isinstance(value, list) or len(value) != 2:
         raise Refusal(Complaint("two whole numbers, [1, 0]", shown(value)))
-    return Label(*read_each(enumerate(value), Whole(0, HIGHEST_INDEX)))
+    return Label(*read_each(enumerate(value), Whole(0, HIGHEST_FIRST)))
 
 
 def read_place(value: object) -> Place:

@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, NoReturn
 
+from bayesplate.cards.syntax import syntax_remedy
 from bayesplate.cards.words import plain, quoted
 from bayesplate.errors import Fault, InputError
 
@@ -109,14 +110,11 @@ def _syntax_fault(message: str, text: str, file: str) -> Fault:
     number = int(match[2]) if match and match[2] else len(lines)
     line = lines[min(number, len(lines)) - 1].strip()
     reason = match[1] if match else message
-    remedy = ""
-    if re.search(r"=\s*[+-]?[0-9]+,[0-9]", line):
-        remedy = "a number has a decimal point, not a comma"
-    elif re.search(r"=\s*[+-]?[0-9.]+\s*[A-Za-z]", line):
-        remedy = "the unit stands in the key: write the number alone"
-    twice = re.match(r"Cannot (overwrite|declare|mutate)", reason)
-    wanted = "each key and each table once" if twice else "TOML"
+    is_twice = bool(re.match(r"Cannot (overwrite|declare|mutate)", reason))
+    wanted = "each key and each table once" if is_twice else "TOML"
+    remedy = syntax_remedy(line, file, is_twice=is_twice)
     return Fault(f"{file} line {number}", wanted, f"{quoted(line)}: {plain(reason)}", remedy)
+
 
 
 def _depth_exceeds(table: dict[str, Any], limit: int) -> bool:

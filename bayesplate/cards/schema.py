@@ -127,9 +127,9 @@ def _unknown_key(keys: Keys, sections: Mapping[Keys, Mapping[str, str]]) -> Comp
     *outer, key = keys
     known = sections[tuple(outer)]
     remedy = did_you_mean(key, known)
-    home = next((place for place, others in sections.items() if key in others and place), None)
-    if not remedy and home:
-        remedy = f"it belongs in [{'.'.join(home)}]"
+    home = next((place for place, others in sections.items() if key in others), None)
+    if not remedy and home is not None:
+        remedy = f"it belongs in [{'.'.join(home)}]" if home else "it belongs above the first table"
     return Complaint(f"one of {', '.join(known)}", "an unknown key", remedy)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator, ValidationInfo, field_validator
+from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo, field_validator
 
 from bayesplate.cards.measures import (
     MOST_MODES,
@@ -18,8 +18,20 @@ from bayesplate.cards.measures import (
     read_place,
     read_places,
 )
+from bayesplate.cards.repeated import FINE_SCALES, FURTHEST_FREQUENCIES, FURTHEST_SIZES, RULE, peak_comma_complaint
 from bayesplate.cards.schema import Section
-from bayesplate.cards.values import Choice, Complaint, Number, Refusal, read_each, read_list, read_name, read_reference
+from bayesplate.cards.values import (
+    Choice,
+    Complaint,
+    Number,
+    Refusal,
+    read_each,
+    read_list,
+    read_name,
+    read_reference,
+    read_text,
+    refuse,
+)
 from bayesplate.cards.values import read_table as read_entries
 from bayesplate.cards.words import ATTACHED_KINDS, BAFFLES, EDGE_NAMES, EDGE_WORDS, shown
 from bayesplate.labels import Label
@@ -27,8 +39,12 @@ from bayesplate.quantities import Quantity
 
 MOST_ATTACHED = 50
 DEFAULT_SETUP_NAME = "setup"
-_FREQUENCY = QuantityReader(Number(0.1, 1e6, "Hz", "in Hz; the zero-frequency modes of a free board are not listed"))
-_CLAMPED_LENGTH = QuantityReader(Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing"))
+_KILOHERTZ = "in Hz: 1 kHz is 1000 Hz"
+_HERTZ = Number(0.1, 1e6, "Hz", "in Hz; the zero-frequency modes of a free board are not listed", _KILOHERTZ)
+_FREQUENCY = QuantityReader(_HERTZ, furthest=FURTHEST_FREQUENCIES)
+_CLAMPED = Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing")
+_CLAMPED_LENGTH = QuantityReader(_CLAMPED, furthest=FURTHEST_SIZES, resolution=RULE)
+_ATTACHED_MASS = QuantityReader(Number(1e-4, 1e6, "g"), furthest=FURTHEST_SIZES, resolution=FINE_SCALES)
 _EDGE_WANTED = 'a word for each of the four edges x0, x1, y0, y1: "clamped", "supported" or "free"'
 
 EdgeWord = Literal["clamped", "supported", "free"]
@@ -54,13 +70,28 @@ class Edges(Section):
         return "".join(word[0].upper() for word in (self.x0, self.y0, self.x1, self.y1))
 
 
+def _edges_table(value: object) -> object:
+    """Refuse a word where the table of the edges stands, and write out the table that it may mean."""
+    if isinstance(value, dict):
+        return value
+    remedy = "x0 is the edge at x = 0"
+    letters = {word[0].upper(): word for word in EDGE_WORDS}
+    words = dict.fromkeys(EDGE_NAMES, value)
+    if isinstance(value, str) and len(value) == 4 and {*value} <= {*letters}:
+        words = dict(zip(("x0", "y0", "x1", "y1"), (letters[letter] for letter in value), strict=True))
+    if {*words.values()} <= {*EDGE_WORDS}:
+        table = ", ".join(f'{edge} = "{words[edge]}"' for edge in EDGE_NAMES)
+        remedy = f"edges = {{ {table} }}"
+    raise Refusal(Complaint("a table", shown(value), remedy))
+
+
 class AttachedItem(Section):
     """A thing fixed to the board: declared if it has a mass, otherwise a candidate at its place."""
 
     kind: Annotated[Literal["accelerometer", "exciter", "shaker", "weight"], PlainValidator(Choice(ATTACHED_KINDS))] = (
         Field(description="what it is")
     )
-    mass_g: Annotated[Quantity | None, PlainValidator(QuantityReader(Number(1e-4, 1e6, "g")))] = None
+    mass_g: Annotated[Quantity | None, PlainValidator(_ATTACHED_MASS)] = None
     at_mm: Annotated[tuple[Place, ...], PlainValidator(read_places)] = Field(
         description="its place [x, y] in mm from the corner of the edges x0 and y0"
     )
@@ -91,7 +122,9 @@ def _read_setup_name(value: object) -> str:
 def _read_unlabelled(value: object) -> tuple[Quantity, ...]:
     if value == []:
         return ()
-    return tuple(read_each(enumerate(read_list(value, "frequencies", MOST_MODES, WHY_MOST_MODES)), _FREQUENCY))
+    items = read_list(value, "frequencies", MOST_MODES, WHY_MOST_MODES)
+    refuse(peak_comma_complaint(items))
+    return tuple(read_each(enumerate(items), _FREQUENCY))
 
 
 def _read_frequencies(value: object) -> dict[Label, Quantity]:
@@ -112,7 +145,8 @@ class SetupSection(Section):
     """A [setup] of a board card. Frequencies are in Hz, lengths in mm, keyed by label or by edge, never by position."""
 
     name: Annotated[str, PlainValidator(_read_setup_name)] = DEFAULT_SETUP_NAME
-    edges: Edges = Field(description=_EDGE_WANTED)
+    notes: Annotated[str, PlainValidator(read_text)] = ""
+    edges: Annotated[Edges, BeforeValidator(_edges_table)] = Field(description=_EDGE_WANTED)
     clamped_mm: Annotated[Mapping[str, Quantity], PlainValidator(_read_clamped)] = Field(default_factory=dict)
     first_label: Annotated[Label, PlainValidator(read_first_label)] = Label(0, 0)
     resolution_hz: Annotated[float | None, PlainValidator(Number(1e-6, 1000, "Hz"))] = None

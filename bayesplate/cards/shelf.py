@@ -63,8 +63,11 @@ def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | No
     wanted = f"the name of a {_SINGULAR[kind]} card, or a path that ends in .toml"
     got = f"no card of that name in {shelf_folder(kind)}"
     here = Path(f"{text}.toml")
-    if "\0" not in text and len(text) < 200 and here.is_file():
+    is_possible = "\0" not in text and len(text) < 200
+    if is_possible and here.is_file():
         remedy = f"there is a file here: write {quoted(str(here))}"
+    elif is_possible and Path(text).suffix and Path(text).is_file():
+        remedy = "a card is a TOML file; bayesplate new writes a first one, for the frequencies to be put in"
     else:
         remedy = did_you_mean(text, names) or f"a card in {plain(os.getcwd())} is given as a path"
     raise InputError(Fault(quoted(text), wanted, got, remedy))

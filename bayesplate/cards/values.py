@@ -32,6 +32,12 @@ class Refusal(ValueError):
         self.complaints = complaints
 
 
+def refuse(complaint: Complaint | None) -> None:
+    """Raise what is wrong with a value, if anything is."""
+    if complaint is not None:
+        raise Refusal(complaint)
+
+
 def read_each(items: Iterable[tuple[str | int, Any]], read: Callable[[Any], T]) -> list[T]:
     """Read the parts of a list or table and refuse all bad ones at once."""
     good: list[T] = []
@@ -79,13 +85,15 @@ def read_list(value: object, what: str, most: int, why: str = "") -> list[Any]:
 class Number:
     """Reads a finite number between two limits, in the unit that stands in the key.
 
-    The range is checked before any arithmetic, so that 1e300 or a thousand-digit integer never reaches a formula.
+    The range is checked before any arithmetic, so that 1e300 or a thousand-digit integer never reaches a formula. What
+    is below it, but positive, may be in another unit: `too_small` says so.
     """
 
     low: float
     high: float
     unit: str = ""
     hint: str = ""
+    too_small: str = ""
 
     def __call__(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -96,7 +104,8 @@ class Number:
             raise Refusal(Complaint("a positive number", shown(value), self.hint))
         if not self.low <= value <= self.high:
             limits = f"a number from {self.low:.10g} to {self.high:.10g} {self.unit}".rstrip()
-            raise Refusal(Complaint(limits, shown(value), self.hint))
+            hint = self.too_small if value < self.low else ""
+            raise Refusal(Complaint(limits, shown(value), hint or self.hint))
         return float(value)
 
 
@@ -106,12 +115,19 @@ def _number_hint(value: object) -> str:
         return ""
     text = value.strip()
     if re.fullmatch(r"[+-]?[0-9]{1,12},[0-9]{1,12}", text):
-        return f"a decimal point and no quotes: {text.replace(',', '.')}"
+        return two_readings(text) or f"a decimal point and no quotes: {text.replace(',', '.')}"
     if re.fullmatch(r"[+-]?[0-9]{1,12}(\.[0-9]{0,12})?", text):
         return "no quotes around a number"
     if re.fullmatch(r"[0-9.]{1,12} ?[A-Za-z/0-9%]{1,8}", text):
         return "the unit stands in the key: write the number alone"
     return ""
+
+
+def two_readings(text: str) -> str:
+    """Both numbers that "1,024" may be, where the comma may part thousands as well as decimals; empty for others."""
+    if not re.fullmatch(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", text):
+        return ""
+    return f"ambiguous: write {text.replace(',', '.')} or {text.replace(',', '')}, whichever is meant"
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import CoefficientCard
 from bayesplate.cards.words import setup_places
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
@@ -203,6 +203,27 @@ def coefficient_faults(board: Board) -> list[Fault]:
         if setup.published_coefficients is not None:
             faults += _misfits(setup.published_coefficients, setup, board, f"{where} published_coefficients")
     return faults
+
+
+def require_sides(board: Board) -> None:
+    """Refuse a board that has the aspect ratio of a printed table only with its sides exchanged.
+
+    Raises
+    ------
+    NotIdentifiableError
+    """
+    nominal = board.nominal()
+    exchanged = {**nominal, "length_x": nominal["length_y"], "length_y": nominal["length_x"]}
+    for setup in board.setups:
+        table = setup.published_coefficients
+        if table is None:
+            continue
+        ratio, other = (aspect_ratio_of(values, setup) / table.aspect_ratio for values in (nominal, exchanged))
+        if abs(other - 1.0) < 2.0 * SAME_ASPECT < abs(ratio - 1.0):
+            place = f"{board.name}.toml setup '{setup.name}' published_coefficients"
+            wanted = f"the aspect ratio L_x / L_y of {table.name}, {table.aspect_ratio:.3g}"
+            remedy = "are length_x_mm and length_y_mm exchanged? x is along the grain"
+            raise NotIdentifiableError(Fault(place, wanted, f"{ratio * table.aspect_ratio:.3g}", remedy))
 
 
 def _misfits(card: CoefficientCard, setup: Setup, board: Board, place: str) -> list[Fault]:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from bayesplate.errors import Fault
-from bayesplate.labels import Label
+from bayesplate.labels import HIGHEST_ORDER, Label
 from bayesplate.modes.plate import is_rigid
 from bayesplate.plate.board import Board
 from bayesplate.plate.setup import Setup
-
-HIGHEST_ORDER = 9
-"""Highest order of a beam function along either side that the production mesh resolves."""
 
 
 def label_faults(board: Board) -> list[Fault]:
@@ -40,7 +37,7 @@ def _problem(setup: Setup, beams: tuple[int, int]) -> str:
     if min(beams) < 0:
         return f"a label below first_label {setup.first_label}"
     if max(beams) > HIGHEST_ORDER:
-        return f"more than {HIGHEST_ORDER} nodal lines one way"
+        return f"more than {HIGHEST_ORDER} nodal lines one way, beyond what the mesh resolves"
     if is_rigid(beams, setup.ends_x, setup.ends_y):
         return "a motion without bending, at 0 Hz"
     return ""

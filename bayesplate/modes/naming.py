@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -13,6 +14,9 @@ from bayesplate.modes.solve import ClassModes, Modes, solve_classes
 
 CERTAIN = 0.75
 """Correlation with its product of beam functions below which a mode's name is "cannot tell"."""
+
+_STRAY = 0.3
+"""Correlation below which a name was given to a mode that was merely left over: its own lies higher."""
 
 _SPARE = 3
 _MOST_MODES = 40
@@ -68,15 +72,10 @@ def name_shapes(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parit
     """
     from scipy.optimize import linear_sum_assignment
 
-    ends_x, ends_y = plate.line_x.ends, plate.line_y.ends
     beams_x = plate.line_x.beams.T @ plate.line_x.mass
     beams_y = plate.line_y.beams.T @ plate.line_y.mass
     correlations = beams_x @ shapes @ beams_y.T
-    products = [
-        beams
-        for beams in np.ndindex(correlations.shape[1:])
-        if plate.parity(beams) == parity and not is_rigid(beams, ends_x, ends_y)
-    ]
+    products = [beams for beams in _elastic_products(plate) if plate.parity(beams) == parity]
     shares = np.stack([correlations[:, i, j] ** 2 for i, j in products], axis=1)
     rows, columns = linear_sum_assignment(shares, maximize=True)
     return [(products[c], float(np.sqrt(shares[r, c]))) for r, c in zip(rows, columns, strict=True)]
@@ -130,24 +129,36 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
         If a name is no elastic mode of this plate or lies beyond the modes that can be resolved.
     """
     names = list(wanted)
-    counts = {p: n + _SPARE for p, n in _expected_ranks(plate, weights, names).items()}
+    # With as many modes as products a class has given all its names, and with more some modes would have none.
+    most = Counter(plate.parity(beams) for beams in _elastic_products(plate))
+    counts = {p: min(n + _SPARE, most[p]) for p, n in _expected_ranks(plate, weights, names).items()}
     found: dict[Beams, Found] = {}
     while counts:
         solved = solve_classes(plate, weights, counts)
         found = {name: one for name, one in found.items() if one.place.parity not in solved} | _found(plate, solved)
-        unsure = {plate.parity(n) for n in names if n not in found or not found[n].place.is_certain}
-        counts = {p: n + 2 * _SPARE for p, n in counts.items() if p in unsure and n < _MOST_MODES // len(plate.blocks)}
+        lost = {plate.parity(n) for n in names if n not in found or found[n].place.correlation < _STRAY}
+        unsure = {plate.parity(n) for n in names if n in found and not found[n].place.is_certain}
+        counts = {
+            p: min(n + 2 * _SPARE, most[p])
+            for p, n in counts.items()
+            if n < most[p] and (p in lost or (p in unsure and n < _MOST_MODES // len(plate.blocks)))
+        }
     missing = [name for name in names if name not in found]
     if missing:
         raise KeyError(missing)
     return {name: found[name] for name in names}
 
 
+def _elastic_products(plate: PlateMatrices) -> list[Beams]:
+    """Orders of all products of beam functions that bend."""
+    shape = plate.line_x.beams.shape[1], plate.line_y.beams.shape[1]
+    return [beams for beams in np.ndindex(shape) if not is_rigid(beams, plate.line_x.ends, plate.line_y.ends)]
+
+
 def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) -> dict[Parity, int]:
     """How many products of each class lie at or below the highest wanted one, by their Rayleigh quotients."""
     values = np.tensordot(weights.stiffness[:4], product_coefficients(plate), axes=1)
-    ends_x, ends_y = plate.line_x.ends, plate.line_y.ends
-    elastic = [beams for beams in np.ndindex(values.shape) if not is_rigid(beams, ends_x, ends_y)]
+    elastic = _elastic_products(plate)
     unknown = [name for name in names if name not in elastic]
     if unknown:
         raise KeyError(unknown)

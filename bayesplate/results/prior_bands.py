@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
+from bayesplate.estimates.plausibility import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.line import N_BEAMS
 from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
+from bayesplate.plate.board import Board
 from bayesplate.plate.setup import Setup
 
 WITHIN = (1 / 6, 5 / 6)
@@ -27,7 +27,7 @@ _COARSE_MESH = 12
 def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float64]]:
     """Constants at the median of the prior, and the nominal inputs: dict of float."""
     medians = {name: np.asarray(density.median) for name, density in prior.constants.items()}
-    return _with_rigidities({**board.nominal(), **medians})
+    return with_rigidities({**board.nominal(), **medians})
 
 
 def prior_bands(
@@ -51,9 +51,7 @@ def prior_bands(
     dict of (float, float)
         By label; labels beyond the beam functions are left out.
     """
-    drawn = {name: density.sample(rng, _N_DRAWS) for name, density in prior.constants.items()}
-    inputs = {name: quantity.value(rng.standard_normal(_N_DRAWS)) for name, quantity in board.inputs.items()}
-    values = _with_rigidities({**inputs, **drawn})
+    values = prior_draws(board, prior, rng, _N_DRAWS)
     products = product_coefficients(thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH))
     middle = term_weights(prior_medians(board, prior), setup).stiffness[0]
     weights = term_weights(values, setup).stiffness
@@ -66,11 +64,3 @@ def prior_bands(
             low, high = np.quantile(factors, WITHIN)
             bands[str(label)] = (float(low), float(high))
     return bands
-
-
-def _with_rigidities(values: Values) -> dict[str, NDArray[np.float64]]:
-    """The same values with D_x, D_y, D_s, from the moduli where these are given."""
-    if set(RIGIDITIES) <= set(values):
-        return dict(values)
-    E_x, E_y, G_xy = (values[name] for name in MODULI)
-    return {**values, **rigidities(E_x, E_y, G_xy, values["thickness"], values["poisson_xy"])._asdict()}

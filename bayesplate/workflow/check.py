@@ -13,6 +13,7 @@ from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.inference import Problem, pose
+from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import prepare
 
 _N_DRAWS = 4000
@@ -38,6 +39,7 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
     InputError, NotIdentifiableError
         As `fit` would.
     """
+    require_arguments(card=card, effects=effects)
     prepared = prepare(card, effects)
     board = prepared.board
     problem = pose(board, prepared.prior)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from textwrap import fill
 
 from bayesplate.results.references import Section, references
+from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import prepare
 
 _WIDTH = 100
@@ -31,6 +32,7 @@ def cite(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) 
     InputError
         As `fit` would.
     """
+    require_arguments(card=card, effects=effects)
     prepared = prepare(card, effects)
     return references(prepared.card, prepared.prior, prepared.board)
 

@@ -18,6 +18,7 @@ from bayesplate.results.comparison import Entries, Method, point_methods, poster
 from bayesplate.results.draws import Draws, effective_draws, law_weights, named_draws
 from bayesplate.results.folder import json_text, make_folder, require_new, write_text
 from bayesplate.results.versions import versions
+from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.check import expected_sd
 from bayesplate.workflow.prepare import prepare
 
@@ -76,6 +77,9 @@ def compare(
     NotConvergedError
         If the sampler fails its gate.
     """
+    require_arguments(
+        card=card, coefficients=coefficients, seed=seed, effects=effects, out=out, force=force, progress=progress
+    )
     files = require_new(Path(out), [COMPARISON], force=force) if out is not None else ()
     declared = prepare(card, effects).board.effects
     others = [name for name in declared if name not in _SHEAR]

@@ -22,6 +22,7 @@ from bayesplate.errors import CheckpointError, NotConvergedError, NotIdentifiabl
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
+from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed, with_board
 from bayesplate.workflow.prepare import Prepared, prepare
@@ -96,6 +97,10 @@ def diagnose(
     InputError, NotIdentifiableError, NotConvergedError, CheckpointError
         As `bayesplate.workflow.fit.fit`, of the fit without further effects.
     """
+    require_arguments(
+        card=card, out=out, write=write, report=report, seed=seed, effects=effects, force=force, resume=resume,
+        n_null=n_null, progress=progress,
+    )  # fmt: skip
     prepared = prepare(card, effects)
     folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
     if folder is not None:

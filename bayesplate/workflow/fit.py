@@ -17,6 +17,7 @@ from bayesplate.results.folder import ARCHIVE, SUMMARY, OutputFolder, json_text,
 from bayesplate.results.store import write_posterior
 from bayesplate.results.summary import Summary, unconverged_summary
 from bayesplate.results.versions import versions
+from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed
 from bayesplate.workflow.prepare import Prepared, prepare
 
@@ -95,6 +96,10 @@ def fit(
     CheckpointError
         If a run cannot be resumed.
     """
+    require_arguments(
+        card=card, out=out, write=write, report=report, seed=seed, effects=effects, law=law, robust=robust,
+        force=force, resume=resume, progress=progress,
+    )  # fmt: skip
     prepared = prepare(card, effects)
     folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
     if folder is not None:

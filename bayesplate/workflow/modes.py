@@ -20,6 +20,7 @@ from bayesplate.posterior.region import noise_widenings
 from bayesplate.results.folder import make_folder, require_new
 from bayesplate.results.prior_bands import prior_bands, prior_medians
 from bayesplate.results.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
+from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import Prepared, prepare
 
 _AT_ESTIMATE = "at the weighted least-squares estimate"
@@ -72,6 +73,7 @@ def modes(
     InputError
         If the card or the folder cannot be used; then nothing is written.
     """
+    require_arguments(card=card, out=out, write=write, effects=effects, seed=seed, force=force)
     prepared = prepare(card, effects, may_lack_frequencies=True)
     board = prepared.board
     folder = Path(out) if out is not None else Path("results") / board.name

@@ -6,10 +6,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from bayesplate.cards import BoardCard, PriorCard, load_board, load_named, physical_faults
+import numpy as np
+
+from bayesplate.cards import BoardCard, PriorCard, load_board, load_named, physical_faults, remarks
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import InputError
-from bayesplate.estimates.coefficients import coefficient_faults
+from bayesplate.estimates.coefficients import coefficient_faults, require_sides
+from bayesplate.estimates.plausibility import unit_faults
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board, board_from_card
 
@@ -49,15 +52,23 @@ def prepare(
     Raises
     ------
     InputError
-        Every schema fault at once; if there is none, every physical fault at once.
+        Every schema fault at once; if there is none, every physical fault at once; if there is none, what all
+        frequencies together say of their unit.
+    NotIdentifiableError
+        If the sides are those of the printed table that the card names, exchanged.
     """
     read = load_board(card, may_lack_frequencies=may_lack_frequencies)
     named = load_named(read)
     board = board_from_card(read, named.prior, named.tables)
     listed = (*board.effects, *implied_effects(board)) if effects is None else effects
     board = replace(board, effects=tuple(dict.fromkeys(listed)))
-    faults = [*physical_faults(read), *named.faults]
-    faults += [*label_faults(board), *effect_faults(board), *coefficient_faults(board)]
+    faults = [*physical_faults(read), *named.faults, *label_faults(board), *effect_faults(board)]
+    if not faults:
+        require_sides(board)
+    faults += coefficient_faults(board)
+    if named.prior is not None and not faults:
+        faults = unit_faults(board, named.prior, np.random.default_rng(0))
     if faults or named.prior is None:
         raise InputError(faults)
-    return Prepared(read, named.prior, declare(replace(board, notes=(*board.notes, *notes(board)))))
+    told = (*board.notes, *remarks(read, board.effects), *notes(board))
+    return Prepared(read, named.prior, declare(replace(board, notes=told)))

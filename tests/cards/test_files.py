@@ -60,6 +60,14 @@ def test_a_name_far_from_all_others_names_the_working_folder(tmp_path: Path, mon
         load_board("qqqq")
 
 
+def test_a_table_of_readings_is_no_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("peaks.csv").write_text("label,hz\n(1;1),35\n", encoding="utf-8")
+    for name in ("peaks.csv", "./peaks.csv"):
+        with refused("a card is a TOML file"):
+            load_board(name)
+
+
 def test_a_file_of_that_name_here_is_offered(board_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(board_file.parent)
     with refused('(there is a file here: write "my-board.toml")'):
@@ -153,6 +161,15 @@ def test_a_large_file(write: Write, make: Callable[[int], bytes]) -> None:
         (b"[plate]\na = 1\n[plate]\n", 'my-board.toml line 3: wanted each key and each table once, got "[plate]"'),
         (b"a = 1\nb = 52,5\n", 'my-board.toml line 2: wanted TOML, got "b = 52,5"'),
         (b"a = 52,5\n", "(a number has a decimal point, not a comma)"),
+        (b"a = 1,024\n", "(ambiguous: write 1.024 or 1024, whichever is meant)"),
+        (b"a = [34,05, 35,2]\n", "(a number has a decimal point, not a comma)"),
+        (b"[setup]\nx = 1\n[setup]\n",
+         "(several setups are written [[setup]], in double brackets, each with a name)"),
+        (b"label;Hz\n(1,1);35\n", "(a card is a TOML file with lines like length_x_mm = 550; bayesplate new writes"),
+        (b"name = \xe2\x80\x9cboard\xe2\x80\x9d\n", '(straight quotes: name = "board")'),
+        (b"(1,0) = 52\n", '(a label stands in quotes: "(1,0)" = 52)'),
+        (b"notes =\n", "(a value after the sign, or leave the line out)"),
+        (b"notes = K\xc3\xbcche\n", "(a text stands in quotes)"),
         (b"a = 52 Hz\n", "(the unit stands in the key: write the number alone)"),
         (b'a = 1\nb = "open\n', 'my-board.toml line 2: wanted TOML, got "b = \\"open"'),
         (b"a = [1,\n2\n", "my-board.toml line 2: wanted TOML"),
@@ -202,6 +219,14 @@ def test_nothing_in_a_card_is_executed(write: Write, tmp_path: Path, board_text:
 
     assert code in card.title
     assert not canary.exists()
+
+
+def test_notes_are_free_text(write: Write, board_text: str) -> None:
+    text = board_text.replace('title =', 'notes = "Küche, 21 °C, Tür zu"\ntitle =')
+    text = text.replace('name = "cantilever"', 'name = "cantilever"\nnotes = "früh"')
+    card = load_board(write(text))
+
+    assert (card.notes, card.setups[0].notes) == ("Küche, 21 °C, Tür zu", "früh")
 
 
 def test_strange_titles_are_kept_as_they_are(write: Write, board_text: str) -> None:

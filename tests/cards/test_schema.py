@@ -20,7 +20,7 @@ SETUP = "[setup] "
 FREQUENCY = '[setup] frequencies_hz."(1,0)"'
 UNKNOWN = "an unknown key"
 NAME_RULE = "letters, digits, '.', '_' or '-', beginning with a letter or digit, at most 80 characters"
-GRAMMAR = 'two whole numbers from 0 to 40, written like "(1,0)"'
+GRAMMAR = 'two whole numbers from 0 to 11, written like "(1,0)"'
 
 NUMBERS = [
     ("-3", "a positive number", "-3"),
@@ -30,12 +30,14 @@ NUMBERS = [
     ("-inf", "a finite number", "-inf"),
     ("true", "a number", "true"),
     ('"52,5"', "a number", '"52,5" (a decimal point and no quotes: 52.5)'),
+    ('"1,024"', "a number", '"1,024" (ambiguous: write 1.024 or 1024, whichever is meant)'),
     ('"52 mm"', "a number", '"52 mm" (the unit stands in the key: write the number alone)'),
     ('"253"', "a number", '"253" (no quotes around a number)'),
     ('"N/A"', "a number", '"N/A"'),
     ("2024-01-29", "a number", "a date or time"),
     ("1e300", "a number from 1 to 100000 mm", "1e+300"),
     ("1e-300", "a number from 1 to 100000 mm", "1e-300"),
+    ("0.253", "a number from 1 to 100000 mm", "0.253 (in mm: 1 m is 1000 mm, 1 cm is 10 mm)"),
     ("0xf" + "f" * 5000, "a number from 1 to 100000 mm", "a whole number of 20004 bits"),
     ("[]", "at least one of readings", "an empty list"),
     ("{}", "{ mean, sd } or { readings, resolution }", "an empty table"),
@@ -94,20 +96,26 @@ REST = [
     (EDGES, EDGES.replace('"clamped"', '"clampd"'), SETUP + "edges.x0", '"clamped", "supported" or "free"',
      '"clampd" (did you mean clamped?)'),
     (EDGES, EDGES.replace("x0", "left"), SETUP + "edges.left", "one of x0, x1, y0, y1", UNKNOWN),
-    (EDGES, 'edges = "free"', SETUP + "edges", "a table", '"free"'),
+    (EDGES, 'edges = "free"', SETUP + "edges", "a table",
+     '"free" (edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" })'),
+    (EDGES, 'edges = "CFSF"', SETUP + "edges", "a table",
+     '"CFSF" (edges = { x0 = "clamped", x1 = "supported", y0 = "free", y1 = "free" })'),
+    (EDGES, "edges = 4", SETUP + "edges", "a table", "4 (x0 is the edge at x = 0)"),
+    ("mass_g = 41.0", 'mass_g = 41.0\nnotes = "x"', "[plate] notes", "one of length_x_mm",
+     UNKNOWN + " (it belongs above the first table)"),
     ("{ x0 = 30 }", "{ x1 = 30 }", SETUP + "clamped_mm.x1", "a clamped edge", "a free one"),
     ("{ x0 = 30 }", "{ z0 = 30 }", SETUP + "clamped_mm.z0", "one of x0, x1, y0, y1", UNKNOWN),
     ("{ x0 = 30 }", "30", SETUP + "clamped_mm", "a table of clamped edges, { x0 = 30 }", "30"),
     ("first_label = [1, 0]", "first_label = [1]", SETUP + "first_label", "two whole numbers, [1, 0]", "a list of 1"),
-    ("first_label = [1, 0]", "first_label = [1, -1]", SETUP + "first_label 2", "a whole number from 0 to 40", "-1"),
-    ("first_label = [1, 0]", "first_label = [1.0, 0]", SETUP + "first_label 1", "a whole number from 0 to 40", "1.0"),
+    ("first_label = [1, 0]", "first_label = [1, -1]", SETUP + "first_label 2", "a whole number from 0 to 2", "-1"),
+    ("first_label = [1, 0]", "first_label = [1.0, 0]", SETUP + "first_label 1", "a whole number from 0 to 2", "1.0"),
     ("resolution_hz = 1\n", "resolution_hz = 0\n", SETUP + "resolution_hz", "a positive number", "0"),
     ("[448.8, 594.1]", "448.8", SETUP + "unlabelled_hz", "a list of frequencies", "448.8"),
     ("[448.8, 594.1]", "[448.8, 0.0]", SETUP + "unlabelled_hz 2", "a positive number", "0.0"),
     ("factor = 2 }", "factor = 1 }", SETUP + "noise_percent.factor", "a factor above 1", "1"),
     ("median = 0.5,", "median = nan,", SETUP + "noise_percent.median", "a finite number", "nan"),
     ("{ median = 0.5, factor = 2 }", "0.5", SETUP + "noise_percent", "{ median = 0.5, factor = 2 }, in percent", "0.5"),
-    (MODE, '"(1,0)" = 0.052', FREQUENCY, "a number from 0.1 to 1000000 Hz", "0.052"),
+    (MODE, '"(1,0)" = 0.052', FREQUENCY, "a number from 0.1 to 1000000 Hz", "0.052 (in Hz: 1 kHz is 1000 Hz)"),
     (MODE, '"(1,0)" = 0', FREQUENCY, "a positive number",
      "0 (in Hz; the zero-frequency modes of a free board are not listed)"),
     (MODE, '"(1,0)" = "52 Hz"', FREQUENCY, "a number", '"52 Hz" (the unit stands in the key'),
@@ -130,7 +138,7 @@ REST = [
      "a table with kind, mass_g, at_mm"),
     ('name = "cantilever"', 'name = "Board"', SETUP + "name", "another name", '"board"'),
 ]  # fmt: skip
-LABELS = ["10", "(1;0)", "(1.0,0)", "(-1,0)", "(41,0)", "resolution_hz"]
+LABELS = ["10", "(1;0)", "(1.0,0)", "(-1,0)", "(12,0)", "resolution_hz"]
 
 
 def assert_refused(text: str, place: str, wanted: str, got: str) -> None:

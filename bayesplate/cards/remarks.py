@@ -1,0 +1,92 @@
+"""What a card leaves to be assumed or makes doubtful, in a sentence each: accepted, but the user is told."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+from bayesplate.cards.board import BoardCard
+from bayesplate.cards.repeated import CALIPER, RULE, SCALES, are_alike
+from bayesplate.cards.setup import SetupSection
+
+THICK_SHARE = 0.1
+"""Thickness over the shorter free side beyond which a thin plate is too stiff."""
+
+LARGE_NOISE = 0.2
+"""Relative noise beyond which frequencies say next to nothing: a modulus goes with their square."""
+
+_SHEAR = "transverse_shear"
+_SIZES = {
+    "length_x_mm": ("length along x", f"{RULE:g} mm"),
+    "length_y_mm": ("length along y", f"{RULE:g} mm"),
+    "thickness_mm": ("thickness", f"{CALIPER:g} mm"),
+    "mass_g": ("mass", f"{SCALES:g} g"),
+}
+
+
+def remarks(card: BoardCard, effects: Collection[str]) -> tuple[str, ...]:
+    """What the user of a card should know before its numbers.
+
+    Parameters
+    ----------
+    card : BoardCard
+    effects : collection of str
+        Names of the declared effects.
+
+    Returns
+    -------
+    tuple of str
+    """
+    found = [*_exact_thickness(card), *_assumed_resolutions(card)]
+    for setup in card.setups:
+        found += [*_thick(card, setup, effects), *_noisy(setup)]
+    return tuple(dict.fromkeys(found))
+
+
+def _exact_thickness(card: BoardCard) -> Iterator[str]:
+    thickness = card.plate.thickness_mm
+    if thickness.is_exact:
+        yield (
+            f"the thickness is taken as exact, and the moduli go with its third power; a caliper reads to "
+            f"{CALIPER:g} mm: write thickness_mm = {{ mean = {thickness.mean:g}, sd = {CALIPER:g} }}, or its readings"
+        )
+
+
+def _assumed_resolutions(card: BoardCard) -> Iterator[str]:
+    plate = card.written.get("plate", {})
+    assumed = [f"{name} to {step}" for key, (name, step) in _SIZES.items() if _lacks_resolution(plate.get(key))]
+    if assumed:
+        yield (
+            f"readings that are all alike were taken as rounded, {', '.join(assumed)}; "
+            "{ readings = [..], resolution = .. } states another resolution"
+        )
+
+
+def _lacks_resolution(value: Any) -> bool:
+    if isinstance(value, dict):
+        return "resolution" not in value and _lacks_resolution(value.get("readings"))
+    return isinstance(value, list) and are_alike(value)
+
+
+def _thick(card: BoardCard, setup: SetupSection, effects: Collection[str]) -> Iterator[str]:
+    covered = {axis: sum(q.mean for e, q in setup.clamped_mm.items() if e.startswith(axis)) for axis in "xy"}
+    plate = card.plate
+    shorter = min(plate.length_x_mm.mean - covered["x"], plate.length_y_mm.mean - covered["y"])
+    share = plate.thickness_mm.mean / shorter
+    if share > THICK_SHARE and _SHEAR not in effects:
+        yield (
+            f"the thickness is 1/{1 / share:.1f} of the shorter side, more than a tenth: transverse shear matters, and "
+            f"without it the moduli come out too low; declare it with --effects {_SHEAR}"
+        )
+
+
+def _noisy(setup: SetupSection) -> Iterator[str]:
+    where = f"setup '{setup.name}'"
+    if setup.noise_percent is not None and setup.noise_percent.median > 100.0 * LARGE_NOISE:
+        yield (
+            f"{where}: a noise of {setup.noise_percent.median:g} % leaves the frequencies little to say: the posterior "
+            "stays close to the prior"
+        )
+    vague = [str(label) for label, hz in setup.frequencies_hz.items() if hz.sd > LARGE_NOISE * hz.mean]
+    if vague:
+        yield f"{where}: more than {100 * LARGE_NOISE:g} % uncertain, so they say next to nothing: {', '.join(vague)}"

@@ -1,0 +1,108 @@
+"""Arguments of the Python functions, held to the same rules as a card: every fault at once, before any work."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from numbers import Integral
+from typing import get_args
+
+import numpy as np
+
+from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
+from bayesplate.errors import Fault, InputError
+from bayesplate.estimates.coefficients import CoefficientSource
+from bayesplate.frequencies.laws import LawName
+
+Check = Callable[[str, object], Iterator[Fault]]
+
+
+def require_arguments(**given: object) -> None:
+    """Check arguments by their names.
+
+    Parameters
+    ----------
+    **given
+        Any of card, out, seed, effects, law, robust, coefficients, write, report, force, resume, n_null, progress.
+
+    Raises
+    ------
+    InputError
+        With every argument that cannot be used, and with arguments that contradict each other.
+    """
+    faults = [fault for name, value in given.items() for fault in _CHECKS[name](name, value)]
+    if given.get("force") is True and given.get("resume") is True:
+        faults.append(Fault("force and resume", "one of them", "both", "force starts anew and resume continues"))
+    if faults:
+        raise InputError(faults)
+
+
+def _path(name: str, value: object) -> Iterator[Fault]:
+    if not isinstance(value, str | os.PathLike):
+        yield Fault(name, "a name or a path", _shown(value))
+    elif not os.fspath(value):
+        yield Fault(name, "a name or a path", "an empty text")
+
+
+def _path_or_none(name: str, value: object) -> Iterator[Fault]:
+    if value is not None:
+        yield from _path(name, value)
+
+
+def _whole(least: int) -> Check:
+    def check(name: str, value: object) -> Iterator[Fault]:
+        if isinstance(value, bool | np.bool_) or not isinstance(value, Integral) or value < least:
+            yield Fault(name, f"a whole number from {least} on", _shown(value))
+
+    return check
+
+
+def _switch(name: str, value: object) -> Iterator[Fault]:
+    if not isinstance(value, bool):
+        yield Fault(name, "True or False", _shown(value))
+
+
+def _word(words: tuple[str, ...]) -> Check:
+    def check(name: str, value: object) -> Iterator[Fault]:
+        if value is not None and value not in words:
+            near = did_you_mean(value, words) if isinstance(value, str) else ""
+            yield Fault(name, f"{', '.join(map(quoted, words))} or None", _shown(value), near)
+
+    return check
+
+
+def _callable(name: str, value: object) -> Iterator[Fault]:
+    if value is not None and not callable(value):
+        yield Fault(name, "a function or None", _shown(value))
+
+
+def _effects(name: str, value: object) -> Iterator[Fault]:
+    if value is None:
+        return
+    if not isinstance(value, list | tuple):
+        remedy = f'{name}=["{value}"]' if value in EFFECT_NAMES else ""
+        yield Fault(name, "a list of names of effects", _shown(value), remedy)
+        return
+    for number, effect in enumerate(value, start=1):
+        if effect not in EFFECT_NAMES:
+            near = did_you_mean(effect, EFFECT_NAMES) if isinstance(effect, str) else ""
+            yield Fault(f"{name} {number}", f"one of {', '.join(EFFECT_NAMES)}", _shown(effect), near)
+        elif effect in value[: number - 1]:
+            yield Fault(f"{name} {number}", "each name once", f"{quoted(effect)} again")
+
+
+def _shown(value: object) -> str:
+    return repr(value) if value is None or isinstance(value, bool) else shown(value)
+
+
+_CHECKS: dict[str, Check] = {
+    "card": _path,
+    "out": _path_or_none,
+    "seed": _whole(0),
+    "n_null": _whole(1),
+    "effects": _effects,
+    "law": _word(get_args(LawName)),
+    "coefficients": _word(get_args(CoefficientSource)),
+    **dict.fromkeys(("robust", "write", "report", "force", "resume"), _switch),
+    "progress": _callable,
+}
