@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesplate.diagnosis.advice import recommendation
-from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.findings import Case, Diagnosis, Side, diagnosis
-from bayesplate.diagnosis.folds import nested
-from bayesplate.diagnosis.hypotheses import order_conflicts
-from bayesplate.diagnosis.null_control import N_SETS, NullControl, null_control
-from bayesplate.diagnosis.refits import excludes_zero, likely_forms, refit_board
-from bayesplate.diagnosis.search import Found, prepare_search, search
-from bayesplate.diagnosis.verdict import Answer, Verdict, alternatives, answers, decide
+from bayesplate.diagnosis.decision.advice import recommendation
+from bayesplate.diagnosis.decision.refits import excludes_zero, likely_forms, refit_board
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives, answers, decide
+from bayesplate.diagnosis.evidence.folds import nested
+from bayesplate.diagnosis.evidence.hypotheses import order_conflicts
+from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
+from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
+from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.wording.findings import Case, Diagnosis, Side, diagnosis
 from bayesplate.errors import CheckpointError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from bayesplate.diagnosis.told import candidates_table, errors_table, shift_table, verdict_sentence
+from bayesplate.diagnosis.wording.told import candidates_table, errors_table, shift_table, verdict_sentence
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.comparison_tables import METHODS_REMARK, forward_table, methods_table, sheet_table
 from bayesplate.results.folder import json_text

@@ -7,11 +7,11 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.constants import draw_constants
-from bayesplate.diagnosis.search import prepare_search, search
-from bayesplate.diagnosis.sensitivity import inclusion_with_width
-from bayesplate.diagnosis.verdict import at_limit, decide
+from bayesplate.diagnosis.decision.constants import draw_constants
+from bayesplate.diagnosis.decision.verdict import at_limit, decide
+from bayesplate.diagnosis.evidence.search import prepare_search, search
+from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
+from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.workflow.fit import fit
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from runs import files_in, read_json
 
 from bayesplate.cli import main
-from bayesplate.diagnosis.search import prepare_search
+from bayesplate.diagnosis.evidence.search import prepare_search
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
 

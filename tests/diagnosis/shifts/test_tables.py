@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from full_refits import full_refit
 
-from bayesplate.diagnosis.forms import sizes, with_forms
-from bayesplate.diagnosis.laws import form_law
-from bayesplate.diagnosis.signatures import signatures
-from bayesplate.diagnosis.tables import nominal_shift, refitted, tabulate
+from bayesplate.diagnosis.shifts.forms import sizes, with_forms
+from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.diagnosis.shifts.signatures import signatures
+from bayesplate.diagnosis.shifts.tables import nominal_shift, refitted, tabulate
 from bayesplate.frequencies.laws import cents
 
 CENT = 1.0

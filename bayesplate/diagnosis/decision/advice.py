@@ -9,9 +9,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import own_variance
-from bayesplate.diagnosis.forms import Form
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.shifts.baseline import own_variance
+from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.effects.words import effect_names
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.spectrum import spectrum

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayesplate.diagnosis.hypotheses import hypotheses, log_evidences, probabilities
-from bayesplate.diagnosis.search import Candidate, Found
-from bayesplate.diagnosis.tables import Table
+from bayesplate.diagnosis.evidence.hypotheses import hypotheses, log_evidences, probabilities
+from bayesplate.diagnosis.evidence.search import Candidate, Found
+from bayesplate.diagnosis.shifts.tables import Table
 from bayesplate.quantities import Quantity
 
 

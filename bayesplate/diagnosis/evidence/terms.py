@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.noise_grid import NoiseGrid
-from bayesplate.diagnosis.tables import Table
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.tables import Table
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence import Fold
-from bayesplate.diagnosis.hypotheses import log_evidences, probabilities
-from bayesplate.diagnosis.search import Ground
+from bayesplate.diagnosis.evidence.hypotheses import log_evidences, probabilities
+from bayesplate.diagnosis.evidence.search import Ground
+from bayesplate.diagnosis.evidence.terms import Fold
 
 Floats = NDArray[np.float64]
 

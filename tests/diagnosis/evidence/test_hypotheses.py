@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, ground_of, one_level, table, with_readings
 
-from bayesplate.diagnosis.evidence import Fold
-from bayesplate.diagnosis.folds import left_out, nested
-from bayesplate.diagnosis.forms import with_labels_exchanged
-from bayesplate.diagnosis.hypotheses import (
+from bayesplate.diagnosis.evidence.folds import left_out, nested
+from bayesplate.diagnosis.evidence.hypotheses import (
     RELABELLING,
     Hypothesis,
     Swap,
@@ -21,8 +19,10 @@ from bayesplate.diagnosis.hypotheses import (
     order_conflicts,
     probabilities,
 )
-from bayesplate.diagnosis.noise_grid import noise_grid
-from bayesplate.diagnosis.tables import nothing, together
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.shifts.forms import with_labels_exchanged
+from bayesplate.diagnosis.shifts.tables import nothing, together
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]
 

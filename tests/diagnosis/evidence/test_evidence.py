@@ -9,10 +9,10 @@ import pytest
 from made_boards import setup_of
 from made_searches import FREE, NOISE, bare, baseline, ground_of, one_level, table
 
-from bayesplate.diagnosis.evidence import Fold, Terms
-from bayesplate.diagnosis.folds import left_out, log_score, nested
-from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.evidence.folds import left_out, log_score, nested
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.evidence.terms import Fold, Terms
 from bayesplate.plate.board import Board
 from bayesplate.quantities import Quantity
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.evidence import normalised
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 
 Floats = NDArray[np.float64]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.folds import NEEDED
-from bayesplate.diagnosis.hypotheses import RELABELLING
-from bayesplate.diagnosis.search import Candidate, Found
-from bayesplate.diagnosis.signatures import LOOK_ALIKE
-from bayesplate.diagnosis.verdict import Answer, Verdict, size_posterior
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
+from bayesplate.diagnosis.evidence.folds import NEEDED
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.diagnosis.evidence.search import Candidate, Found
+from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_names
 from bayesplate.frequencies.laws import cents

@@ -9,10 +9,10 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.evidence import Fold, Terms, normalised
-from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
-from bayesplate.diagnosis.tables import Table, nothing, together
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.evidence.terms import Fold, Terms, normalised
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.tables import Table, nothing, together
 
 Floats = NDArray[np.float64]
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.constants import draw_constants
-from bayesplate.diagnosis.entries import candidate_entry, relabelling_entries, rms
-from bayesplate.diagnosis.folds import Nested, log_score
-from bayesplate.diagnosis.null_control import NullControl, gain
-from bayesplate.diagnosis.search import Found
-from bayesplate.diagnosis.sensitivity import inclusion_with_width
-from bayesplate.diagnosis.verdict import Answer, Verdict, answers
+from bayesplate.diagnosis.decision.constants import draw_constants
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answers
+from bayesplate.diagnosis.evidence.folds import Nested, log_score
+from bayesplate.diagnosis.evidence.null_control import NullControl, gain
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
+from bayesplate.diagnosis.wording.entries import candidate_entry, relabelling_entries, rms
 from bayesplate.effects import EFFECTS
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI

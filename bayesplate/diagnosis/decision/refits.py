@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.forms import Form, with_forms, with_labels_exchanged
-from bayesplate.diagnosis.search import Found
-from bayesplate.diagnosis.verdict import size_posterior
+from bayesplate.diagnosis.decision.verdict import size_posterior
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.shifts.forms import Form, with_forms, with_labels_exchanged
 from bayesplate.plate.board import Board
 from bayesplate.results.draws import Draws
 

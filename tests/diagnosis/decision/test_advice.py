@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.advice import options, recommendation
-from bayesplate.diagnosis.search import search
+from bayesplate.diagnosis.decision.advice import options, recommendation
+from bayesplate.diagnosis.evidence.search import search
 
 ASKED = ("transverse_shear", "clamp_rotation")
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline, symmetry_of
-from bayesplate.diagnosis.following import Following
-from bayesplate.diagnosis.forms import Form, sizes
+from bayesplate.diagnosis.shifts.baseline import Baseline, symmetry_of
+from bayesplate.diagnosis.shifts.following import Following
+from bayesplate.diagnosis.shifts.forms import Form, sizes
 from bayesplate.frequencies.laws import ExactLaw, log_frequency
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.system import system_of

@@ -7,10 +7,10 @@ import pytest
 from made_searches import bare, baseline, candidate, one_level, table
 from scipy.stats import chi2, kstest
 
-from bayesplate.diagnosis.evidence import Fold
-from bayesplate.diagnosis.gate import PASSES, gate
-from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.gate import PASSES, gate
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.terms import Fold
 
 N_SETS = 4000
 CERTAIN = 1e-3

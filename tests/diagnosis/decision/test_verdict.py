@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of
 
-from bayesplate.diagnosis.gate import PASSES
-from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap
-from bayesplate.diagnosis.noise_grid import noise_grid
-from bayesplate.diagnosis.search import Found
-from bayesplate.diagnosis.tables import nothing, together
-from bayesplate.diagnosis.verdict import alternatives, answers, at_limit, decide
+from bayesplate.diagnosis.decision.verdict import alternatives, answers, at_limit, decide
+from bayesplate.diagnosis.evidence.gate import PASSES
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.shifts.tables import nothing, together
 from bayesplate.quantities import Quantity
 
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}

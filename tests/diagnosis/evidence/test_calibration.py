@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.hypotheses import log_evidences, probabilities
+from bayesplate.diagnosis.evidence.hypotheses import log_evidences, probabilities
 
 N_SETS = 4000
 N_BINS = 10

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level
 
-from bayesplate.diagnosis.constants import draw_constants
-from bayesplate.diagnosis.evidence import Fold, Terms
-from bayesplate.diagnosis.forms import Form, Free
-from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
-from bayesplate.diagnosis.null_control import gain, null_control, simulate_null
-from bayesplate.diagnosis.refits import excludes_zero
-from bayesplate.diagnosis.search import Found, search
-from bayesplate.diagnosis.sensitivity import inclusion_with_width
+from bayesplate.diagnosis.decision.constants import draw_constants
+from bayesplate.diagnosis.decision.refits import excludes_zero
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.null_control import gain, null_control, simulate_null
+from bayesplate.diagnosis.evidence.search import Found, search
+from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
+from bayesplate.diagnosis.evidence.terms import Fold, Terms
+from bayesplate.diagnosis.shifts.forms import Form, Free
 from bayesplate.quantities import Quantity
 
 

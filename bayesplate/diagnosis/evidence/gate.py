@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence import Fold
-from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.terms import Fold
 
 Floats = NDArray[np.float64]
 

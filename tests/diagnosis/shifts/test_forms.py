@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.forms import forms, sizes, with_forms
+from bayesplate.diagnosis.shifts.forms import forms, sizes, with_forms
 from bayesplate.effects import EFFECTS
 from bayesplate.workflow.prepare import prepare
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence import Terms, normalised
-from bayesplate.diagnosis.folds import nested
-from bayesplate.diagnosis.hypotheses import log_evidences, probabilities
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.evidence.folds import nested
+from bayesplate.diagnosis.evidence.hypotheses import log_evidences, probabilities
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.terms import Terms, normalised
 
 Floats = NDArray[np.float64]
 

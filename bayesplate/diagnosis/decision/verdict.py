@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence import normalised
-from bayesplate.diagnosis.folds import NEEDED
-from bayesplate.diagnosis.gate import PASSES
-from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.evidence.folds import NEEDED
+from bayesplate.diagnosis.evidence.gate import PASSES
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.effects.words import effect_names
 from bayesplate.quantities import Quantity
 

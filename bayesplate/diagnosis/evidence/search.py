@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.evidence import Fold
-from bayesplate.diagnosis.forms import Form, forms
-from bayesplate.diagnosis.gate import gate
-from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses, log_evidences, probabilities
-from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.diagnosis.tables import COARSE, Table, nominal_shift, tabulate
+from bayesplate.diagnosis.evidence.gate import gate
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, hypotheses, log_evidences, probabilities
+from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.forms import Form, forms
+from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
+from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate
 
 Floats = NDArray[np.float64]
 Solve = Callable[[Baseline, Form], FormLaw]
