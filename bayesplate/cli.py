@@ -213,7 +213,7 @@ def diagnose(
 
             result = run(card, out=out, seed=seed, effects=_names(effects), force=force, resume=resume, progress=tell)
         if as_json:
-            print_json(result.diagnosis)
+            print_json(result.to_json())
         elif not quiet:
             from bayesplate.workflow.shown import show_diagnosis
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from bayesplate.diagnosis.evidence.hypotheses import order_conflicts
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.diagnosis.wording.findings import Case, Diagnosis, Side, diagnosis
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
+from bayesplate.diagnosis.wording.findings import Case, FitFigures, Side, diagnosis_of
 from bayesplate.errors import CheckpointError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
@@ -39,8 +41,7 @@ class DiagnoseResult:
     ----------
     folder : Path or None
         Where its files are; None if none were asked for.
-    diagnosis : dict
-        As in diagnosis.json.
+    diagnosis : Diagnosis
     before, after : Fitted
         The same where nothing was added.
     """
@@ -49,6 +50,16 @@ class DiagnoseResult:
     diagnosis: Diagnosis
     before: Fitted
     after: Fitted
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of diagnosis.json."""
+        return diagnosis_json(self.diagnosis)
+
+    def __repr__(self) -> str:
+        return repr(self.diagnosis)
+
+    def _repr_html_(self) -> str:
+        return self.diagnosis._repr_html_()
 
 
 def diagnose(
@@ -129,17 +140,17 @@ def diagnose(
         except (NotIdentifiableError, NotConvergedError) as error:
             notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
     case = _case(found, verdict, control, before, refits, tuple(notes))
-    content, after = diagnosis(case), refits.get(verdict.index, before)
+    diagnosis, after = diagnosis_of(case), refits.get(verdict.index, before)
     if folder is not None:
         if after is not before:
             make_folder(folder.path / BEFORE)
             write_fit(folder.path / BEFORE, before)
         write_fit(folder.path, after)
-        write_text(folder.path / DIAGNOSIS, json_text(content))
+        write_text(folder.path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
         if report:
-            write_page(folder.path, after, content)
+            write_page(folder.path, after, diagnosis)
         folder.close()
-    return DiagnoseResult(None if folder is None else folder.path, content, before, after)
+    return DiagnoseResult(None if folder is None else folder.path, diagnosis, before, after)
 
 
 def finalists(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
@@ -165,11 +176,15 @@ def _case(
         verdict=verdict,
         control=control,
         folded=nested(found.ground, found.residual[None, :]),
-        before=Side(0, before.summary, before.draws),
-        after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
+        before=Side(0, FitFigures.of(before.summary), before.draws),
+        after=Side(verdict.index if is_refitted else 0, FitFigures.of(after.summary), after.draws),
         is_clear_of_zero=clear,
         recommendation=recommendation(found, asked_about(found, verdict)),
-        finalists=[(one, refits[one.index].summary) for one in finalists(found, verdict) if one.index in refits],
+        finalists=[
+            (one, FitFigures.of(refits[one.index].summary))
+            for one in finalists(found, verdict)
+            if one.index in refits
+        ],
         notes=notes,
     )
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.inference import Inference
@@ -131,8 +131,8 @@ def write_fit(folder: Path, result: Fitted) -> None:
     write_text(folder / SUMMARY, json_text(result.summary))
 
 
-def write_page(folder: Path, result: Fitted, diagnosis: Mapping[str, Any] | None = None) -> Path:
-    """Write report.html, its figures and tables; with a diagnosis (as in diagnosis.json) its verdict too."""
+def write_page(folder: Path, result: Fitted, diagnosis: Diagnosis | None = None) -> Path:
+    """Write report.html, its figures and tables; with a diagnosis its verdict too."""
     from bayesplate.report.page import write_report
 
     card = result.prepared.card

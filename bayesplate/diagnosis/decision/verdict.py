@@ -26,6 +26,8 @@ WITHIN = 10.0
 AT_LIMIT = 0.005
 """Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
 
+NOTHING_LEFT = "three modes determine the three constants and leave nothing to judge by"
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -108,6 +110,8 @@ def decide(found: Found) -> Verdict:
     """
     ranked = answers(found)
     best = ranked[0] if ranked else None
+    if not found.ground.n_directions:
+        return Verdict("undetectable", (), 0, best, NOTHING_LEFT)
     if found.none >= NEEDED or best is None:
         return _without(found, best)
     passed = found.passes(best.index)

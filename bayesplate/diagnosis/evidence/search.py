@@ -67,6 +67,11 @@ class Ground:
         """The fold that uses all readings."""
         return Fold(self.baseline)
 
+    @property
+    def n_directions(self) -> int:
+        """Directions of the readings that the three constants cannot reach, and that are left to judge by."""
+        return len(self.whole.blind)
+
     def visibility(self, name: str) -> float:
         """Visible rms of a candidate in units of the rms that drowns in the noise: 2 noise / sqrt(n)."""
         seen = self.baseline.whitened(self.candidates[name].visible)
@@ -77,10 +82,10 @@ class Ground:
         return self.visibility(name) < 1.0
 
     def cosine(self, one: str, other: str) -> float:
-        """Likeness of the visible parts of two candidates, -1 to 1; 0 if one has none."""
+        """Likeness of the visible parts of two candidates, -1 to 1; 0 where nothing is visible."""
         first, second = (self.baseline.whitened(self.candidates[name].visible) for name in (one, other))
         norms = float(np.linalg.norm(first) * np.linalg.norm(second))
-        return float(first @ second) / norms if norms > 0 else 0.0
+        return float(first @ second) / norms if norms > 0 and self.n_directions else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -112,8 +112,8 @@ class Terms:
         spread = np.einsum("di,kip->kdp", self.fold.blind, self.table.slopes)
         own = spread @ np.swapaxes(spread, 1, 2)
         covariance = self.noise_covariance[:, None] + own[None]
-        d = covariance.shape[-1]
-        factors = np.linalg.cholesky(covariance.reshape(-1, d, d))
+        n_levels, n_cells, d, _ = covariance.shape
+        factors = np.linalg.cholesky(covariance.reshape(n_levels * n_cells, d, d))
         half = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
         return np.linalg.inv(factors), half
 
@@ -135,7 +135,7 @@ class Terms:
         seen = residuals @ self.fold.blind.T
         n_levels = self.noise.weights.size
         middles = np.tile(self.middles, (n_levels, 1))
-        whitened = (whitening.reshape(n_terms * d, d) @ seen.T).reshape(n_terms, d, -1)
+        whitened = (whitening.reshape(n_terms * d, d) @ seen.T).reshape(n_terms, d, len(seen))
         whitened -= np.einsum("kde,ke->kd", whitening, middles)[:, :, None]
         squares = np.einsum("kdn,kdn->kn", whitened, whitened)
         result: Floats = (self.log_weights - half - 0.5 * d * _LOG_TWO_PI)[:, None] - 0.5 * squares

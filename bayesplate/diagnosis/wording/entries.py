@@ -1,9 +1,8 @@
-"""What diagnosis.json says of each candidate: what it would do, how probable it is, and why it was rejected."""
+"""Each candidate of a diagnosis: what it would do, how probable it is, and why it was rejected."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from bayesplate.diagnosis.evidence.folds import NEEDED
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
+from bayesplate.diagnosis.wording.diagnosis import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_names
 from bayesplate.frequencies.laws import cents
@@ -20,38 +20,53 @@ from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.results.draws import finite
 
 Floats = NDArray[np.float64]
-Entry = dict[str, Any]
 
 
-def candidate_entry(found: Found, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float) -> Entry:
+def effect_entry(
+    found: Found, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float
+) -> EffectEntry:
+    """What there is to say of a candidate effect.
+
+    Parameters
+    ----------
+    found : Found
+    verdict : Verdict
+    ranked : sequence of Answer
+        Best first.
+    one : Candidate
+    doubled : float
+        Its inclusion probability with the width of every amplitude prior doubled.
+    """
     ground = found.ground
     index = next(i for i, other in enumerate(ground.hypotheses) if other.members == (one.name,))
     gained = float(found.log_evidence[index] - found.log_evidence[0])
     best_fit = _best_fit(found, index) - _best_fit(found, 0)
-    return {
-        "name": one.name,
-        "setup": _where(one),
-        "raw_rms_cents": finite(rms(cents(one.raw))),
-        "visible_rms_cents": finite(rms(cents(one.visible))),
-        "visible_cents": [finite(float(value)) for value in cents(one.visible)],
-        "below_sight": ground.is_below_sight(one.name),
-        "bias_percent": _bias(found, one),
-        "inclusion_probability": found.inclusion(one.name),
-        "inclusion_probability_with_doubled_priors": doubled,
-        "log_bayes_factor": gained,
-        "ockham_log_factor": gained - best_fit,
-        "gate": found.passes(index),
-        "amplitude": _amplitude(found, index, one),
-        "look_alikes": [
+    fate, because = _fate(found, verdict, ranked, one.name)
+    return EffectEntry(
+        name=one.name,
+        setup=_where(one),
+        raw_rms_cents=finite(rms(cents(one.raw))),
+        visible_rms_cents=finite(rms(cents(one.visible))),
+        visible_cents=tuple(finite(float(value)) for value in cents(one.visible)),
+        below_sight=ground.is_below_sight(one.name),
+        bias_percent=_bias(found, one),
+        inclusion_probability=found.inclusion(one.name),
+        inclusion_probability_with_doubled_priors=doubled,
+        log_bayes_factor=gained,
+        ockham_log_factor=gained - best_fit,
+        gate=gate_of(found, index),
+        amplitude=_amplitude(found, index, one),
+        look_alikes=tuple(
             other
             for other in ground.candidates
             if other != one.name and abs(ground.cosine(one.name, other)) > LOOK_ALIKE
-        ],
-        "rejected_because": _rejection(found, verdict, ranked, one.name, index),
-    }
+        ),
+        rejected_because=because,
+        fate=fate,
+    )
 
 
-def relabelling_entries(found: Found, verdict: Verdict) -> list[Entry]:
+def exchange_entries(found: Found, verdict: Verdict) -> tuple[ExchangeEntry, ...]:
     """Exchanged labels, as one candidate each."""
     ground = found.ground
     labels = [f"{label}" for setup in ground.baseline.board.setups for label in setup.labels]
@@ -59,25 +74,25 @@ def relabelling_entries(found: Found, verdict: Verdict) -> list[Entry]:
     for i, one in enumerate(ground.hypotheses):
         if one.swap is None:
             continue
-        pair = [labels[one.swap.first], labels[one.swap.second]]
         setup = ground.baseline.board.setups[ground.baseline.setup_index[one.swap.first]]
-        accepted = i == verdict.index or RELABELLING in verdict.effects
+        is_accepted = i == verdict.index or RELABELLING in verdict.effects
+        fate: Fate = "not needed" if found.none >= NEEDED else "less probable"
         entries.append(
-            {
-                "name": RELABELLING,
-                "setup": setup.name,
-                "labels": pair,
-                "raw_rms_cents": None,
-                "visible_rms_cents": None,
-                "bias_percent": None,
-                "inclusion_probability": float(found.probability[i]),
-                "log_bayes_factor": float(found.log_evidence[i] - found.log_evidence[0]),
-                "amplitude": None,
-                "look_alikes": [],
-                "rejected_because": None if accepted else "exchanging the labels does not make the readings likelier",
-            }
+            ExchangeEntry(
+                setup=setup.name,
+                labels=(labels[one.swap.first], labels[one.swap.second]),
+                inclusion_probability=float(found.probability[i]),
+                log_bayes_factor=float(found.log_evidence[i] - found.log_evidence[0]),
+                rejected_because=None if is_accepted else "exchanging the labels does not make the readings likelier",
+                fate="in the verdict" if is_accepted else fate,
+            )
         )
-    return entries
+    return tuple(entries)
+
+
+def gate_of(found: Found, index: int) -> float | None:
+    """The gate of a hypothesis; None where the constants meet every reading, so that there is no misfit to judge."""
+    return found.passes(index) if found.ground.n_directions else None
 
 
 def _where(one: Candidate) -> str:
@@ -113,7 +128,7 @@ def _best_fit(found: Found, index: int) -> float:
     return float(summed[hypothesis.table.weights > 0].max()) - found.ground.whole.half_log_det
 
 
-def _amplitude(found: Found, index: int, one: Candidate) -> Entry | None:
+def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
     """Quantiles of the first free parameter of the most probable form, given that the effect is there."""
     if not one.laws[0].form.free:
         return None
@@ -125,28 +140,25 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Entry | None:
     cumulated = np.cumsum(share[order]) - 0.5 * share[order]
     quantiles = np.interp([0.05, 0.5, 0.95], cumulated / share.sum(), z[order])
     low, middle, high = (float(free.prior.value(q)) for q in quantiles)
-    return {
-        "parameter": free.name,
-        "form": one.laws[best].form.detail,
-        "q05": low,
-        "q50": middle,
-        "q95": high,
-        "unit": free.unit,
-    }
+    return Amplitude(
+        parameter=free.name, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit
+    )
 
 
-def _rejection(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str, index: int) -> str | None:
+def _fate(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str) -> tuple[Fate, str | None]:
+    """What became of a candidate, and why it was rejected."""
     if name in verdict.effects:
-        return None
+        return "in the verdict", None
     if found.ground.is_below_sight(name):
-        return "its visible part is below what these readings could show"
+        return "below sight", "its visible part is below what these readings could show"
     if found.none >= NEEDED:
-        word = "not established" if verdict.word == "unexplained" else "not needed"
-        return f"{word}: nothing lacking has a probability of {found.none:.2f}"
+        fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
+        return fate, f"{fate}: nothing lacking has a probability of {found.none:.2f}"
     if verdict.word == "unexplained" and verdict.best is not None and name in verdict.best.members:
-        return verdict.reason
+        return "does not fit", verdict.reason
     best = ranked[0]
-    return f"less probable ({found.inclusion(name):.3f}) than {effect_names(best.members)} ({best.support:.3f})"
+    told = f"less probable ({found.inclusion(name):.3f}) than {effect_names(best.members)} ({best.support:.3f})"
+    return "less probable", told
 
 
 def rms(values: Floats) -> float:
