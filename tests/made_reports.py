@@ -49,7 +49,6 @@ class Fit:
 def fitted(card: str) -> Fit:
     """Fit a board as far as the loose gate lets it, in memory."""
     with pytest.MonkeyPatch.context() as patched:
-        for where in ("fit", "fitting"):
-            patched.setattr(f"bayesplate.workflow.{where}.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+        patched.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
         result = fit(card, write=False)
     return Fit(prepare(card).card, result.inference, result.draws, result.summary)

@@ -20,12 +20,12 @@ from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, FitFigures, Side, diagnosis_of
-from bayesplate.errors import CheckpointError, NotConvergedError, NotIdentifiableError
+from bayesplate.errors import NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder, write_text
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
-from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed, with_board
+from bayesplate.workflow.fitting import Fitted, Request, fitted, opened, posed, with_board
 from bayesplate.workflow.prepare import Prepared, prepare
 
 _NULL_LINE = 7
@@ -108,24 +108,15 @@ def diagnose(
         As `bayesplate.workflow.fit.fit`, of the fit without further effects.
     """
     prepared = prepare(card, effects)
-    folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
-    if folder is not None:
-        folder.require_usable(force=force, resume=resume)
-    request = Request(seed)
-    problem = posed(prepared, request)
-    if folder is not None:
-        if resume and not checkpoint_in(folder.checkpoint / BEFORE, prepared, problem).exists():
-            raise CheckpointError(f"{folder.path}: wanted a saved diagnosis, got none to resume (--force runs it anew)")
-        folder.open(resume=resume)
+    begun = opened(prepared, Request(seed), out, write=write, force=force, resume=resume, first=BEFORE)
+    folder = begun.folder
 
     def run(under: Prepared, name: str) -> Fitted:
         def refuse(inference: Inference) -> None:
-            where = folder.path if folder is not None and name == BEFORE else None
-            refuse_unconverged(inference, seed, under, where)
+            refuse_unconverged(inference, seed, under, begun.path if name == BEFORE else None)
 
-        posed_again = problem if under is prepared else posed(under, request)
-        checkpoints = None if folder is None else folder.checkpoint / name
-        return fitted(under, posed_again, request, checkpoints, refuse, progress)
+        problem = begun.problem if under is prepared else posed(under, begun.request)
+        return fitted(under, problem, begun.request, begun.checkpoints(name), refuse, progress)
 
     before = run(prepared, BEFORE)
     found = search(prepare_search(baseline_of(before.inference.problem)))
@@ -150,7 +141,7 @@ def diagnose(
         if report:
             write_page(folder.path, after, diagnosis)
         folder.close()
-    return DiagnoseResult(None if folder is None else folder.path, diagnosis, before, after)
+    return DiagnoseResult(begun.path, diagnosis, before, after)
 
 
 def finalists(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
