@@ -236,7 +236,7 @@ def diagnose(
 
             result = run(card, out=out, seed=seed, effects=effects, force=force, resume=resume, progress=tell)
         if as_json:
-            print_json(result.diagnosis)
+            print_json(result.to_json())
         elif not quiet:
             from bayesplate.workflow.shown import show_diagnosis
 

@@ -16,8 +16,9 @@ import argparse
 import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.words import MERITS
 from bayesplate.workflow.diagnose import diagnose
 
 BOARDS = (
@@ -33,7 +34,7 @@ BOARDS = (
 COLUMNS = ("board", "verdict", "effects", "claim", "in sample", "left out", "nested", "E_x", "E_y", "G_xy")
 
 
-def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, dict[str, Any]]:
+def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, Diagnosis]:
     """Diagnose each board.
 
     Parameters
@@ -44,37 +45,35 @@ def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, d
 
     Returns
     -------
-    dict
-        The content of diagnosis.json, by board.
+    dict of Diagnosis
+        By board.
     """
     return {board: diagnose(board, write=False, seed=seed).diagnosis for board in boards}
 
 
-def rows(diagnoses: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, ...]]:
+def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
     """One row a board: errors in cents before -> after, shift of each constant in standard deviations."""
     return [
         (
             name,
-            one["verdict"],
-            ", ".join(one["effects"]) or "-",
-            "error reduced" if one["claim"] else "no claim",
-            _before_after(one, "in_sample_rms_cents"),
-            _before_after(one, "leave_one_out_rms_cents"),
-            _before_after(one, "nested_leave_one_out_rms_cents"),
-            *(f"{entry['shift_in_sd']:+.1f}" for entry in one["elastic_shift"].values()),
+            one.verdict,
+            ", ".join(one.effects) or "-",
+            "error reduced" if one.claim else "no claim",
+            *(f"{_cents(merit.of(one.before))} → {_cents(merit.of(one.after))}" for merit in MERITS if merit.is_rms),
+            *(f"{shift.shift_in_sd:+.1f}" for shift in one.elastic_shift.values()),
         )
         for name, one in diagnoses.items()
     ]
 
 
-def markdown(diagnoses: Mapping[str, Mapping[str, Any]]) -> str:
+def markdown(diagnoses: Mapping[str, Diagnosis]) -> str:
     """The table as Markdown."""
     lines = [COLUMNS, tuple("---" for _ in COLUMNS), *rows(diagnoses)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
-def _before_after(one: Mapping[str, Any], key: str) -> str:
-    return f"{one['before'][key]:.1f} → {one['after'][key]:.1f}"
+def _cents(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
 
 
 def main() -> None:
@@ -86,7 +85,7 @@ def main() -> None:
     diagnoses = close_the_loop(arguments.boards)
     print(markdown(diagnoses))
     if "paper-cantilever-fe" in diagnoses:
-        assert "transverse_shear" in diagnoses["paper-cantilever-fe"]["effects"]
+        assert "transverse_shear" in diagnoses["paper-cantilever-fe"].effects
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
         (arguments.out / "closing-the-loop.md").write_text(markdown(diagnoses), encoding="utf-8")

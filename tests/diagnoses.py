@@ -1,76 +1,139 @@
-"""Diagnoses made by hand, one of each verdict, with the keys that diagnosis.json promises and no others."""
+"""Diagnoses made by hand, one of each verdict."""
 
 from __future__ import annotations
 
 from typing import Any
 
-BEFORE = {
-    "in_sample_rms_cents": 21.25,
-    "leave_one_out_rms_cents": 46.5,
-    "nested_leave_one_out_rms_cents": 46.5,
-    "log_score": -24.75,
-    "hits_90": 0.5,
-}
-AFTER = {
-    "in_sample_rms_cents": 4.25,
-    "leave_one_out_rms_cents": 9.5,
-    "nested_leave_one_out_rms_cents": 12.5,
-    "log_score": -15.5,
-    "hits_90": 1.0,
-}
+from bayesplate.diagnosis.decision.verdict import Word
+from bayesplate.diagnosis.wording.diagnosis import (
+    Amplitude,
+    Diagnosis,
+    EffectEntry,
+    ElasticShift,
+    Errors,
+    ExchangeEntry,
+    Explanation,
+    Finalist,
+    Gates,
+    NullControlSummary,
+    Spread,
+)
+from bayesplate.effects import EFFECTS
+
+BEFORE = Errors(
+    in_sample_rms_cents=21.25,
+    leave_one_out_rms_cents=46.5,
+    nested_leave_one_out_rms_cents=46.5,
+    log_score=-24.75,
+    hits_90=0.5,
+)
+AFTER = Errors(
+    in_sample_rms_cents=4.25,
+    leave_one_out_rms_cents=9.5,
+    nested_leave_one_out_rms_cents=12.5,
+    log_score=-15.5,
+    hits_90=1.0,
+)
 SHIFT = {
-    "E_x": {"before": 10.25e9, "after": 11.5e9, "shift_in_sd": 2.5},
-    "E_y": {"before": 1.0e9, "after": 0.75e9, "shift_in_sd": -1.25},
-    "G_xy": {"before": 0.5e9, "after": 0.5e9, "shift_in_sd": 0.0},
+    "E_x": ElasticShift(before=10.25e9, after=11.5e9, shift_in_sd=2.5),
+    "E_y": ElasticShift(before=1.0e9, after=0.75e9, shift_in_sd=-1.25),
+    "G_xy": ElasticShift(before=0.5e9, after=0.5e9, shift_in_sd=0.0),
 }
 NEXT = "Weigh a second accelerometer onto the board and measure (1,0) again."
 
 
-def candidate(name: str, setup: str = "clamped", **changed: Any) -> dict[str, Any]:
-    """One candidate as diagnosis.json has it."""
-    return {
-        "name": name,
-        "setup": setup,
-        "raw_rms_cents": 45.0,
-        "visible_rms_cents": 12.5,
-        "bias_percent": {"E_x": 1.5, "E_y": -2.5, "G_xy": 0.5},
-        "inclusion_probability": 0.25,
-        "amplitude": {"q05": 10.0, "q50": 120.0, "q95": 230.0, "unit": "N/m"},
-        "look_alikes": [],
-        "rejected_because": None,
-    } | changed
+def spread(mean: float, unit: str = "Pa") -> Spread:
+    """A mean with a tenth of it as standard deviation."""
+    sd = 0.1 * mean
+    quantiles = {f"q{p:02}": mean + z * sd for p, z in ((5, -1.5), (25, -0.75), (50, 0.0), (75, 0.75), (95, 1.5))}
+    return Spread(mean=mean, sd=sd, **quantiles, unit=unit)
 
 
-TENSION = candidate("membrane_tension", inclusion_probability=0.97)
+def candidate(name: str, setup: str = "clamped", **changed: Any) -> EffectEntry:
+    """One candidate effect."""
+    return EffectEntry(
+        **{
+            "name": name,
+            "setup": setup,
+            "raw_rms_cents": 45.0,
+            "visible_rms_cents": 12.5,
+            "visible_cents": (12.5, -12.5),
+            "below_sight": False,
+            "bias_percent": {"E_x": 1.5, "E_y": -2.5, "G_xy": 0.5},
+            "inclusion_probability": 0.25,
+            "inclusion_probability_with_doubled_priors": 0.125,
+            "log_bayes_factor": 1.25,
+            "ockham_log_factor": -2.25,
+            "gate": 0.375,
+            "amplitude": Amplitude(parameter="tension", form="", q05=10.0, q50=120.0, q95=230.0, unit="N/m"),
+            "look_alikes": (),
+            "rejected_because": "less probable (0.250) than something else (0.500)",
+            "fate": "less probable",
+        }
+        | changed
+    )
+
+
+TENSION = candidate("membrane_tension", inclusion_probability=0.97, rejected_because=None, fate="in the verdict")
 AIR = candidate(
     "air_loading", raw_rms_cents=60.0, visible_rms_cents=2.5, inclusion_probability=0.02, amplitude=None,
-    look_alikes=["attached_mass"], rejected_because="its visible part drowns in the noise",
+    look_alikes=("attached_mass",), rejected_because="its visible part drowns in the noise", fate="below sight",
 )  # fmt: skip
 GRAIN = candidate("grain_angle", "board", visible_rms_cents=0.25, inclusion_probability=0.01)
+EXCHANGE = ExchangeEntry(
+    setup="clamped", labels=("(1,0)", "(0,1)"), inclusion_probability=0.03, log_bayes_factor=-1.5,
+    rejected_because="exchanging the labels does not make the readings likelier", fate="less probable",
+)  # fmt: skip
 
 
-def diagnosis(verdict: str, effects: tuple[str, ...] = (), claim: bool = False, after: Any = None) -> dict[str, Any]:
-    """A diagnosis with three candidates."""
-    still = {name: {**one, "after": one["before"], "shift_in_sd": 0.0} for name, one in SHIFT.items()}
-    return {
-        "format": 1,
-        "verdict": verdict,
-        "claim": claim,
-        "effects": list(effects),
-        "before": BEFORE,
-        "after": BEFORE if after is None else after,
-        "gain_null_percentile": 99.0 if after else 40.0,
-        "elastic_shift": SHIFT if after else still,
-        "candidates": [TENSION, AIR, GRAIN],
-        "recommendation": NEXT,
-    }
+def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, after: Errors | None = None) -> Diagnosis:
+    """A diagnosis with three candidate effects; with an `after`, the first of its effects was added."""
+    still = {name: ElasticShift(before=one.before, after=one.before, shift_in_sd=0.0) for name, one in SHIFT.items()}
+    refitted = effects[:1] if after else ()
+    elastic = {name: spread(one.after) for name, one in SHIFT.items()}
+    sizes = {"clamped": {name: {"tension": spread(120.0, "N/m")} for name in refitted}}
+    finalist = Finalist(
+        effects=refitted, probability=0.97, in_sample_rms_cents=4.25, leave_one_out_rms_cents=9.5, elastic=elastic,
+        sizes=sizes,
+    )  # fmt: skip
+    return Diagnosis(
+        name="a-board",
+        seed=1,
+        card_sha256="0" * 64,
+        verdict=word,
+        claim=claim,
+        effects=effects,
+        refitted=refitted,
+        reason="the reason of it",
+        sentences=tuple(EFFECTS[name].sentence for name in effects),
+        declared=(),
+        probability_of_none=0.02,
+        probability_of_none_with_doubled_priors=0.03,
+        gate=Gates(before=0.01, after=0.5),
+        before=BEFORE,
+        after=after or BEFORE,
+        gain_null_percentile=99.0 if after else 40.0,
+        null_control=NullControlSummary(
+            n_sets=500, flagged_percent=2.0, nested_ratio=0.25, nested_ratio_to_beat=0.75
+        ),
+        elastic_shift=SHIFT if after else still,
+        finalists=(finalist,) if after else (),
+        elastic_averaged={name: spread(one.before) for name, one in SHIFT.items()},
+        answers=(Explanation(effects=("membrane_tension",), probability=0.97),),
+        candidates=() if word == "undetectable" else (TENSION, AIR, GRAIN),
+        recommendation=NEXT,
+        notes=(),
+    )
 
 
 DIAGNOSES = {
-    "none needed": diagnosis("none needed"),
-    "named": diagnosis("named", ("membrane_tension",), claim=True, after=AFTER),
-    "indistinguishable group": diagnosis("indistinguishable group", ("membrane_tension", "air_loading"), after=AFTER),
-    "unexplained": diagnosis("unexplained"),
-    "undetectable": diagnosis("undetectable") | {"candidates": []},
+    one.verdict: one
+    for one in (
+        diagnosis("none needed"),
+        diagnosis("named", ("membrane_tension",), claim=True, after=AFTER),
+        diagnosis("indistinguishable group", ("membrane_tension", "air_loading"), after=AFTER),
+        diagnosis("unexplained"),
+        diagnosis("undetectable"),
+    )
 }
 """By verdict."""

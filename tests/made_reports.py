@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from bayesplate.cards import BoardCard
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import SamplerSettings
@@ -32,11 +33,11 @@ class Fit:
     draws: Draws
     summary: Mapping[str, Any]
 
-    def write(self, folder: Path, diagnosis: Mapping[str, Any] | None = None) -> Path:
+    def write(self, folder: Path, diagnosis: Diagnosis | None = None) -> Path:
         """Its report in a folder."""
         return write_report(folder, self.card, self.inference, self.draws, self.summary, diagnosis)
 
-    def page(self, title: str = "", source: str = "", diagnosis: Mapping[str, Any] | None = None) -> str:
+    def page(self, title: str = "", source: str = "", diagnosis: Diagnosis | None = None) -> str:
         """Its page without figures, with another title and source."""
         problem = self.inference.problem
         board = replace(problem.board, title=title, source=source)
@@ -48,7 +49,6 @@ class Fit:
 def fitted(card: str) -> Fit:
     """Fit a board as far as the loose gate lets it, in memory."""
     with pytest.MonkeyPatch.context() as patched:
-        for where in ("fit", "fitting"):
-            patched.setattr(f"bayesplate.workflow.{where}.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
+        patched.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
         result = fit(card, write=False)
     return Fit(prepare(card).card, result.inference, result.draws, result.summary)

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 from made_boards import setup_of
 
-from bayesplate.diagnosis.baseline import Baseline
-from bayesplate.diagnosis.forms import Form
-from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.laws import FormLaw
-from bayesplate.diagnosis.noise_grid import NoiseGrid
-from bayesplate.diagnosis.search import Candidate, Ground
-from bayesplate.diagnosis.tables import Table, nothing
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid
+from bayesplate.diagnosis.evidence.search import Candidate, Ground
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.forms import Form
+from bayesplate.diagnosis.shifts.laws import FormLaw
+from bayesplate.diagnosis.shifts.tables import Table, nothing
 from bayesplate.labels import Label
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import made_board

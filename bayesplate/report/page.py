@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 from bayesplate.cards import BoardCard
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.exports import write_before_after
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.plate.board import vibrating_lengths
@@ -71,7 +73,7 @@ def write_report(
     inference: Inference,
     draws: Draws,
     summary: Mapping[str, Any],
-    diagnosis: Mapping[str, Any] | None = None,
+    diagnosis: Diagnosis | None = None,
 ) -> Path:
     """Write report.html, its figures as PNG and SVG, and the tables for other programs.
 
@@ -85,8 +87,8 @@ def write_report(
     draws : Draws
     summary : dict
         As in summary.json.
-    diagnosis : dict, optional
-        As in diagnosis.json; then `inference`, `draws` and `summary` are those of the refitted model.
+    diagnosis : Diagnosis, optional
+        Then `inference`, `draws` and `summary` are those of the refitted model.
 
     Returns
     -------
@@ -100,7 +102,10 @@ def write_report(
         every = [one for found in groups.values() for one in found]
         vector = save_pictures(every, folder / FIGURES, "svg")
         shown = {place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}
-        write_exports(folder, summary, inference.problem.board.title or summary["name"], diagnosis)
+        title = inference.problem.board.title or summary["name"]
+        write_exports(folder, summary, title)
+        if diagnosis is not None:
+            write_before_after(folder, diagnosis, title)
         write_text(page, render(card, inference, draws, summary, shown, diagnosis))
         save_pictures(every, folder / FIGURES, "png")
     return page
@@ -119,7 +124,7 @@ def _uncollected() -> Iterator[None]:
 
 
 def pictures(
-    inference: Inference, draws: Draws, summary: Mapping[str, Any], diagnosis: Mapping[str, Any] | None = None
+    inference: Inference, draws: Draws, summary: Mapping[str, Any], diagnosis: Diagnosis | None = None
 ) -> dict[str, list[Picture]]:
     """Every figure of the page, by the place where it stands."""
     problem = inference.problem
@@ -143,7 +148,7 @@ def pictures(
     }
 
 
-def _of_diagnosis(diagnosis: Mapping[str, Any] | None) -> tuple[list[Picture], list[Picture]]:
+def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Picture]]:
     if diagnosis is None:
         return [], []
     before_after = before_after_picture(diagnosis)
@@ -190,7 +195,7 @@ def render(
     draws: Draws,
     summary: Mapping[str, Any],
     shown: Mapping[str, Sequence[Shown]],
-    diagnosis: Mapping[str, Any] | None = None,
+    diagnosis: Diagnosis | None = None,
 ) -> str:
     """The page as text; parameters as of `write_report`, `shown` the pictures by their place."""
     from markupsafe import Markup

@@ -1,4 +1,4 @@
-"""Tables for other programs: the constants, and the error before and after, as CSV and as LaTeX."""
+"""Tables for other programs: the constants as CSV and as LaTeX, and what any such table needs."""
 
 from __future__ import annotations
 
@@ -8,17 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bayesplate.results.folder import BEFORE_AFTER, CONSTANTS, write_text
+from bayesplate.results.folder import CONSTANTS, write_text
 from bayesplate.results.tables import decimals
-
-ERROR_WORDS = {
-    "in_sample_rms_cents": "error in the fit, rms cents",
-    "leave_one_out_rms_cents": "error of a mode left out, rms cents",
-    "nested_leave_one_out_rms_cents": "the same, search included, rms cents",
-    "log_score": "log score",
-    "hits_90": "readings inside their 90 % intervals",
-}
-"""Figures of merit of a diagnosis, as tables name them."""
 
 _PA_TO_GPA = 1e-9
 _STARTS_A_FORMULA = ("=", "+", "-", "@")
@@ -42,10 +33,8 @@ _LATEX = {
 Cell = str | float | int | None
 
 
-def write_exports(
-    folder: Path, summary: Mapping[str, Any], title: str, diagnosis: Mapping[str, Any] | None = None
-) -> tuple[Path, ...]:
-    """Write the tables of a fit and, where there is one, of a diagnosis.
+def write_exports(folder: Path, summary: Mapping[str, Any], title: str) -> tuple[Path, ...]:
+    """Write the tables of a fit.
 
     Parameters
     ----------
@@ -55,16 +44,12 @@ def write_exports(
         As in summary.json.
     title : str
         Of the board; any text.
-    diagnosis : dict, optional
-        As in diagnosis.json.
 
     Returns
     -------
     tuple of Path
     """
     texts = dict(zip(CONSTANTS, (constants_csv(summary), constants_tex(summary, title)), strict=True))
-    if diagnosis is not None and diagnosis.get("before"):
-        texts |= zip(BEFORE_AFTER, (before_after_csv(diagnosis), before_after_tex(diagnosis, title)), strict=True)
     for name, text in texts.items():
         write_text(folder / name, text)
     return tuple(folder / name for name in texts)
@@ -99,27 +84,6 @@ def constants_tex(summary: Mapping[str, Any], title: str) -> str:
     return tabular(source, header, rows)
 
 
-def before_after_csv(diagnosis: Mapping[str, Any]) -> str:
-    """Figures of merit before and after, then the constants in GPa."""
-    rows: list[list[Cell]] = [["quantity", "before", "after", "shift_in_sd"]]
-    rows += [[words, before, after, None] for words, before, after in _merits(diagnosis)]
-    for name, one in (diagnosis.get("elastic_shift") or {}).items():
-        both = [_scaled(_mean(one.get(key)), _PA_TO_GPA) for key in ("before", "after")]
-        rows.append([f"{name}, GPa", *both, one.get("shift_in_sd")])
-    return csv_text(rows)
-
-
-def before_after_tex(diagnosis: Mapping[str, Any], title: str) -> str:
-    """The same as a tabular."""
-    rows = [[latex(words), _rounded(b, 2, 1.0), _rounded(a, 2, 1.0), ""] for words, b, a in _merits(diagnosis)]
-    for name, one in (diagnosis.get("elastic_shift") or {}).items():
-        both = [_rounded(_mean(one.get(key)), 3) for key in ("before", "after")]
-        shift = one.get("shift_in_sd")
-        rows.append([f"${name[0]}_{{{latex(name[2:])}}}$, GPa", *both, "--" if shift is None else f"${shift:+.1f}$"])
-    source = f"% Before and after, {latex(title)}; verdict: {latex(str(diagnosis['verdict']))}"
-    return tabular(source, ["", "before", "after", "shift in sd"], rows)
-
-
 def csv_text(rows: Sequence[Sequence[Cell]]) -> str:
     """Rows as CSV with full precision, texts on one line; what looks like a formula begins with an apostrophe."""
     stream = io.StringIO()
@@ -141,12 +105,6 @@ def tabular(comment: str, header: Sequence[str], rows: Sequence[Sequence[str]]) 
     return "\n".join([comment, rf"\begin{{tabular}}{{{columns}}}", r"\hline", *body, r"\end{tabular}", ""])
 
 
-def _merits(diagnosis: Mapping[str, Any]) -> list[tuple[str, float | None, float | None]]:
-    before, after = diagnosis.get("before") or {}, diagnosis.get("after") or {}
-    known = [name for name in ERROR_WORDS if name in before or name in after]
-    return [(ERROR_WORDS[name], before.get(name), after.get(name)) for name in known]
-
-
 def _cell(value: Cell) -> str:
     if value is None:
         return ""
@@ -154,11 +112,6 @@ def _cell(value: Cell) -> str:
         line = " ".join(value.split())
         return f"'{line}" if line.startswith(_STARTS_A_FORMULA) else line
     return repr(value)
-
-
-def _mean(value: Any) -> float | None:
-    """A modulus that is given alone, or with its spread."""
-    return value["mean"] if isinstance(value, Mapping) else value
 
 
 def _scaled(value: float | None, factor: float) -> float | None:

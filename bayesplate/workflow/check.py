@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
+from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli

@@ -6,25 +6,27 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from bayesplate.diagnosis.advice import recommendation
-from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.findings import Case, Diagnosis, Side, diagnosis
-from bayesplate.diagnosis.folds import nested
-from bayesplate.diagnosis.hypotheses import order_conflicts
-from bayesplate.diagnosis.null_control import N_SETS, NullControl, null_control
-from bayesplate.diagnosis.refits import excludes_zero, likely_forms, refit_board
-from bayesplate.diagnosis.search import Found, prepare_search, search
-from bayesplate.diagnosis.verdict import Answer, Verdict, alternatives, answers, decide
-from bayesplate.errors import CheckpointError, NotConvergedError, NotIdentifiableError
+from bayesplate.diagnosis.decision.advice import recommendation
+from bayesplate.diagnosis.decision.refits import excludes_zero, likely_forms, refit_board
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives, answers, decide
+from bayesplate.diagnosis.evidence.folds import nested
+from bayesplate.diagnosis.evidence.hypotheses import order_conflicts
+from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
+from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
+from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
+from bayesplate.diagnosis.wording.findings import Case, FitFigures, Side, diagnosis_of
+from bayesplate.errors import NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder, write_text
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
-from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed, with_board
+from bayesplate.workflow.fitting import Fitted, Request, fitted, opened, posed, with_board
 from bayesplate.workflow.prepare import Prepared, prepare
 
 _NULL_LINE = 7
@@ -40,8 +42,7 @@ class DiagnoseResult:
     ----------
     folder : Path or None
         Where its files are; None if none were asked for.
-    diagnosis : dict
-        As in diagnosis.json.
+    diagnosis : Diagnosis
     before, after : Fitted
         The same where nothing was added.
     """
@@ -50,6 +51,16 @@ class DiagnoseResult:
     diagnosis: Diagnosis
     before: Fitted
     after: Fitted
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of diagnosis.json."""
+        return diagnosis_json(self.diagnosis)
+
+    def __repr__(self) -> str:
+        return repr(self.diagnosis)
+
+    def _repr_html_(self) -> str:
+        return self.diagnosis._repr_html_()
 
 
 def diagnose(
@@ -102,24 +113,15 @@ def diagnose(
         n_null=n_null, progress=progress,
     )  # fmt: skip
     prepared = prepare(card, effects)
-    folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
-    if folder is not None:
-        folder.require_usable(force=force, resume=resume)
-    request = Request(seed)
-    problem = posed(prepared, request)
-    if folder is not None:
-        if resume and not checkpoint_in(folder.checkpoint / BEFORE, prepared, problem).exists():
-            raise CheckpointError(f"{folder.path}: wanted a saved diagnosis, got none to resume (--force runs it anew)")
-        folder.open(resume=resume)
+    begun = opened(prepared, Request(seed), out, write=write, force=force, resume=resume, first=BEFORE)
+    folder = begun.folder
 
     def run(under: Prepared, name: str) -> Fitted:
         def refuse(inference: Inference) -> None:
-            where = folder.path if folder is not None and name == BEFORE else None
-            refuse_unconverged(inference, seed, under, where)
+            refuse_unconverged(inference, seed, under, begun.path if name == BEFORE else None)
 
-        posed_again = problem if under is prepared else posed(under, request)
-        checkpoints = None if folder is None else folder.checkpoint / name
-        return fitted(under, posed_again, request, checkpoints, refuse, progress)
+        problem = begun.problem if under is prepared else posed(under, begun.request)
+        return fitted(under, problem, begun.request, begun.checkpoints(name), refuse, progress)
 
     before = run(prepared, BEFORE)
     found = search(prepare_search(baseline_of(before.inference.problem)))
@@ -134,17 +136,17 @@ def diagnose(
         except (NotIdentifiableError, NotConvergedError) as error:
             notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
     case = _case(found, verdict, control, before, refits, tuple(notes))
-    content, after = diagnosis(case), refits.get(verdict.index, before)
+    diagnosis, after = diagnosis_of(case), refits.get(verdict.index, before)
     if folder is not None:
         if after is not before:
             make_folder(folder.path / BEFORE)
             write_fit(folder.path / BEFORE, before)
         write_fit(folder.path, after)
-        write_text(folder.path / DIAGNOSIS, json_text(content))
+        write_text(folder.path / DIAGNOSIS, json_text(diagnosis_json(diagnosis)))
         if report:
-            write_page(folder.path, after, content)
+            write_page(folder.path, after, diagnosis)
         folder.close()
-    return DiagnoseResult(None if folder is None else folder.path, content, before, after)
+    return DiagnoseResult(begun.path, diagnosis, before, after)
 
 
 def finalists(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
@@ -170,11 +172,15 @@ def _case(
         verdict=verdict,
         control=control,
         folded=nested(found.ground, found.residual[None, :]),
-        before=Side(0, before.summary, before.draws),
-        after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
+        before=Side(0, FitFigures.of(before.summary), before.draws),
+        after=Side(verdict.index if is_refitted else 0, FitFigures.of(after.summary), after.draws),
         is_clear_of_zero=clear,
         recommendation=recommendation(found, asked_about(found, verdict)),
-        finalists=[(one, refits[one.index].summary) for one in finalists(found, verdict) if one.index in refits],
+        finalists=[
+            (one, FitFigures.of(refits[one.index].summary))
+            for one in finalists(found, verdict)
+            if one.index in refits
+        ],
         notes=notes,
     )
 

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from bayesplate.errors import CheckpointError, NotConvergedError
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.errors import NotConvergedError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.posterior.sampling import Progress
 from bayesplate.results.draws import Draws
-from bayesplate.results.folder import ARCHIVE, SUMMARY, OutputFolder, json_text, write_text
+from bayesplate.results.folder import ARCHIVE, SUMMARY, json_text, write_text
 from bayesplate.results.store import write_posterior
 from bayesplate.results.summary import Summary, unconverged_summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed
+from bayesplate.workflow.fitting import Fitted, Request, fitted, opened
 from bayesplate.workflow.prepare import Prepared, prepare
 
 
@@ -101,33 +101,22 @@ def fit(
         force=force, resume=resume, progress=progress,
     )  # fmt: skip
     prepared = prepare(card, effects)
-    folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
-    if folder is not None:
-        folder.require_usable(force=force, resume=resume)
-    request = Request(seed, law, robust)
-    problem = posed(prepared, request)
-    SamplerSettings(seed=seed).walkers(problem.parameters.n_dim)
-    if folder is not None:
-        if resume and not checkpoint_in(folder.checkpoint, prepared, problem).exists():
-            wanted = f"a saved run under the {problem.posterior.law} law"
-            raise CheckpointError(f"{folder.path}: wanted {wanted}, got none to resume (--force runs it anew)")
-        folder.open(resume=resume)
-        if report:
-            from bayesplate.report.page import load_libraries
+    run = opened(prepared, Request(seed, law, robust), out, write=write, force=force, resume=resume)
+    if write and report:
+        from bayesplate.report.page import load_libraries
 
-            load_libraries()  # while nobody waits for the page yet
+        load_libraries()  # while nobody waits for the page yet
 
     def refuse(inference: Inference) -> None:
-        refuse_unconverged(inference, seed, prepared, None if folder is None else folder.path)
+        refuse_unconverged(inference, seed, prepared, run.path)
 
-    checkpoints = None if folder is None else folder.checkpoint
-    result = fitted(prepared, problem, request, checkpoints, refuse, progress)
-    if folder is not None:
-        write_fit(folder.path, result)
+    result = fitted(prepared, run.problem, run.request, run.checkpoints(), refuse, progress)
+    if run.folder is not None:
+        write_fit(run.folder.path, result)
         if report:
-            write_page(folder.path, result)
-        folder.close()
-    return FitResult(None if folder is None else folder.path, result.summary, result.inference, result.draws)
+            write_page(run.folder.path, result)
+        run.folder.close()
+    return FitResult(run.path, result.summary, result.inference, result.draws)
 
 
 def write_fit(folder: Path, result: Fitted) -> None:
@@ -136,8 +125,8 @@ def write_fit(folder: Path, result: Fitted) -> None:
     write_text(folder / SUMMARY, json_text(result.summary))
 
 
-def write_page(folder: Path, result: Fitted, diagnosis: Mapping[str, Any] | None = None) -> Path:
-    """Write report.html, its figures and tables; with a diagnosis (as in diagnosis.json) its verdict too."""
+def write_page(folder: Path, result: Fitted, diagnosis: Diagnosis | None = None) -> Path:
+    """Write report.html, its figures and tables; with a diagnosis its verdict too."""
     from bayesplate.report.page import write_report
 
     card = result.prepared.card

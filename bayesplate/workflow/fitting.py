@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from bayesplate.errors import CheckpointError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.inference import Inference, Problem, infer, pose
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.draws import Draws, linear_is_enough, linearisation, named_draws
+from bayesplate.results.folder import OutputFolder
 from bayesplate.results.summary import Summary, summarise
 from bayesplate.results.versions import versions
 from bayesplate.workflow.prepare import Prepared
@@ -54,6 +57,34 @@ class Fitted:
     summary: Summary
 
 
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A run that may begin: its problem is posed and its folder open.
+
+    Attributes
+    ----------
+    prepared : Prepared
+    request : Request
+    problem : Problem
+    folder : OutputFolder or None
+        None if nothing is to be written.
+    """
+
+    prepared: Prepared
+    request: Request
+    problem: Problem
+    folder: OutputFolder | None
+
+    @property
+    def path(self) -> Path | None:
+        """Where the files go; None if nothing is to be written."""
+        return None if self.folder is None else self.folder.path
+
+    def checkpoints(self, part: str = "") -> Path | None:
+        """Where the chunks of the run, or of one of its fits, are kept."""
+        return None if self.folder is None else self.folder.checkpoint / part
+
+
 Refuse = Callable[[Inference], None]
 
 
@@ -65,6 +96,57 @@ def with_board(prepared: Prepared, board: Board) -> Prepared:
 def posed(prepared: Prepared, request: Request) -> Problem:
     """The problem of a prepared board; see `bayesplate.posterior.inference.pose`."""
     return pose(prepared.board, prepared.prior, law=request.law, robust=request.robust)
+
+
+def opened(
+    prepared: Prepared,
+    request: Request,
+    out: str | os.PathLike[str] | None,
+    *,
+    write: bool = True,
+    force: bool = False,
+    resume: bool = False,
+    first: str = "",
+) -> Opened:
+    """Pose the problem of a prepared board and open the folder of its run; whatever is refused is refused before that.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    request : Request
+    out : path or None
+        Output folder; by default results/NAME.
+    write : bool
+        False opens none.
+    force, resume : bool
+        Replace the results in the folder, or continue an interrupted run.
+    first : str
+        Which of several fits comes first: the subfolder of its checkpoint.
+
+    Returns
+    -------
+    Opened
+
+    Raises
+    ------
+    InputError
+        If the folder may not be used; then nothing is written, nor with the following.
+    NotIdentifiableError
+        If the data leave a constant open.
+    CheckpointError
+        If there is nothing to resume.
+    """
+    folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
+    if folder is not None:
+        folder.require_usable(force=force, resume=resume)
+    problem = posed(prepared, request)
+    SamplerSettings(seed=request.seed).walkers(problem.parameters.n_dim)
+    if folder is not None:
+        if resume and not checkpoint_in(folder.checkpoint / first, prepared, problem).exists():
+            wanted = f"a saved run under the {problem.posterior.law} law"
+            raise CheckpointError(f"{folder.path}: wanted {wanted}, got none to resume (--force runs it anew)")
+        folder.open(resume=resume)
+    return Opened(prepared, request, problem, folder)
 
 
 def fitted(

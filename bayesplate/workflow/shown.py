@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from bayesplate.diagnosis.told import candidates_table, errors_table, shift_table, verdict_sentence
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.tables import candidates_table, errors_table, shift_table
+from bayesplate.diagnosis.wording.told import verdict_sentence
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.comparison_tables import METHODS_REMARK, forward_table, methods_table, sheet_table
 from bayesplate.results.folder import json_text
@@ -72,12 +74,13 @@ def show_compare(comparison: Mapping[str, Any]) -> Shown:
     return Shown(tuple(tables), (*remarks, METHODS_REMARK), (), comparison["verdict"]["sentence"])
 
 
-def show_diagnosis(diagnosis: Mapping[str, Any]) -> Shown:
+def show_diagnosis(diagnosis: Diagnosis) -> Shown:
     """The result of `bayesplate.workflow.diagnose.diagnose` for a person."""
+    tables = (errors_table(diagnosis), shift_table(diagnosis), candidates_table(diagnosis, narrow=True))
     return Shown(
-        (errors_table(diagnosis), shift_table(diagnosis), candidates_table(diagnosis)),
-        (*diagnosis["sentences"], diagnosis["recommendation"]),
-        tuple(diagnosis["notes"]),
+        tuple(table for table in tables if table is not None),
+        (*diagnosis.sentences, diagnosis.recommendation),
+        diagnosis.notes,
         verdict_sentence(diagnosis),
     )
 

@@ -89,7 +89,7 @@ def _write_pages(app: Any) -> None:
 
 
 def _page(room: str) -> str:
-    modules = sorted(path for path in (PACKAGE / room).glob("*.py") if _caption(path))
+    modules = sorted(path for path in (PACKAGE / room).rglob("*.py") if _caption(path))
     title = room
     return "\n".join([title, "=" * len(title), "", SENTENCES[room], "", *(_module(path) for path in modules)])
 

@@ -7,11 +7,11 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from bayesplate.diagnosis.baseline import baseline_of
-from bayesplate.diagnosis.constants import draw_constants
-from bayesplate.diagnosis.search import prepare_search, search
-from bayesplate.diagnosis.sensitivity import inclusion_with_width
-from bayesplate.diagnosis.verdict import at_limit, decide
+from bayesplate.diagnosis.decision.constants import draw_constants
+from bayesplate.diagnosis.decision.verdict import at_limit, decide
+from bayesplate.diagnosis.evidence.search import prepare_search, search
+from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
+from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.workflow.fit import fit
 
 pytestmark = pytest.mark.slow
@@ -32,31 +32,31 @@ def rounding_cents(result):
 def test_the_simulated_cantilever_names_transverse_shear(diagnosed):
     """Thin, 13.7 cents rms remain; with the shear of the paper's inputs no more than whole Hz leave."""
     told = diagnosed("paper-cantilever-fe").diagnosis
-    before, after = told["before"], told["after"]
-    assert told["verdict"] in ("named", "indistinguishable group")
-    assert SHEAR in told["effects"]
-    assert before["in_sample_rms_cents"] == pytest.approx(13.7, abs=0.1)
+    before, after = told.before, told.after
+    assert told.verdict in ("named", "indistinguishable group")
+    assert SHEAR in told.effects
+    assert before.in_sample_rms_cents == pytest.approx(13.7, abs=0.1)
     rounding, variances = rounding_cents(diagnosed("paper-cantilever-fe"))
     spread = 4.0 * np.sqrt(0.8 * np.sum(variances**2)) / variances.sum()  # uniform: fourth moment 1.8 variance squared
-    assert after["in_sample_rms_cents"] < rounding * np.sqrt(1.0 + spread)
-    assert before["in_sample_rms_cents"] > rounding * np.sqrt(1.0 + spread)
-    assert after["nested_leave_one_out_rms_cents"] < 0.5 * before["nested_leave_one_out_rms_cents"]
-    assert told["claim"] is True
-    assert told["gate"]["before"] < 0.05 < told["gate"]["after"]
+    assert after.in_sample_rms_cents < rounding * np.sqrt(1.0 + spread)
+    assert before.in_sample_rms_cents > rounding * np.sqrt(1.0 + spread)
+    assert after.nested_leave_one_out_rms_cents < 0.5 * before.nested_leave_one_out_rms_cents
+    assert told.claim is True
+    assert told.gate.before < 0.05 < told.gate.after
 
 
 def test_the_simulated_clamped_plate_names_shear_or_a_group_with_it(diagnosed):
     told = diagnosed("paper-clamped-fe").diagnosis
-    assert told["verdict"] in ("named", "indistinguishable group", "none needed")
-    assert told["verdict"] == "none needed" or SHEAR in told["effects"]
+    assert told.verdict in ("named", "indistinguishable group", "none needed")
+    assert told.verdict == "none needed" or SHEAR in told.effects
 
 
 def test_the_finnish_board_supports_no_claim_and_no_poisson_ratio(diagnosed, finnish):
     told = diagnosed("finnish-spruce-cantilever").diagnosis
-    assert told["claim"] is False
-    assert "poisson_ratio" not in told["effects"]
+    assert told.claim is False
+    assert "poisson_ratio" not in told.effects
     found = search(finnish.ground)
-    assert decide(found).effects == tuple(told["effects"])
+    assert decide(found).effects == told.effects
     for factor in (2.0, 3.0):
         wider = inclusion_with_width(found, factor)
         assert wider[""] >= 0.1 or max(wider, key=wider.get) != "poisson_ratio"
@@ -75,26 +75,26 @@ def test_a_poisson_ratio_that_the_readings_drive_to_its_bound_is_not_named(simul
 def test_fiemme_names_nothing_alone(diagnosed):
     """Air, mass and tension are one group or none."""
     told = diagnosed("fiemme-spruce-clamped").diagnosis
-    assert told["verdict"] != "named"
-    assert told["claim"] is False
+    assert told.verdict != "named"
+    assert told.claim is False
 
 
 @pytest.mark.parametrize("name", ["spruce-free-2R", "spruce-free-2L"])
 def test_a_blind_board_that_is_named_or_grouped_is_so_with_shear_or_mass(diagnosed, name):
     told = diagnosed(name).diagnosis
-    if told["effects"]:
-        assert {SHEAR, "attached_mass"} & set(told["effects"])
+    if told.effects:
+        assert {SHEAR, "attached_mass"} & set(told.effects)
 
 
 def test_the_outline_is_applied_before_the_search(diagnosed):
     told = diagnosed("spruce-free-1R").diagnosis
-    assert "outline_profile" in told["declared"]
-    assert "outline_profile" not in [one["name"] for one in told["candidates"]]
+    assert "outline_profile" in told.declared
+    assert "outline_profile" not in [one.name for one in told.candidates]
 
 
 def test_a_board_whose_residual_is_far_too_large_supports_no_claim(diagnosed):
     told = diagnosed("spruce-free-3L").diagnosis
-    assert told["claim"] is False
+    assert told.claim is False
 
 
 @pytest.mark.parametrize("name", ["finnish-spruce-cantilever", "spruce-free-2R"])

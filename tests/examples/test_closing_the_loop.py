@@ -38,12 +38,12 @@ def shown_rows():
 
 def test_a_hidden_effect_is_named_and_the_error_falls(computed):
     one = computed["paper-cantilever-fe"]
-    assert one["verdict"] == "named"
-    assert one["effects"] == ["transverse_shear"]
-    assert one["claim"]
+    assert one.verdict == "named"
+    assert one.effects == ("transverse_shear",)
+    assert one.claim
     # Readings rounded to 1 Hz leave 2.9 cents rms of themselves: (1 Hz / f) / sqrt(12), averaged over the six.
-    assert one["after"]["in_sample_rms_cents"] < 3.0 < 10.0 < one["before"]["in_sample_rms_cents"]
-    assert one["after"]["nested_leave_one_out_rms_cents"] < 0.5 * one["before"]["nested_leave_one_out_rms_cents"]
+    assert one.after.in_sample_rms_cents < 3.0 < 10.0 < one.before.in_sample_rms_cents
+    assert one.after.nested_leave_one_out_rms_cents < 0.5 * one.before.nested_leave_one_out_rms_cents
 
 
 def test_the_row_is_the_one_that_is_shown(example, computed):

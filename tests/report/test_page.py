@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64decode, b64encode
+from dataclasses import replace
 from hashlib import sha256
 from html.parser import HTMLParser
 from xml.etree import ElementTree
@@ -11,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import runs
-from diagnoses import DIAGNOSES, NEXT, candidate
+from diagnoses import DIAGNOSES, NEXT, candidate, spread
 from payloads import DIRECTION_MARKS, PAYLOADS, shown
 
 from bayesplate.report.style import visible
@@ -160,11 +161,8 @@ def test_it_is_small(clamped_folder):
 @pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
 def test_a_text_stays_a_text(clamped, payload):
     """In the title, the source, and what a diagnosis says: literally, without marks that turn the writing around."""
-    found = DIAGNOSES["named"] | {
-        "recommendation": payload,
-        "candidates": [candidate(payload, payload, look_alikes=[payload], rejected_because=payload)],
-        "notes": [payload],
-    }
+    told = candidate(payload, payload, look_alikes=(payload,), rejected_because=payload)
+    found = replace(DIAGNOSES["named"], recommendation=payload, candidates=(told,), notes=(payload,))
     page = Read(clamped.page(payload, payload, found))
     expected = " ".join(shown(payload).split())
     text = " ".join(page.text.split())
@@ -208,9 +206,10 @@ def test_each_verdict_is_told_in_plain_words(clamped, verdict):
     assert ("is reduced" in text) == (verdict == "named")
 
 
-def test_constants_averaged_over_the_effects_are_shown_where_they_are_given(clamped):
-    averaged = {"E_x": {"mean": 10.25e9, "sd": 0.5e9, "q05": 9.5e9, "q95": 11.0e9, "unit": "Pa"}}
-    text = Read(clamped.page("A board", diagnosis=DIAGNOSES["named"] | {"elastic_averaged": averaged})).text
+def test_constants_averaged_over_the_effects_are_shown(clamped):
+    averaged = {"E_x": replace(spread(10.25e9), sd=0.5e9, q05=9.5e9, q95=11.0e9)}
+    found = replace(DIAGNOSES["named"], elastic_averaged=averaged)
+    text = Read(clamped.page("A board", diagnosis=found)).text
 
     assert "if any of the effects may be there" in text
     assert "10.25 ± 0.50" in text

@@ -6,12 +6,9 @@ import csv
 import io
 
 import pytest
-from diagnoses import DIAGNOSES
 from payloads import PAYLOADS
 
 from bayesplate.results.exports import (
-    before_after_csv,
-    before_after_tex,
     constants_csv,
     constants_tex,
     csv_text,
@@ -58,16 +55,6 @@ def test_no_percentile_leaves_its_cells_empty():
     assert read(constants_csv(SUMMARY | {"percentile": None}))["E_x"]["percentile_mean"] == ""
 
 
-def test_before_and_after_in_one_table():
-    rows = read(before_after_csv(DIAGNOSES["named"]))
-
-    assert rows["error in the fit, rms cents"] | {"quantity": ""} == {
-        "quantity": "", "before": "21.25", "after": "4.25", "shift_in_sd": "",
-    }  # fmt: skip
-    assert float(rows["E_x, GPa"]["before"]) == pytest.approx(10.25)
-    assert float(rows["E_x, GPa"]["shift_in_sd"]) == 2.5
-
-
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1", *PAYLOADS])
 def test_no_text_becomes_a_formula(text):
     written = csv_text([[text, -1.5, 2, None]])
@@ -89,25 +76,24 @@ def test_latex_prints_what_stands_there():
 @pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
 def test_a_title_cannot_break_the_tables(payload):
     """It stands in a comment of one line: below it the table begins, and nothing else."""
-    for table in (constants_tex(SUMMARY, payload), before_after_tex(DIAGNOSES["named"], payload)):
-        comment, begin, *_, last = table.splitlines()
+    table = constants_tex(SUMMARY, payload)
+    comment, begin, *_, last = table.splitlines()
 
-        assert comment.startswith("% ")
-        assert begin.startswith(r"\begin{tabular}")
-        assert last == r"\end{tabular}"
-        assert payload not in table or not set('\\{}$&#^_~%<>|"') & set(payload)
+    assert comment.startswith("% ")
+    assert begin.startswith(r"\begin{tabular}")
+    assert last == r"\end{tabular}"
+    assert payload not in table or not set('\\{}$&#^_~%<>|"') & set(payload)
 
 
 def test_tables_have_as_many_cells_as_columns():
-    for table in (constants_tex(SUMMARY, "x"), before_after_tex(DIAGNOSES["named"], "x")):
-        rows = [line for line in table.splitlines() if line.endswith(r"\\")]
-        columns = table.splitlines()[1].rpartition("{")[2].rstrip("}")
+    table = constants_tex(SUMMARY, "x")
+    rows = [line for line in table.splitlines() if line.endswith(r"\\")]
+    columns = table.splitlines()[1].rpartition("{")[2].rstrip("}")
 
-        assert {row.count(" & ") + 1 for row in rows} == {len(columns)}
-    assert r"$E_{x}$ & $10.50 \pm 0.25$ & 10.00 to 11.00 & 10.25 & 10.25 \\" in constants_tex(SUMMARY, "x")
+    assert {row.count(" & ") + 1 for row in rows} == {len(columns)}
+    assert r"$E_{x}$ & $10.50 \pm 0.25$ & 10.00 to 11.00 & 10.25 & 10.25 \\" in table
 
 
 def test_the_files(tmp_path):
     assert [path.name for path in write_exports(tmp_path, SUMMARY, "x")] == ["constants.csv", "constants.tex"]
-    assert len(write_exports(tmp_path, SUMMARY, "x", DIAGNOSES["named"])) == 4
-    assert len(list(tmp_path.iterdir())) == 4
+    assert len(list(tmp_path.iterdir())) == 2

@@ -40,6 +40,9 @@ ROOMS = {
     **dict.fromkeys(OPEN_TO_ALL, OPEN_TO_ALL),
 }
 
+WITHIN = {"diagnosis": ("shifts", "evidence", "decision", "wording")}
+"""Folders that are divided again: each part sees the parts before it, and every file stands in one."""
+
 DOORS = {
     "emcee": "posterior",
     "skfem": "modes",
@@ -81,6 +84,10 @@ def _import_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
     if room not in ROOMS:
         yield 1, f"stands in no known room: {room}"
         return
+    inner = inside.parts[1] if len(inside.parts) > 2 else ""
+    if room in WITHIN and inner not in WITHIN[room] and inside.name != "__init__.py":
+        yield 1, f"stands in no known part of {room}"
+        return
     for item in _imports(tree):
         parts = item.module.split(".")
         if not parts[0]:
@@ -89,12 +96,19 @@ def _import_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
             target = parts[1] if len(parts) > 1 else "__init__"
             if target not in ROOMS[room]:
                 yield item.line, f"{room} imports {target}"
+            elif target == room in WITHIN and len(parts) > 2 and _comes_later(parts[2], inner, WITHIN[room]):
+                yield item.line, f"{room}.{inner} imports {room}.{parts[2]}".replace(". ", " ")
         elif parts[0] in EXECUTES_DATA:
             yield item.line, f"imports {parts[0]}"
         elif DOORS.get(parts[0], room) != room:
             yield item.line, f"{room} imports {parts[0]}, which belongs to {DOORS[parts[0]]}"
         if item.is_at_top and any(f"{item.module}.".startswith(f"{heavy}.") for heavy in ONLY_WHERE_NEEDED):
             yield item.line, f"imports {item.module} at the top"
+
+
+def _comes_later(target: str, inner: str, order: tuple[str, ...]) -> bool:
+    """Whether a part of a room stands after the one that imports it; nothing comes before the room's own file."""
+    return target in order and (inner not in order or order.index(target) > order.index(inner))
 
 
 def _imports(tree: ast.Module) -> Iterator[Import]:
@@ -106,7 +120,7 @@ def _imports(tree: ast.Module) -> Iterator[Import]:
         elif isinstance(node, ast.ImportFrom):
             module = "." * node.level + (node.module or "")
             # `from scipy import stats` and `from bayesplate import modes` name a module after the word import
-            names_module = module in {"scipy", "bayesplate"}
+            names_module = module in {"scipy", "bayesplate", *(f"bayesplate.{room}" for room in WITHIN)}
             names = [f"{module}.{alias.name}" if names_module else module for alias in node.names]
             yield from (Import(name, node.lineno, is_at_top) for name in dict.fromkeys(names))
         elif isinstance(node, ast.Call) and _called(node) in {"import_module", "__import__"}:
@@ -191,6 +205,28 @@ BAD_FILES = [
     ("batch.py", "from bayesplate.cli import main", "batch imports cli"),
     ("errors.py", "from bayesplate.cards.board import BoardCard", "errors imports cards"),
     ("gadgets/bad.py", "", "stands in no known room: gadgets"),
+    ("diagnosis/bad.py", "", "stands in no known part of diagnosis"),
+    ("diagnosis/gadgets/bad.py", "", "stands in no known part of diagnosis"),
+    (
+        "diagnosis/shifts/bad.py",
+        "from bayesplate.diagnosis.evidence.search import Found",
+        "diagnosis.shifts imports diagnosis.evidence",
+    ),
+    (
+        "diagnosis/evidence/bad.py",
+        "from bayesplate.diagnosis import decision",
+        "diagnosis.evidence imports diagnosis.decision",
+    ),
+    (
+        "diagnosis/decision/__init__.py",
+        "import bayesplate.diagnosis.wording.told",
+        "diagnosis.decision imports diagnosis.wording",
+    ),
+    (
+        "diagnosis/__init__.py",
+        "from bayesplate.diagnosis.shifts.laws import form_law",
+        "diagnosis imports diagnosis.shifts",
+    ),
     ("modes/bad.py", "from . import plate", "imports relatively"),
     ("modes/bad.py", "def f():\n    import emcee", "modes imports emcee, which belongs to posterior"),
     ("posterior/bad.py", "import emcee", "imports emcee at the top"),
@@ -213,7 +249,7 @@ BAD_FILES = [
 def test_fabricated_fault_is_reported(tmp_path, place, code, fault):
     """The negative control: each rule must catch a file that breaks it, and name only that fault."""
     path = tmp_path / place
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(f'"""A caption."""\n\n{code}\n')
 
     (found,) = faults(tmp_path)

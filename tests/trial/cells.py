@@ -121,7 +121,7 @@ def fingerprint() -> str:
     part of it.
     """
     root = Path(__file__).resolve().parents[2]
-    files = [file for folder in _DECIDING for file in sorted((root / folder).glob("*.py"))]
+    files = [file for folder in _DECIDING for file in sorted((root / folder).rglob("*.py"))]
     files = [file for file in files if not file.name.startswith("test_")]
     digest = hashlib.sha256()
     for file in [*files, *(root / "tests" / "trial" / name for name in _OWN)]:

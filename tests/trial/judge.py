@@ -20,12 +20,12 @@ from generator.designs import MEDIANS
 from trial.amplitudes import recovered
 from trial.cells import KINDS, SENSORS, UNKNOWN, Cell
 
-from bayesplate.diagnosis.baseline import Baseline, baseline_at
-from bayesplate.diagnosis.constants import ConstantDraws, draw_constants
-from bayesplate.diagnosis.forms import Form, forms
-from bayesplate.diagnosis.laws import FormLaw, form_law
-from bayesplate.diagnosis.search import Found, Ground, prepare_search, search
-from bayesplate.diagnosis.verdict import Verdict, alternatives, answers, decide
+from bayesplate.diagnosis.decision.constants import ConstantDraws, draw_constants
+from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answers, decide
+from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
+from bayesplate.diagnosis.shifts.baseline import Baseline, baseline_at
+from bayesplate.diagnosis.shifts.forms import Form, forms
+from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.plate.material import MODULI

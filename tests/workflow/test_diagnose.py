@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -12,9 +13,12 @@ from click.testing import CliRunner
 from runs import files_in, read_json
 
 from bayesplate.cli import main
-from bayesplate.diagnosis.search import prepare_search
+from bayesplate.diagnosis.evidence.search import prepare_search
+from bayesplate.errors import InputError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.workflow.diagnose import diagnose as run_diagnose
+from bayesplate.workflow.fit import fit
 
 WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
@@ -41,11 +45,12 @@ def diagnose(folder: Path, *arguments: str) -> runs.Run:
     return runs.Run(result.exit_code, result.stdout, result.stderr, folder)
 
 
-def quickly(patch: pytest.MonkeyPatch) -> None:
-    """Two candidates, and a sampler whose first judgement passes."""
+def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
+    """Two candidates, and a sampler whose first judgement passes; a page only where it is asked for."""
     patch.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
     patch.setattr("bayesplate.workflow.diagnose.prepare_search", partial(prepare_search, tried=TRIED))
-    patch.setattr("bayesplate.workflow.diagnose.write_page", lambda *_: None)
+    if not page:
+        patch.setattr("bayesplate.workflow.diagnose.write_page", lambda *_: None)
 
 
 @pytest.fixture
@@ -163,7 +168,11 @@ def test_what_somebody_else_keeps_in_before_stays(tmp_path, quick):
 
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    [(("no-such-board",), 3), ((CALM, "--effects", "no_such_effect"), 3), ((CALM, "--force", "--resume"), 2)],
+    [
+        (("no-such-board",), 3),
+        ((CALM, "--effects", "no_such_effect"), 3),
+        ((CALM, "--force", "--resume"), 2),
+    ],
 )
 def test_refused_input_leaves_no_folder(tmp_path, arguments, code):
     run = diagnose(tmp_path / "out", *arguments)
@@ -172,14 +181,50 @@ def test_refused_input_leaves_no_folder(tmp_path, arguments, code):
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.parametrize("command", [run_diagnose, fit])
+def test_settings_that_cannot_be_sampled_leave_no_folder(tmp_path, command):
+    """Fit and diagnose open their folder in one way: after everything that may be refused."""
+    with pytest.raises(InputError, match="seed"):
+        command(CALM, out=tmp_path / "out", seed=-1)
+    assert not (tmp_path / "out").exists()
+
+
+def card_of_few(folder: Path, board: str, labels: Sequence[str]) -> str:
+    """A shipped card with the readings of a few labels only."""
+    lines = (Path(runs.__file__).parents[1] / f"models/boards/{board}.toml").read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith('"(') or line.split('"')[1] in labels]
+    card = folder / "few.toml"
+    card.write_text("\n".join(kept).replace(f'"{board}"', '"few"') + "\n", encoding="utf-8")
+    return str(card)
+
+
 def test_too_few_readings_leave_no_folder(tmp_path):
-    lines = (Path(runs.__file__).parents[1] / "models/boards/fiemme-spruce-clamped.toml").read_text().splitlines()
-    card = tmp_path / "few.toml"
-    kept = [line for line in lines if not line.startswith(('"(0,1)', '"(1,0)', '"(1,1)', '"(1,2)'))]
-    card.write_text("\n".join(kept).replace(CALM, "few") + "\n", encoding="utf-8")
-    run = diagnose(tmp_path / "out", str(card))
+    run = diagnose(tmp_path / "out", card_of_few(tmp_path, CALM, ("(0,0)", "(0,2)")))
     assert run.exit_code == 4
     assert not run.folder.exists()
+
+
+def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypatch):
+    """The fit is there with its page; what a search would tell is null, and is said to be."""
+    with monkeypatch.context() as patch:
+        quickly(patch, page=True)
+        card = card_of_few(tmp_path, "finnish-spruce-cantilever", ("(1,0)", "(1,1)", "(1,2)"))
+        run = diagnose(tmp_path / "out", card)
+    assert run.exit_code == 0, run.stderr
+    found = told(run)
+    assert set(run.files) >= FIT | {"diagnosis.json", "report.html", "before-after.csv"}
+    assert len(run.summary["modes"]) == 3
+    assert (found["verdict"], found["effects"], found["refitted"], found["claim"]) == ("undetectable", [], [], False)
+    assert "three modes" in found["reason"]
+    assert "leave nothing to judge by" in " ".join(run.stdout.split())
+    assert set(found) >= KEYS
+    missing = {name for name, value in found["before"].items() if value is None}
+    assert missing == {"leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score"}
+    assert found["before"] == found["after"]
+    assert found["gain_null_percentile"] is None
+    assert found["gate"] == {"before": None, "after": None}
+    assert [one["below_sight"] for one in found["candidates"][:2]] == [True, True]
+    assert found["recommendation"].startswith("Measure ")
 
 
 def test_there_is_nothing_to_resume(tmp_path):

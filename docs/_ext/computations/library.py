@@ -12,12 +12,12 @@ import numpy as np
 import bayesplate
 from bayesplate import errors
 from bayesplate.cards.shelf import card_names
-from bayesplate.diagnosis.folds import NEEDED
-from bayesplate.diagnosis.gate import PASSES
-from bayesplate.diagnosis.hypotheses import NONE, ONE, TWO
-from bayesplate.diagnosis.null_control import CLAIM_QUANTILE, N_SETS
-from bayesplate.diagnosis.signatures import LOOK_ALIKE
-from bayesplate.diagnosis.verdict import AT_LIMIT, CLEARLY, WITHIN
+from bayesplate.diagnosis.decision.verdict import AT_LIMIT, CLEARLY, WITHIN
+from bayesplate.diagnosis.evidence.folds import NEEDED
+from bayesplate.diagnosis.evidence.gate import PASSES
+from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, TWO
+from bayesplate.diagnosis.evidence.null_control import CLAIM_QUANTILE, N_SETS
+from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.diagnosis.signatures import cosine, signatures
+from bayesplate.diagnosis.shifts.signatures import cosine, signatures
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.inference import pose
 from bayesplate.workflow.prepare import prepare

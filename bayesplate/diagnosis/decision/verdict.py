@@ -1,0 +1,218 @@
+"""The verdict: one of five words, by rules that are the same for every board."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.evidence.folds import NEEDED
+from bayesplate.diagnosis.evidence.gate import PASSES
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.effects.words import effect_names
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+Word = Literal["none needed", "named", "indistinguishable group", "unexplained", "undetectable"]
+
+CLEARLY = 3.0
+"""How many times more probable the best must be than the next to be named, and a pair than its better member."""
+WITHIN = 10.0
+"""Alternatives up to this factor below the best are listed with it."""
+AT_LIMIT = 0.005
+"""Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
+
+NOTHING_LEFT = "three modes determine the three constants and leave nothing to judge by"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One way to explain a residual: a single effect or a pair, with the support that it has.
+
+    Attributes
+    ----------
+    members : tuple of str
+    index : int
+        Of its hypothesis.
+    support : float
+        Its probability, and that of pairs that say little more than it.
+    """
+
+    members: tuple[str, ...]
+    index: int
+    support: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the readings allow to say.
+
+    Attributes
+    ----------
+    word : str
+        "none needed", "named", "indistinguishable group", "unexplained" or "undetectable".
+    effects : tuple of str
+        Named: all of them are present. Group: each is an alternative.
+    index : int
+        Hypothesis to refit; 0 if the model stays as it is.
+    best : Answer or None
+        The most probable answer, whatever the verdict.
+    reason : str
+    """
+
+    word: Word
+    effects: tuple[str, ...]
+    index: int
+    best: Answer | None
+    reason: str
+
+
+def answers(found: Found) -> tuple[Answer, ...]:
+    """Single effects and pairs by their support, best first.
+
+    A pair stands for itself only if it is three times as probable as its better member alone; otherwise it says no more
+    than that member, which gets its probability.
+    """
+    support: dict[int, float] = {}
+    singles = {
+        one.members[0]: i for i, one in enumerate(found.ground.hypotheses) if len(one.members) == 1 and not one.swap
+    }
+    swaps = [i for i, one in enumerate(found.ground.hypotheses) if one.swap]
+    for i in (*singles.values(), *swaps):
+        support[i] = float(found.probability[i])
+    for i, one in enumerate(found.ground.hypotheses):
+        if len(one.members) != 2:
+            continue
+        better = max((singles[name] for name in one.members), key=lambda j: float(found.probability[j]))
+        share = float(found.probability[i])
+        if share >= CLEARLY * float(found.probability[better]):
+            support[i] = share
+        else:
+            support[better] += share
+    listed = [Answer(found.ground.hypotheses[i].members, i, value) for i, value in support.items()]
+    return tuple(sorted(listed, key=lambda answer: -answer.support))
+
+
+def decide(found: Found) -> Verdict:
+    """The verdict on one set of readings.
+
+    Parameters
+    ----------
+    found : Found
+
+    Returns
+    -------
+    Verdict
+    """
+    ranked = answers(found)
+    best = ranked[0] if ranked else None
+    if not found.ground.n_directions:
+        return Verdict("undetectable", (), 0, best, NOTHING_LEFT)
+    if found.none >= NEEDED or best is None:
+        return _without(found, best)
+    passed = found.passes(best.index)
+    if passed < PASSES:
+        return Verdict(
+            "unexplained",
+            (),
+            0,
+            best,
+            f"with {effect_names(best.members)} the misfit is still too large (gate {passed:.3f})",
+        )
+    limit = at_limit(found, best.index)
+    if limit:
+        return Verdict(
+            "unexplained", (), 0, best, f"{effect_names(best.members)} fits only at the limit of its range: {limit}"
+        )
+    rivals = [one for one in ranked[1:] if one.support * WITHIN >= best.support]
+    nearest = max((one.support for one in rivals), default=0.0)
+    if best.support >= CLEARLY * nearest:
+        return Verdict(
+            "named", best.members, best.index, best, f"{effect_names(best.members)} has no rival within a factor 3"
+        )
+    group = tuple(dict.fromkeys(name for one in (best, *rivals) for name in one.members))
+    return Verdict(
+        "indistinguishable group", group, best.index, best, "several explanations are about equally probable"
+    )
+
+
+def _without(found: Found, best: Answer | None) -> Verdict:
+    """No effect is probable enough: the bare model passes, cannot be questioned, or fails without a reason."""
+    passed = found.passes(0)
+    if passed < PASSES:
+        reason = f"the misfit is too large for the noise (gate {passed:.3f}), but no effect is probable enough"
+        return Verdict("unexplained", (), 0, best, reason)
+    hidden = all(found.ground.is_below_sight(name) for name in found.ground.candidates)
+    if found.ground.candidates and hidden:
+        return Verdict("undetectable", (), 0, best, "every effect is below what these readings could show")
+    return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave (gate {passed:.3f})")
+
+
+def at_limit(found: Found, index: int) -> str:
+    """Which size of a hypothesis sits at the limit of its range; empty if none does.
+
+    A size that may be zero is not at a limit there: zero is no effect.
+    """
+    hypothesis = found.ground.hypotheses[index]
+    for place, name in enumerate(hypothesis.members):
+        if name not in found.ground.candidates:
+            continue
+        candidate = found.ground.candidates[name]
+        for law_index, law in enumerate(candidate.laws):
+            for i, free in enumerate(law.form.free):
+                shares, z = size_posterior(found, index, place, law_index, i)
+                if shares.sum() < 0.5:
+                    continue
+                order = np.argsort(z)
+                median = z[order][np.searchsorted(np.cumsum(shares[order]), 0.5 * shares.sum())]
+                if _is_extreme(free.prior, float(median)):
+                    return f"{free.key} = {float(free.prior.value(median)):.3g} {free.unit}".removesuffix(" 1")
+    return ""
+
+
+def size_posterior(found: Found, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
+    """Probability and standard coordinate of each cell of a member's form, under one hypothesis.
+
+    Parameters
+    ----------
+    found : Found
+    index : int
+        Of the hypothesis.
+    member : int
+        0 or 1: which of its effects.
+    form, parameter : int
+        Which form of that effect, and which of its parameters.
+    """
+    ground, hypothesis = found.ground, found.ground.hypotheses[index]
+    terms = hypothesis.terms(ground.whole)
+    log_density = terms.log_densities(hypothesis.seen(ground.baseline, found.residual[None, :]))[:, 0]
+    by_cell = normalised(log_density).reshape(hypothesis.noise.weights.size, -1).sum(axis=0)
+    if len(hypothesis.members) == 1:
+        own = hypothesis.table
+    else:
+        tables = [ground.candidates[name].coarse for name in hypothesis.members]
+        by_cell = by_cell.reshape(tables[0].n_cells, tables[1].n_cells).sum(axis=1 - member)
+        own = tables[member]
+    of_form = own.form == form
+    return by_cell[of_form], own.z[of_form, parameter]
+
+
+def _is_extreme(prior: Quantity, z: float) -> bool:
+    """Whether hardly any of a prior lies between a size and a bound; a zero that means no effect is no bound."""
+    from scipy.special import ndtr
+
+    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    whole = ndtr(high) - ndtr(low)
+    starts_at_nothing = prior.lower == 0.0 and prior.mean == 0.0
+    near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
+    near_bottom = np.isfinite(low) and not starts_at_nothing and (ndtr(z) - ndtr(low)) / whole < AT_LIMIT
+    return bool(near_top or near_bottom)
+
+
+def alternatives(found: Found, ranked: Sequence[Answer]) -> tuple[Answer, ...]:
+    """Answers within a factor ten of the best."""
+    return tuple(one for one in ranked if one.support * WITHIN >= ranked[0].support)

@@ -1,0 +1,150 @@
+"""What may be the case: nothing, one effect, two, or two labels exchanged; and how probable each is beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.evidence.terms import Fold, Terms, normalised
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.tables import Table, nothing, together
+
+Floats = NDArray[np.float64]
+
+NONE, ONE, TWO = 0.5, 0.4, 0.1
+"""Prior probability that nothing, one effect, or two are behind a residual; each shared equally by those tried."""
+
+RELABELLING = "relabelling"
+CLOSE = 0.12
+"""ln of a frequency ratio up to which neighbouring readings of different symmetry may have been confused."""
+
+
+@dataclass(frozen=True)
+class Swap:
+    """Two readings whose labels may have been exchanged: indices among all readings."""
+
+    first: int
+    second: int
+
+    def applied(self, baseline: Baseline, residuals: Floats) -> Floats:
+        """Residuals with the two readings exchanged: (n_sets, n_modes) arrays."""
+        readings = residuals + baseline.log_frequency
+        readings[:, [self.first, self.second]] = readings[:, [self.second, self.first]]
+        return readings - baseline.log_frequency
+
+    def in_fold(self, fold: Fold) -> Fold:
+        """The fold that leaves out the same reading where the two are exchanged: it stands under the other label."""
+        exchanged = {self.first: self.second, self.second: self.first}
+        return fold if fold.left_out not in exchanged else Fold(fold.baseline, exchanged[fold.left_out])
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One thing that may be the case.
+
+    Attributes
+    ----------
+    members : tuple of str
+        Effects that are present; empty for none.
+    prior : float
+    table : Table
+    noise : NoiseGrid
+    swap : Swap or None
+    """
+
+    members: tuple[str, ...]
+    prior: float
+    table: Table
+    noise: NoiseGrid
+    swap: Swap | None = None
+
+    def terms(self, fold: Fold) -> Terms:
+        """Normal terms in a fold, which names the reading that is left out by its place on the card."""
+        return Terms(self.table, fold if self.swap is None else self.swap.in_fold(fold), self.noise)
+
+    def seen(self, baseline: Baseline, residuals: Floats) -> Floats:
+        """Residuals as this hypothesis reads them."""
+        return residuals if self.swap is None else self.swap.applied(baseline, residuals.copy())
+
+
+def hypotheses(
+    baseline: Baseline, fine: Mapping[str, Table], coarse: Mapping[str, Table], paired: Sequence[str]
+) -> tuple[Hypothesis, ...]:
+    """Every hypothesis about a board: none first, then single effects, exchanged labels, and pairs.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    fine, coarse : dict of Table
+        By effect; coarse ones are combined.
+    paired : sequence of str
+        Effects that may be one of two: those whose visible part could be seen at all. A pair costs nothing for a
+        member that cannot be seen, so that every effect would seem to come with an invisible one.
+    """
+    levels, few = noise_grid(baseline.board), noise_grid(baseline.board, few=True)
+    empty = nothing(baseline.n_modes)
+    swaps = confusable(baseline)
+    pairs = list(combinations([name for name in fine if name in paired], 2))
+    each = ONE / max(len(fine) + bool(swaps), 1)
+    found = [Hypothesis((), NONE, empty, levels)]
+    found += [Hypothesis((name,), each, table, levels) for name, table in fine.items()]
+    found += [Hypothesis((RELABELLING,), each / len(swaps), empty, levels, swap) for swap in swaps]
+    found += [
+        Hypothesis((one, other), TWO / len(pairs), together(coarse[one], coarse[other]), few) for one, other in pairs
+    ]
+    return tuple(found)
+
+
+def confusable(baseline: Baseline) -> tuple[Swap, ...]:
+    """Neighbouring readings of one setup that belong to different symmetry classes and lie close together.
+
+    Within a class exchanging two labels changes nothing: a label means the rank within its class, and the lower reading
+    is the lower mode whatever it is called.
+    """
+    readings = baseline.residual + baseline.log_frequency
+    swaps = []
+    for setup in range(len(baseline.board.setups)):
+        members = np.flatnonzero(baseline.setup_index == setup)
+        ordered = members[np.argsort(readings[members])]
+        for first, second in pairwise(ordered):
+            differ = baseline.places[first].parity != baseline.places[second].parity
+            if differ and readings[second] - readings[first] < CLOSE:
+                swaps.append(Swap(int(first), int(second)))
+    return tuple(swaps)
+
+
+def order_conflicts(baseline: Baseline) -> tuple[str, ...]:
+    """Readings of one symmetry class that stand in another order than the modes they are called after.
+
+    Modes of one class do not cross: at a veering they exchange their figures, and a board that lacks something may show
+    the figures the other way round than the ideal one that is fitted to it. No search can mend that; it is said.
+    """
+    readings = baseline.residual + baseline.log_frequency
+    names = [f"{label}" for setup in baseline.board.setups for label in setup.labels]
+    sentences = []
+    for first, second in combinations(range(baseline.n_modes), 2):
+        one, other = baseline.places[first], baseline.places[second]
+        same = baseline.setup_index[first] == baseline.setup_index[second] and one.parity == other.parity
+        if same and (one.rank - other.rank) * (readings[first] - readings[second]) < 0:
+            sentences.append(
+                f"the readings {names[first]} and {names[second]} stand in the other order than these modes of the "
+                "fitted plate: compare their figures again, or fit with the two labels exchanged"
+            )
+    return tuple(sentences)
+
+
+def log_evidences(found: Sequence[Hypothesis], fold: Fold, residuals: Floats) -> Floats:
+    """Logarithm of the evidence of every hypothesis for every data set: (n_hypotheses, n_sets) array."""
+    return np.stack([one.terms(fold).log_evidence(one.seen(fold.baseline, residuals)) for one in found])
+
+
+def probabilities(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
+    """Posterior probabilities, summing to one over the hypotheses: same shape as the evidences."""
+    log_prior = np.log([one.prior for one in found])
+    total = evidences + log_prior.reshape(-1, *([1] * (evidences.ndim - 1)))
+    return normalised(total)

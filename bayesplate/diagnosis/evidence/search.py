@@ -1,0 +1,162 @@
+"""The search: from tables of shifts to the probability of every hypothesis and every effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.evidence.gate import gate
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, hypotheses, log_evidences, probabilities
+from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.forms import Form, forms
+from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
+from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate
+
+Floats = NDArray[np.float64]
+Solve = Callable[[Baseline, Form], FormLaw]
+"""Makes the law of a form around a baseline."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect that is tried.
+
+    Attributes
+    ----------
+    name : str
+    laws : tuple of FormLaw
+        Of its forms.
+    fine, coarse : Table
+    raw, visible : (n_modes,) array
+        Shift at nominal size before and after the constants are refitted, ln f; of the form that shows most.
+    moved : (3,) array
+        Change of ln D by that refit.
+    """
+
+    name: str
+    laws: tuple[FormLaw, ...]
+    fine: Table
+    coarse: Table
+    raw: Floats
+    visible: Floats
+    moved: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Everything about a board that a search needs, whatever the readings turn out to be.
+
+    Attributes
+    ----------
+    baseline : Baseline
+    candidates : dict of Candidate
+    hypotheses : tuple of Hypothesis
+    """
+
+    baseline: Baseline
+    candidates: Mapping[str, Candidate]
+    hypotheses: tuple[Hypothesis, ...]
+
+    @cached_property
+    def whole(self) -> Fold:
+        """The fold that uses all readings."""
+        return Fold(self.baseline)
+
+    @property
+    def n_directions(self) -> int:
+        """Directions of the readings that the three constants cannot reach, and that are left to judge by."""
+        return len(self.whole.blind)
+
+    def visibility(self, name: str) -> float:
+        """Visible rms of a candidate in units of the rms that drowns in the noise: 2 noise / sqrt(n)."""
+        seen = self.baseline.whitened(self.candidates[name].visible)
+        return float(np.sqrt(np.mean(seen**2) * self.baseline.n_modes)) / 2.0
+
+    def is_below_sight(self, name: str) -> bool:
+        """Whether this experiment could not see a candidate even if it were there."""
+        return self.visibility(name) < 1.0
+
+    def cosine(self, one: str, other: str) -> float:
+        """Likeness of the visible parts of two candidates, -1 to 1; 0 where nothing is visible."""
+        first, second = (self.baseline.whitened(self.candidates[name].visible) for name in (one, other))
+        norms = float(np.linalg.norm(first) * np.linalg.norm(second))
+        return float(first @ second) / norms if norms > 0 and self.n_directions else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search finds in one set of readings.
+
+    Attributes
+    ----------
+    ground : Ground
+    residual : (n_modes,) array
+        ln measured less ln f of the baseline.
+    log_evidence, probability : (n_hypotheses,) array
+    """
+
+    ground: Ground
+    residual: Floats
+    log_evidence: Floats
+    probability: Floats
+
+    @property
+    def none(self) -> float:
+        """Probability that nothing is lacking."""
+        return float(self.probability[0])
+
+    def inclusion(self, name: str) -> float:
+        """Probability that an effect is present, alone or with another."""
+        present = [name in one.members for one in self.ground.hypotheses]
+        return float(self.probability[present].sum())
+
+    def passes(self, index: int) -> float:
+        """The gate of a hypothesis."""
+        return float(gate(self.ground.hypotheses[index], self.ground.whole, self.residual[None, :])[0])
+
+
+def prepare_search(baseline: Baseline, solve: Solve | None = None, tried: Sequence[str] | None = None) -> Ground:
+    """Tabulate every candidate of a board.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    solve : callable, optional
+        By default full solves around the baseline.
+    tried : sequence of str, optional
+        Effects to try; by default all that are not declared and can act.
+
+    Returns
+    -------
+    Ground
+    """
+    solve = form_law if solve is None else solve
+    candidates = {}
+    for name, each in forms(baseline.board).items():
+        if tried is None or name in tried:
+            laws = tuple(solve(baseline, form).placed(baseline) for form in each)
+            candidates[name] = _candidate(baseline, name, laws)
+    ground = Ground(baseline, candidates, ())
+    fine = {name: one.fine for name, one in candidates.items()}
+    coarse = {name: one.coarse for name, one in candidates.items()}
+    paired = [name for name in candidates if not ground.is_below_sight(name)]
+    return Ground(baseline, candidates, hypotheses(baseline, fine, coarse, paired))
+
+
+def search(ground: Ground, residual: Floats | None = None) -> Found:
+    """Judge one set of readings: those of the board, or others given by their residual."""
+    residual = ground.baseline.residual if residual is None else residual
+    evidence = log_evidences(ground.hypotheses, ground.whole, residual[None, :])
+    return Found(ground, residual, evidence[:, 0], probabilities(ground.hypotheses, evidence)[:, 0])
+
+
+def _candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Candidate:
+    shifts = [nominal_shift(baseline, law) for law in laws]
+    raw, visible, moved = max(shifts, key=lambda three: float(np.nansum(three[1] ** 2)))
+    fine, coarse = tabulate(baseline, name, laws), tabulate(baseline, name, laws, COARSE)
+    return Candidate(name, laws, fine, coarse, raw, visible, moved)

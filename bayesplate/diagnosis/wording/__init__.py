@@ -1,0 +1,1 @@
+"""A diagnosis as one result, and what people read of it."""

@@ -1,0 +1,166 @@
+"""Each candidate of a diagnosis: what it would do, how probable it is, and why it was rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
+from bayesplate.diagnosis.evidence.folds import NEEDED
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.diagnosis.evidence.search import Candidate, Found
+from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
+from bayesplate.diagnosis.wording.diagnosis import Amplitude, EffectEntry, ExchangeEntry, Fate
+from bayesplate.effects import EFFECTS
+from bayesplate.effects.words import effect_names
+from bayesplate.frequencies.laws import cents
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.results.draws import finite
+
+Floats = NDArray[np.float64]
+
+
+def effect_entry(
+    found: Found, verdict: Verdict, ranked: Sequence[Answer], one: Candidate, doubled: float
+) -> EffectEntry:
+    """What there is to say of a candidate effect.
+
+    Parameters
+    ----------
+    found : Found
+    verdict : Verdict
+    ranked : sequence of Answer
+        Best first.
+    one : Candidate
+    doubled : float
+        Its inclusion probability with the width of every amplitude prior doubled.
+    """
+    ground = found.ground
+    index = next(i for i, other in enumerate(ground.hypotheses) if other.members == (one.name,))
+    gained = float(found.log_evidence[index] - found.log_evidence[0])
+    best_fit = _best_fit(found, index) - _best_fit(found, 0)
+    fate, because = _fate(found, verdict, ranked, one.name)
+    return EffectEntry(
+        name=one.name,
+        setup=_where(one),
+        raw_rms_cents=finite(rms(cents(one.raw))),
+        visible_rms_cents=finite(rms(cents(one.visible))),
+        visible_cents=tuple(finite(float(value)) for value in cents(one.visible)),
+        below_sight=ground.is_below_sight(one.name),
+        bias_percent=_bias(found, one),
+        inclusion_probability=found.inclusion(one.name),
+        inclusion_probability_with_doubled_priors=doubled,
+        log_bayes_factor=gained,
+        ockham_log_factor=gained - best_fit,
+        gate=gate_of(found, index),
+        amplitude=_amplitude(found, index, one),
+        look_alikes=tuple(
+            other
+            for other in ground.candidates
+            if other != one.name and abs(ground.cosine(one.name, other)) > LOOK_ALIKE
+        ),
+        rejected_because=because,
+        fate=fate,
+    )
+
+
+def exchange_entries(found: Found, verdict: Verdict) -> tuple[ExchangeEntry, ...]:
+    """Exchanged labels, as one candidate each."""
+    ground = found.ground
+    labels = [f"{label}" for setup in ground.baseline.board.setups for label in setup.labels]
+    entries = []
+    for i, one in enumerate(ground.hypotheses):
+        if one.swap is None:
+            continue
+        setup = ground.baseline.board.setups[ground.baseline.setup_index[one.swap.first]]
+        is_accepted = i == verdict.index or RELABELLING in verdict.effects
+        fate: Fate = "not needed" if found.none >= NEEDED else "less probable"
+        entries.append(
+            ExchangeEntry(
+                setup=setup.name,
+                labels=(labels[one.swap.first], labels[one.swap.second]),
+                inclusion_probability=float(found.probability[i]),
+                log_bayes_factor=float(found.log_evidence[i] - found.log_evidence[0]),
+                rejected_because=None if is_accepted else "exchanging the labels does not make the readings likelier",
+                fate="in the verdict" if is_accepted else fate,
+            )
+        )
+    return tuple(entries)
+
+
+def gate_of(found: Found, index: int) -> float | None:
+    """The gate of a hypothesis; None where the constants meet every reading, so that there is no misfit to judge."""
+    return found.passes(index) if found.ground.n_directions else None
+
+
+def _where(one: Candidate) -> str:
+    form = one.laws[0].form
+    if EFFECTS[one.name].scope == "board":
+        return "board"
+    names = [setup.name for setup in form.board.setups if not EFFECTS[one.name].refusal(form.board, setup)]
+    return ", ".join(names)
+
+
+def _bias(found: Found, one: Candidate) -> dict[str, float]:
+    """What ignoring the effect at its nominal size does to the moduli, percent."""
+    values = found.ground.baseline.values
+    fitted = {name: float(values[name]) for name in RIGIDITIES}
+    true = {name: v * float(np.exp(m)) for (name, v), m in zip(fitted.items(), one.moved, strict=True)}
+    thickness, nu_xy = values["thickness"], values["poisson_xy"]
+    ignoring, knowing = (
+        moduli(np.asarray(D["D_x"]), np.asarray(D["D_y"]), np.asarray(D["D_s"]), thickness, nu_xy)
+        for D in (fitted, true)
+    )
+    return {n: 100.0 * float(a / b - 1.0) for n, a, b in zip(MODULI, ignoring, knowing, strict=True)}
+
+
+def _best_fit(found: Found, index: int) -> float:
+    """Log density at the best size, noise averaged: what the evidence would be without the width of the prior."""
+    hypothesis = found.ground.hypotheses[index]
+    seen = hypothesis.seen(found.ground.baseline, found.residual[None, :])
+    log_density = hypothesis.terms(found.ground.whole).log_densities(seen)[:, 0]
+    by_cell = log_density.reshape(hypothesis.noise.weights.size, -1)
+    top = by_cell.max(axis=0)
+    with np.errstate(divide="ignore"):
+        summed = top + np.log(np.exp(by_cell - top).sum(axis=0)) - np.log(hypothesis.table.weights)
+    return float(summed[hypothesis.table.weights > 0].max()) - found.ground.whole.half_log_det
+
+
+def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
+    """Quantiles of the first free parameter of the most probable form, given that the effect is there."""
+    if not one.laws[0].form.free:
+        return None
+    shares = [size_posterior(found, index, 0, form, 0) for form in range(len(one.laws))]
+    best = int(np.argmax([share.sum() for share, _ in shares]))
+    free = one.laws[best].form.free[0]
+    share, z = shares[best]
+    order = np.argsort(z)
+    cumulated = np.cumsum(share[order]) - 0.5 * share[order]
+    quantiles = np.interp([0.05, 0.5, 0.95], cumulated / share.sum(), z[order])
+    low, middle, high = (float(free.prior.value(q)) for q in quantiles)
+    return Amplitude(
+        parameter=free.key, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit
+    )
+
+
+def _fate(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str) -> tuple[Fate, str | None]:
+    """What became of a candidate, and why it was rejected."""
+    if name in verdict.effects:
+        return "in the verdict", None
+    if found.ground.is_below_sight(name):
+        return "below sight", "its visible part is below what these readings could show"
+    if found.none >= NEEDED:
+        fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
+        return fate, f"{fate}: nothing lacking has a probability of {found.none:.2f}"
+    if verdict.word == "unexplained" and verdict.best is not None and name in verdict.best.members:
+        return "does not fit", verdict.reason
+    best = ranked[0]
+    told = f"less probable ({found.inclusion(name):.3f}) than {effect_names(best.members)} ({best.support:.3f})"
+    return "less probable", told
+
+
+def rms(values: Floats) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.asarray(values) ** 2)))

@@ -1,0 +1,164 @@
+"""The decision table row by row, on searches whose probabilities are set by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_searches import bare, baseline, candidate, ground_of
+
+from bayesplate.diagnosis.decision.verdict import alternatives, answers, at_limit, decide
+from bayesplate.diagnosis.evidence.gate import PASSES
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.shifts.tables import nothing, together
+from bayesplate.quantities import Quantity
+
+WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
+NAMES = ("a", "b", "c")
+PAIR = ("a", "b")
+SWAPPED = (RELABELLING,)
+BOUNDED = Quantity.from_mean(0.4, 0.15, "normal", lower=0.0, upper=0.9)
+
+
+@pytest.fixture(scope="module")
+def base():
+    return baseline(np.random.default_rng(1))
+
+
+def found_with(base, probability, size=0.05, residual=None, prior=None):
+    """A search that found given probabilities by members; readings of which "a" at its nominal size is the cause."""
+    directions = size * np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][:3]
+    chosen = {} if prior is None else {"prior": prior}
+    candidates = {n: candidate(base, n, d, **chosen) for n, d in zip(NAMES, directions, strict=True)}
+    levels = noise_grid(base.board)
+    every = [bare(base, levels)]
+    every += [Hypothesis((name,), 0.1, one.fine, levels) for name, one in candidates.items()]
+    every += [Hypothesis(SWAPPED, 0.1, nothing(6), levels, Swap(1, 2))]
+    every += [Hypothesis(PAIR, 0.1, together(candidates["a"].coarse, candidates["b"].coarse), levels)]
+    shares = np.array([probability.get(one.members, 0.0) for one in every])
+    residual = candidates["a"].visible if residual is None else residual
+    return Found(ground_of(base, *every, candidates=candidates), residual, np.log(shares + 1e-300), shares)
+
+
+NOTHING = np.zeros(6)
+
+
+def large(base):
+    """Readings that neither noise nor any effect explains."""
+    return 0.3 * base.log_frequency * np.array([1, -1, 1, 1, -1, -1])
+
+
+def test_none_needed(base):
+    verdict = decide(found_with(base, {(): 0.1, ("a",): 0.9}, residual=NOTHING))
+    assert verdict.word == "none needed"
+    assert (verdict.effects, verdict.index) == ((), 0)
+    assert verdict.best.members == ("a",)
+
+
+def test_undetectable_if_every_effect_is_below_sight(base):
+    assert decide(found_with(base, {(): 0.5, ("a",): 0.5}, size=1e-4, residual=NOTHING)).word == "undetectable"
+
+
+def test_unexplained_if_the_bare_model_fails_and_no_effect_is_probable_enough(base):
+    verdict = decide(found_with(base, {(): 0.1, ("a",): 0.9}, residual=large(base)))
+    assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
+
+
+def test_the_bound_for_none_is_a_tenth(base):
+    assert decide(found_with(base, {(): 0.0999, ("a",): 0.9001})).word == "named"
+    assert decide(found_with(base, {(): 0.1, ("a",): 0.9})).word != "named"
+
+
+def test_unexplained_if_the_winner_fails_the_gate(base):
+    found = found_with(base, {("a",): 1.0}, residual=large(base))
+    assert found.passes(1) < PASSES
+    verdict = decide(found)
+    assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
+    assert "gate" in verdict.reason
+
+
+def test_named_from_three_times_the_next_on(base):
+    verdict = decide(found_with(base, {("a",): 0.75, ("b",): 0.25}))
+    assert (verdict.word, verdict.effects, verdict.index) == ("named", ("a",), 1)
+
+
+def test_a_group_below_three_times_the_next(base):
+    verdict = decide(found_with(base, {("a",): 0.70, ("b",): 0.27, ("c",): 0.03}))
+    assert verdict.word == "indistinguishable group"
+    assert verdict.effects == ("a", "b")
+    assert verdict.index == 1
+
+
+def test_a_group_holds_what_is_within_a_factor_ten(base):
+    within = found_with(base, {("a",): 0.60, ("b",): 0.33, ("c",): 0.061})
+    beyond = found_with(base, {("a",): 0.60, ("b",): 0.33, ("c",): 0.059})
+    assert decide(within).effects == ("a", "b", "c")
+    assert decide(beyond).effects == ("a", "b")
+    assert [one.members for one in alternatives(beyond, answers(beyond))] == [("a",), ("b",)]
+
+
+def test_a_pair_stands_for_itself_from_three_times_its_better_member_on(base):
+    verdict = decide(found_with(base, {("a",): 0.2, ("b",): 0.1, PAIR: 0.7}))
+    assert (verdict.word, verdict.effects, verdict.index) == ("named", PAIR, 5)
+
+
+def test_a_pair_below_that_counts_for_its_better_member(base):
+    found = found_with(base, {("a",): 0.3, ("b",): 0.15, PAIR: 0.55})
+    best = answers(found)[0]
+    assert (best.members, best.index) == (("a",), 1)
+    assert best.support == pytest.approx(0.85)
+    assert decide(found).effects == ("a",)
+    assert sum(one.support for one in answers(found)) == pytest.approx(1.0)
+
+
+def test_exchanged_labels_can_win(base):
+    swap = Swap(1, 2)
+    mixed = swap.applied(base, np.zeros((1, 6)))[0]
+    verdict = decide(found_with(base, {SWAPPED: 0.9, ("a",): 0.1}, residual=mixed))
+    assert (verdict.word, verdict.effects, verdict.index) == ("named", SWAPPED, 4)
+
+
+@pytest.mark.parametrize(("z", "limited"), [(0.0, False), (2.0, False), (2.6, True), (-2.55, True)])
+def test_a_size_at_the_limit_of_its_range_is_never_named(base, z, limited):
+    """A Poisson ratio between 0 and 0.9: most probable at 0.4, 0.7, 0.79 and 0.02."""
+    found = found_with(base, {("a",): 1.0}, size=1.0, prior=BOUNDED)
+    of_a = found.ground.candidates["a"]
+    cell = int(np.argmin(np.abs(of_a.fine.z[:, 0] - z)))
+    found = replace(found, residual=of_a.fine.shift[cell])
+    verdict = decide(found)
+    assert bool(at_limit(found, 1)) is limited
+    assert verdict.word == ("unexplained" if limited else "named")
+    assert ("limit" in verdict.reason) is limited
+
+
+def test_zero_is_no_limit_of_a_size_that_may_be_nothing(base):
+    found = found_with(base, {("a",): 1.0}, residual=NOTHING)
+    assert at_limit(found, 1) == ""
+
+
+def test_a_size_at_its_limit_is_found_in_a_pair_too(base):
+    found = found_with(base, {PAIR: 1.0}, size=1.0, prior=BOUNDED)
+    of_b = found.ground.candidates["b"]
+    found = replace(found, residual=of_b.coarse.shift[np.argmax(of_b.coarse.z[:, 0])])
+    assert at_limit(found, 5) != ""
+
+
+def test_without_candidates_there_is_nothing_to_name(base):
+    ground = ground_of(base, bare(base, noise_grid(base.board)))
+    calm = Found(ground, NOTHING, np.zeros(1), np.ones(1))
+    assert decide(calm).word == "none needed"
+    assert decide(calm).best is None
+    assert decide(replace(calm, residual=large(base))).word == "unexplained"
+
+
+def test_only_the_five_words(base):
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        shares = rng.dirichlet(np.full(6, 0.3))
+        members = [(), ("a",), ("b",), ("c",), SWAPPED, PAIR]
+        verdict = decide(found_with(base, dict(zip(members, shares, strict=True))))
+        assert verdict.word in WORDS
+        assert bool(verdict.effects) == (verdict.word in ("named", "indistinguishable group")) == bool(verdict.index)

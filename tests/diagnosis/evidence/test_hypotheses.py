@@ -1,0 +1,145 @@
+"""Hypotheses: their prior shares, exchanged labels, and what a fold may know of a reading that is left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_searches import bare, baseline, ground_of, one_level, table, with_readings
+
+from bayesplate.diagnosis.evidence.folds import left_out, nested
+from bayesplate.diagnosis.evidence.hypotheses import (
+    RELABELLING,
+    Hypothesis,
+    Swap,
+    confusable,
+    hypotheses,
+    log_evidences,
+    order_conflicts,
+    probabilities,
+)
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.shifts.forms import with_labels_exchanged
+from bayesplate.diagnosis.shifts.tables import nothing, together
+
+CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]
+
+
+@pytest.fixture
+def base():
+    return baseline(np.random.default_rng(1), parities=CLOSE_PAIR, spacing=0.08)
+
+
+def swap_of(base, first, second, prior=0.5):
+    return Hypothesis((RELABELLING,), prior, nothing(base.n_modes), one_level(base), Swap(first, second))
+
+
+def test_prior_shares(base):
+    rng = np.random.default_rng(2)
+    fine = {name: table(rng, name=name) for name in "abc"}
+    found = hypotheses(base, fine, fine, ["a", "c"])
+    shares = {}
+    for one in found:
+        shares[len(one.members) if not one.swap else "swap"] = (
+            shares.get(len(one.members) if not one.swap else "swap", 0) + one.prior
+        )
+    assert found[0].members == ()
+    assert shares == pytest.approx({0: 0.5, 1: 0.3, "swap": 0.1, 2: 0.1})
+    assert [one.members for one in found if len(one.members) == 2] == [("a", "c")]
+    assert probabilities(found, np.zeros(len(found))) == pytest.approx([one.prior for one in found])
+
+
+def test_two_effects_add(base):
+    rng = np.random.default_rng(3)
+    one, other = table(rng, n_cells=2, name="a"), table(rng, n_cells=3, n_tangents=2, name="b")
+    both = together(one, other)
+    assert both.members == ("a", "b")
+    assert both.weights.sum() == pytest.approx(1.0)
+    for i in range(2):
+        for j in range(3):
+            k = 3 * i + j
+            assert both.weights[k] == pytest.approx(one.weights[i] * other.weights[j])
+            assert both.shift[k] == pytest.approx(one.shift[i] + other.shift[j])
+            assert both.moved[k] == pytest.approx(one.moved[i] + other.moved[j])
+            assert both.slopes[k] == pytest.approx(np.hstack([one.slopes[i], other.slopes[j]]))
+            assert both.moved_slopes[k] == pytest.approx(np.hstack([one.moved_slopes[i], other.moved_slopes[j]]))
+
+
+def test_only_close_neighbours_of_different_symmetry_may_be_exchanged(base):
+    assert {(one.first, one.second) for one in confusable(base)} == {(0, 1), (1, 2), (3, 4), (4, 5)}
+    apart = baseline(np.random.default_rng(1), parities=CLOSE_PAIR, spacing=0.13)
+    assert confusable(apart) == ()
+
+
+def test_readings_of_one_class_in_the_other_order_than_the_modes_are_told(base):
+    """A reading above the next one of its class is told; one that stays below it, or passes another class, is not."""
+    ranked = [
+        replace(one, rank=[p.parity for p in base.places[:i]].count(one.parity)) for i, one in enumerate(base.places)
+    ]
+    gap = base.log_frequency[2] - base.log_frequency[0]
+    labels = base.board.setups[0].labels
+
+    def told(*raised):
+        return order_conflicts(replace(base, places=tuple(ranked), residual=np.array([*raised, 0.0, 0.0, 0.0, 0.0])))
+
+    assert told(0.0, 0.0) == ()
+    assert told(0.99 * gap, 0.0) == ()
+    (sentence,) = told(1.01 * gap, 0.0)
+    assert f"{labels[0]} and {labels[2]}" in sentence
+
+
+def test_exchanging_twice_changes_nothing_and_once_moves_the_readings(base):
+    residuals = 0.01 * np.random.default_rng(4).standard_normal((3, 6))
+    swap = Swap(3, 4)
+    once = swap.applied(base, residuals.copy())
+    assert once + base.log_frequency == pytest.approx((residuals + base.log_frequency)[:, [0, 1, 2, 4, 3, 5]])
+    assert swap.applied(base, once.copy()) == pytest.approx(residuals, abs=1e-14)
+    assert np.abs(once - residuals).max() > 0.05
+
+
+def test_a_board_with_labels_exchanged_holds_the_same_readings_under_the_other_label(base):
+    labelled = with_readings(base, labels=[(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (2, 0)])
+    changed = with_labels_exchanged(labelled.board, 3, 4)
+    (before,), (after,) = labelled.board.setups, changed.setups
+    assert after.measured == pytest.approx(before.measured)
+    assert [after.labels.index(before.labels[i]) for i in range(6)] == [0, 1, 2, 4, 3, 5]
+    assert [one.beams for one in after.readings] == [before.readings[i].beams for i in (0, 1, 2, 4, 3, 5)]
+    assert with_labels_exchanged(changed, 3, 4) == labelled.board
+
+
+def test_labels_are_exchanged_in_their_own_setup():
+    base = baseline(np.random.default_rng(1), noise=(0.005, 0.005), parities=CLOSE_PAIR, spacing=0.08)
+    first, second = with_labels_exchanged(base.board, 3, 4).setups
+    assert first == base.board.setups[0]
+    assert second.labels == tuple(base.board.setups[1].labels[i] for i in (1, 0, 2))
+
+
+@pytest.mark.parametrize("mode", range(6))
+def test_a_fold_knows_nothing_of_the_reading_that_is_left_out(base, mode):
+    """Also where labels are exchanged: the reading is then left out under its other label."""
+    rng = np.random.default_rng(5)
+    found = (bare(base, one_level(base)), Hypothesis(("a",), 0.1, table(rng), one_level(base)), swap_of(base, 3, 4))
+    residuals = 0.01 * rng.standard_normal((1, 6))
+    changed = residuals + 0.1 * np.eye(6)[mode]
+    fold = Fold(base, mode)
+    assert log_evidences(found, fold, changed) == pytest.approx(log_evidences(found, fold, residuals), abs=1e-9)
+    other = Fold(base, (mode + 1) % 6)
+    assert np.abs(log_evidences(found, other, changed) - log_evidences(found, other, residuals)).min() > 1e-6
+
+
+def test_readings_with_exchanged_labels_are_predicted_once_the_exchange_is_seen(base):
+    """Every fold that can see the exchange makes it; the error left out is then that of the readings put right."""
+    rng = np.random.default_rng(6)
+    straight = 1e-4 * rng.standard_normal((1, 6))
+    swap = swap_of(base, 3, 4)
+    mixed = swap.swap.applied(base, straight.copy())
+    ground = ground_of(base, bare(base, noise_grid(base.board)), swap)
+    as_it_is = left_out(ground_of(base, bare(base, one_level(base))), 0, straight[0])
+    put_right = left_out(ground, 1, mixed[0])
+
+    assert put_right[[0, 1, 2, 4, 3, 5]] == pytest.approx(as_it_is, abs=1e-12)
+    assert (nested(ground, mixed).chosen[0, [0, 1, 2, 5]] == 1).all()
+    assert nested(ground, mixed).ratio[0] < 0.1
+    assert (nested(ground, straight).chosen == 0).all()

@@ -1,0 +1,159 @@
+"""Tables of shifts against boards that are solved in full and fitted again, at sizes that are no points of the grid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from full_refits import full_refit
+
+from bayesplate.diagnosis.shifts.forms import with_forms
+from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.diagnosis.shifts.signatures import signatures
+from bayesplate.diagnosis.shifts.tables import nominal_shift, refitted, tabulate
+from bayesplate.frequencies.laws import cents
+
+CENT = 1.0
+FAR = 0.7
+"""Change of ln D up to which the reduced law of a form holds: it is trained within three sd of the fit."""
+_LIKELY = 2.0
+
+
+def random_place(form, rng):
+    """Standard coordinates of the free parameters: (1, n_parameters) array, within two sd and the bounds."""
+    place = []
+    for free in form.free:
+        bounds = (free.prior.standard(bound) for bound in (free.prior.lower, free.prior.upper))
+        low, high = (np.clip(float(bound), -_LIKELY, _LIKELY) for bound in bounds)
+        place.append(rng.uniform(low, high))
+    return np.array(place).reshape(1, -1)
+
+
+def values_at(form, z):
+    return {free.name: float(free.prior.value(z[0, i])) for i, free in enumerate(form.free)}
+
+
+def on_tangent(table, index, form, z):
+    """The table's shift at a place: from the nearest cell along its tangents, whose unit is half a cell."""
+    own = np.flatnonzero(table.form == index)
+    n = len(form.free)
+    at = table.z[own][:, :n]
+    nearest = int(np.argmin(((at - z) ** 2).sum(axis=1)))
+    half = [0.5 * np.min(np.diff(np.unique(at[:, i]))) for i in range(n)]
+    steps = (z[0] - at[nearest]) / half
+    return table.shift[own[nearest]] + table.slopes[own[nearest], :, :n] @ steps
+
+
+def compared(ground, rng, n_forms):
+    """Name, error of the table in cents, and how far the constants went, for one random size of each form."""
+    base = ground.baseline
+    for name, one in ground.candidates.items():
+        for index, law in enumerate(one.laws[:n_forms]):
+            z = random_place(law.form, rng)
+            exact, moved = full_refit(base, law.form.board, values_at(law.form, z), 1 / base.scales)
+            found = on_tangent(one.fine, index, law.form, z)
+            yield name, float(np.abs(cents(found - exact)).max()), float(np.abs(moved).max()), exact
+
+
+def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish):
+    shown = 0
+    for name, error, moved, exact in compared(finnish.ground, np.random.default_rng(1), 1):
+        assert moved < FAR, name
+        assert error < CENT, name
+        shown += np.abs(cents(exact)).max() > 5.0 * CENT
+    assert shown >= 4  # else the comparison would say nothing
+
+
+@pytest.mark.slow
+def test_every_effect_on_the_clamped_board_is_as_full_solves_have_it(fiemme):
+    """An effect that needs the constants to change by a factor of two leaves the region for which its law is made."""
+    near = [
+        (name, error) for name, error, moved, _ in compared(fiemme.ground, np.random.default_rng(2), 2) if moved < FAR
+    ]
+    assert len(near) >= 8
+    assert all(error < CENT for _, error in near), near
+
+
+def test_another_size_is_not_within_a_cent(finnish):
+    """Negative control: the comparison sees a change of the size by a tenth of its prior."""
+    (law,) = finnish.ground.candidates["air_loading"].laws
+    z = np.zeros((1, 1))
+    base = finnish.ground.baseline
+    exact, _ = full_refit(base, law.form.board, values_at(law.form, z + 0.3), 1 / base.scales)
+    shift, _ = refitted(base, law, z)
+    assert np.abs(cents(shift - exact)).max() > CENT
+
+
+def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish):
+    """To a cent, at sizes up to one sd; beyond, the step that serves the bare board may not settle."""
+    base = finnish.ground.baseline
+    for one in finnish.ground.candidates.values():
+        kept = np.abs(one.fine.z).max(axis=1, initial=0.0) <= 1.0
+        assert np.abs(cents(one.fine.shift[kept] @ base.absorbing.T)).max() < CENT
+        assert one.fine.weights.sum() == pytest.approx(1.0)
+        assert one.coarse.weights.sum() == pytest.approx(1.0)
+
+
+def test_the_cells_hold_the_prior(finnish):
+    """Mean of the size over cells is the prior's, at the accuracy of the middle rule and of a reach of three sd."""
+    one = finnish.ground.candidates["clamp_translation"]
+    (free,) = one.laws[0].form.free
+    mean = float(one.fine.weights @ free.prior.value(one.fine.z[:, 0]))
+    assert mean == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.01)
+    coarse = float(one.coarse.weights @ free.prior.value(one.coarse.z[:, 0]))
+    assert coarse == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.02)
+
+
+def test_two_effects_add_on_the_cantilever(finnish):
+    """At nominal sizes, against the joint full solve: to a tenth of the noise there."""
+    ground, base = finnish.ground, finnish.ground.baseline
+    paired = [name for name in ground.candidates if not ground.is_below_sight(name)]
+    assert len(paired) >= 2
+    for names in combinations(paired, 2):
+        laws = [ground.candidates[name].laws[0] for name in names]
+        total, at = np.zeros(base.n_modes), {}
+        for law in laws:
+            z = np.array([[float(free.prior.standard(free.nominal)) for free in law.form.free]]).reshape(1, -1)
+            total = total + refitted(base, law, z)[0][0]
+            at |= values_at(law.form, z)
+        exact, _ = full_refit(base, with_forms(base.board, [law.form for law in laws]), at, 1 / base.scales)
+        assert np.abs((total - exact) / base.scales).max() < 0.1, names
+        alone = refitted(base, laws[0], np.zeros((1, len(laws[0].form.free))))[0][0]
+        assert np.abs((alone - exact) / base.scales).max() > 0.1, names
+
+
+@pytest.mark.parametrize("name", ["air_loading", "thickness_profile", "grain_angle"])
+def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish, name):
+    """The same sizes, constants half as large again: made there with a wide region, placed here."""
+    base = finnish.ground.baseline
+    elsewhere = base.log_rigidities + np.array([0.3, -0.2, 0.1])
+    values = {**base.values, **dict(zip(("D_x", "D_y", "D_s"), np.exp(elsewhere), strict=True))}
+    far = replace(base, log_rigidities=elsewhere, values=values)
+    form = finnish.ground.candidates[name].laws[0].form
+    placed = form_law(far, form, half_width=0.8).placed(base)
+    own = finnish.ground.candidates[name].laws[0]
+    assert tabulate(base, name, [placed]).shift == pytest.approx(
+        tabulate(base, name, [own]).shift, abs=CENT * np.log(2) / 1200
+    )
+
+
+def test_signatures_and_tables_tell_the_same_of_every_effect(finnish):
+    """Raw shifts at once; visible ones where the constants stand that the search finds with the effect in place.
+
+    A signature asks what a fit makes of the estimate with the effect, the search which constants with the effect give
+    the estimate: the same question at constants that lie apart by what the fit absorbs.
+    """
+    ground, problem = finnish.ground, finnish.problem
+    for name, one in ground.candidates.items():
+        if name == "attached_mass":  # the card names no item: the search tries places that signatures do not know
+            continue
+        law = one.laws[0]
+        raw, visible, moved = nominal_shift(ground.baseline, law)
+        (here,) = signatures(problem, [name])
+        assert cents(raw) == pytest.approx(here.raw, abs=0.3), name
+        centre = problem.centre.copy()
+        centre[:3] += moved
+        there = signatures(replace(problem, centre=centre), [name])[0]
+        assert cents(visible) == pytest.approx(there.visible, abs=0.3), name

@@ -1,0 +1,256 @@
+"""From a search to its result: what each candidate is told to have been rejected for, the claim, and three readings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnoses import spread
+from made_searches import NOISE, bare, baseline, candidate, ground_of
+
+from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, answers, decide
+from bayesplate.diagnosis.evidence.folds import Nested, nested
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
+from bayesplate.diagnosis.evidence.search import Found, search
+from bayesplate.diagnosis.shifts.tables import nothing
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis, EffectEntry, diagnosis_json
+from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
+from bayesplate.diagnosis.wording.findings import Case, FitFigures, Side, diagnosis_of
+from bayesplate.effects import EFFECTS
+from bayesplate.plate.material import RIGIDITIES, moduli
+
+SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "air_loading", "grain_angle")
+FIGURES = FitFigures("made", 3, "0" * 64, 21.25, 46.5, {n: spread(1e9) for n in ("E_x", "E_y", "G_xy")}, {})
+MOVED = replace(
+    FIGURES,
+    in_sample_rms_cents=4.25,
+    elastic={n: spread(1.25e9) for n in ("E_x", "E_y", "G_xy")},
+    sizes={"board": {SHEAR: {"size": spread(1.0, "1")}, "declared": {"x": spread(1.0)}}},
+)
+
+
+def made(probability, size=0.05, residual=None, n_modes=6):
+    """A search of three effects and one exchange of labels that found given probabilities by members.
+
+    The readings are those of shear at its nominal size.
+    """
+    base = baseline(np.random.default_rng(1), n_modes)
+    directions = size * np.linalg.qr(np.random.default_rng(2).standard_normal((n_modes, n_modes)))[0][:3]
+    candidates = {name: candidate(base, name, one) for name, one in zip(NAMES, directions, strict=True)}
+    levels = noise_grid(base.board)
+    every = [bare(base, levels)]
+    every += [Hypothesis((name,), 0.1, one.fine, levels) for name, one in candidates.items()]
+    every += [Hypothesis((RELABELLING,), 0.1, nothing(n_modes), levels, Swap(1, 2))]
+    shares = np.array([probability.get(one.members, 0.0) for one in every])
+    residual = candidates[SHEAR].visible if residual is None else residual
+    ground = ground_of(base, *every, candidates=candidates)
+    return Found(ground, residual, np.log(shares + 1e-300), shares)
+
+
+def entries(found: Found) -> dict[str, EffectEntry]:
+    verdict, ranked = decide(found), answers(found)
+    told = [effect_entry(found, verdict, ranked, one, 0.5) for one in found.ground.candidates.values()]
+    return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict)[0]}
+
+
+def case_of(found: Found, control: NullControl, folded: Nested | None, **changed) -> Case:
+    verdict = decide(found)
+    readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
+    draws = SimpleNamespace(predictive=readings * np.linspace(0.99, 1.01, 21)[None, :, None])
+    after = Side(verdict.index, MOVED, draws) if verdict.index else Side(0, FIGURES, draws)
+    case = Case(found, verdict, control, folded, Side(0, FIGURES, draws), after, True, "Measure on.")
+    return replace(case, **changed)
+
+
+NAMED = {(): 0.01, (SHEAR,): 0.79, (AIR,): 0.15, (GRAIN,): 0.05}
+
+
+def control_of(found: Found, to_beat: float) -> NullControl:
+    n = 101
+    return NullControl(np.linspace(-5.0, 1.0, n), np.full(n, to_beat), 0.02)
+
+
+def folds_of(found: Found, ratio: float) -> Nested:
+    errors = 0.01 * np.ones((1, found.ground.baseline.n_modes))
+    return Nested(errors, ratio * errors, np.ones(errors.shape, dtype=np.intp))
+
+
+def test_what_became_of_each_candidate_of_a_named_effect():
+    told = entries(made(NAMED))
+    assert {name: one.fate for name, one in told.items()} == {
+        SHEAR: "in the verdict", AIR: "less probable", GRAIN: "less probable", RELABELLING: "less probable",
+    }  # fmt: skip
+    assert told[SHEAR].rejected_because is None
+    assert told[AIR].rejected_because == "less probable (0.150) than transverse shear (0.790)"
+    assert told[RELABELLING].labels == ("(1,0)", "(2,0)")
+
+
+def test_a_group_holds_its_members():
+    told = entries(made({(SHEAR,): 0.5, (AIR,): 0.4, (GRAIN,): 0.04}))
+    assert [told[name].fate for name in NAMES] == ["in the verdict", "in the verdict", "less probable"]
+    assert [told[name].rejected_because is None for name in NAMES] == [True, True, False]
+
+
+def test_exchanged_labels_that_are_named_are_not_rejected():
+    found = made({(RELABELLING,): 0.99, (): 0.01})
+    found = replace(found, residual=Swap(1, 2).applied(found.ground.baseline, np.zeros((1, 6)))[0])
+    told = entries(found)
+    assert (told[RELABELLING].fate, told[RELABELLING].rejected_because) == ("in the verdict", None)
+    assert told[SHEAR].rejected_because == "less probable (0.000) than relabelling (0.990)"
+
+
+def test_nothing_is_needed_from_a_tenth_on():
+    calm = made({(): 0.1, (SHEAR,): 0.9}, residual=np.zeros(6))
+    assert {one.fate for one in entries(calm).values()} == {"not needed"}
+    assert entries(calm)[SHEAR].rejected_because == "not needed: nothing lacking has a probability of 0.10"
+    rough = replace(calm, residual=0.3 * calm.ground.baseline.log_frequency * np.array([1, -1, 1, 1, -1, -1]))
+    assert entries(rough)[SHEAR].rejected_because == "not established: nothing lacking has a probability of 0.10"
+    assert entries(rough)[SHEAR].fate == "not established"
+    probable = made({(): 0.0999, (SHEAR,): 0.9001})
+    assert entries(probable)[SHEAR].fate == "in the verdict"
+
+
+def test_the_winner_that_fails_the_gate_is_told_so():
+    found = made({(SHEAR,): 1.0})
+    found = replace(found, residual=0.3 * found.ground.baseline.log_frequency * np.array([1, -1, 1, 1, -1, -1]))
+    told = entries(found)
+    assert told[SHEAR].fate == "does not fit"
+    assert told[SHEAR].rejected_because.startswith("with transverse shear the misfit is still too large (gate ")
+    assert told[AIR].fate == "less probable"
+
+
+def test_below_sight_comes_first():
+    told = entries(made({(): 0.5, (SHEAR,): 0.5}, size=1e-4, residual=np.zeros(6)))
+    assert {told[name].fate for name in NAMES} == {"below sight"}
+    assert told[AIR].rejected_because == "its visible part is below what these readings could show"
+    assert all(told[name].below_sight for name in NAMES)
+
+
+def test_an_entry_by_hand():
+    """Cents from logarithms, bias from the refit of the constants, the size's quantiles from the cells."""
+    found = made(NAMED)
+    one, told = found.ground.candidates[AIR], entries(found)[AIR]
+    in_cents = 1200.0 / np.log(2.0)
+    assert told.raw_rms_cents == pytest.approx(in_cents * np.sqrt(np.mean(one.raw**2)))
+    assert told.visible_cents == pytest.approx(in_cents * one.visible)
+    assert told.log_bayes_factor == pytest.approx(np.log(0.15 / 0.01))
+    values = found.ground.baseline.values
+    fitted = [np.asarray(values[name]) for name in RIGIDITIES]
+    true = [D * np.exp(m) for D, m in zip(fitted, one.moved, strict=True)]
+    sizes = values["thickness"], values["poisson_xy"]
+    wanted = [100 * (a / b - 1) for a, b in zip(moduli(*fitted, *sizes), moduli(*true, *sizes), strict=True)]
+    assert list(told.bias_percent.values()) == pytest.approx(wanted)
+    shear = entries(found)[SHEAR].amplitude
+    assert shear.q05 < 1.0 < shear.q95  # the readings are those of a size of one
+    assert shear.q95 - shear.q05 < 1.0  # its prior alone has 1.9
+    assert (shear.parameter, shear.form, shear.unit) == ("size", "", "1")
+
+
+@pytest.mark.parametrize(
+    ("ratio", "clear", "named", "claim"),
+    [
+        (0.499, True, True, True),
+        (0.5, True, True, False),
+        (0.499, False, True, False),
+        (0.499, True, False, False),
+        (None, True, True, False),
+    ],
+)
+def test_an_error_is_claimed_to_be_reduced_only_beyond_chance_with_a_size_clear_of_zero(ratio, clear, named, claim):
+    found = made(NAMED if named else {(): 0.9, (SHEAR,): 0.1}, residual=None if named else np.zeros(6))
+    folded = None if ratio is None else folds_of(found, ratio)
+    case = case_of(found, control_of(found, 0.5), folded, is_clear_of_zero=clear)
+    assert diagnosis_of(case).claim is claim
+
+
+def test_without_a_null_control_of_the_nested_error_nothing_is_claimed():
+    found = made(NAMED)
+    control = replace(control_of(found, 0.5), ratio=None)
+    assert case_of(found, control, folds_of(found, 0.1)).claim is False
+
+
+def test_a_named_effect_that_was_refitted():
+    found = made(NAMED)
+    ranked = answers(found)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25), finalists=[(ranked[0], MOVED)])
+    told = diagnosis_of(case)
+    assert (told.verdict, told.effects, told.refitted) == ("named", (SHEAR,), (SHEAR,))
+    assert told.sentences == (EFFECTS[SHEAR].sentence,)
+    assert (told.before.in_sample_rms_cents, told.after.in_sample_rms_cents) == (21.25, 4.25)
+    nested_cents = told.before.nested_leave_one_out_rms_cents
+    assert nested_cents == pytest.approx(0.01 * 1200 / np.log(2))
+    assert told.after.nested_leave_one_out_rms_cents == pytest.approx(0.25 * nested_cents)
+    assert told.before.hits_90 == 1.0
+    assert told.elastic_shift["E_x"].shift_in_sd == pytest.approx(2.5)
+    assert told.gate.before < 0.05 < told.gate.after
+    assert told.null_control.nested_ratio == pytest.approx(0.25)
+    assert told.gain_null_percentile == 100.0  # ln (0.79 / 0.01) + ln (0.1 / 0.5) is beyond the last of the null sets
+    (finalist,) = told.finalists
+    assert (finalist.effects, list(finalist.sizes["board"])) == ((SHEAR,), [SHEAR])
+    assert told.after.log_score > told.before.log_score
+
+
+def test_a_refit_that_failed_leaves_the_model_as_it_was():
+    found = made(NAMED)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    told = diagnosis_of(replace(case, after=case.before, is_clear_of_zero=False, notes=("it failed",)))
+    assert (told.verdict, told.refitted, told.claim) == ("named", (), False)
+    assert told.before == told.after
+    assert told.notes == ("it failed",)
+
+
+def test_readings_outside_their_band_are_counted():
+    found = made(NAMED)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
+    off = np.array([1.0, 1.0, 1.0, 1.0, 1.02, 0.98]) * readings * np.linspace(0.99, 1.01, 21)[None, :, None]
+    before = replace(case.before, draws=SimpleNamespace(predictive=off))
+    assert diagnosis_of(replace(case, before=before)).before.hits_90 == pytest.approx(4 / 6)
+
+
+def judged(n_modes: int) -> tuple[Found, Diagnosis]:
+    """The whole road of a diagnosis without a refit, on readings that are nothing but noise."""
+    found = made({}, n_modes=n_modes)
+    rng = np.random.default_rng(4)
+    found = search(found.ground, NOISE * rng.standard_normal(n_modes))
+    folded = nested(found.ground, found.residual[None, :])
+    return found, diagnosis_of(case_of(found, null_control(found, rng, 40), folded))
+
+
+def test_three_modes_leave_nothing_to_judge_by():
+    found, told = judged(3)
+    assert found.ground.n_directions == 0
+    priors = np.array([one.prior for one in found.ground.hypotheses])
+    assert found.probability == pytest.approx(priors / priors.sum())  # nothing was learned
+    assert (told.verdict, told.effects, told.claim) == ("undetectable", (), False)
+    assert told.reason == NOTHING_LEFT
+    content = diagnosis_json(told)
+    for place, name in (
+        ("before", "nested_leave_one_out_rms_cents"), ("before", "log_score"), ("gate", "before"), ("gate", "after"),
+        ("null_control", "nested_ratio"), ("null_control", "nested_ratio_to_beat"),
+    ):  # fmt: skip
+        assert content[place][name] is None
+    assert content["gain_null_percentile"] is None
+    assert [one["look_alikes"] for one in content["candidates"]] == [[]] * 4
+    assert all(one["below_sight"] and one["gate"] is None for one in content["candidates"][:3])
+
+
+def test_three_modes_leave_nothing_to_judge_by_even_without_candidates():
+    base = baseline(np.random.default_rng(1), 3)
+    ground = ground_of(base, bare(base, noise_grid(base.board)))
+    assert decide(search(ground, np.zeros(3))).word == "undetectable"
+
+
+@pytest.mark.parametrize("n_modes", [4, 5])
+def test_four_and_five_modes_are_judged(n_modes):
+    found, told = judged(n_modes)
+    assert found.ground.n_directions == n_modes - 3
+    assert told.reason != NOTHING_LEFT
+    assert told.verdict == "none needed"
+    assert 0.0 < told.gate.before <= 1.0
+    assert 0.0 <= told.gain_null_percentile <= 100.0
+    assert (told.before.log_score is None) is (n_modes < 5)

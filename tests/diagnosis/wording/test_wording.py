@@ -1,0 +1,235 @@
+"""What is said of a diagnosis: one word list for terminal, page, figures and files, and JSON as the contract has it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import fields, replace
+from html.parser import HTMLParser
+from typing import get_args
+
+import pytest
+from diagnoses import AFTER, AIR, BEFORE, DIAGNOSES, EXCHANGE, GRAIN, NEXT, TENSION, candidate
+from payloads import PAYLOADS
+
+from bayesplate.diagnosis.decision.verdict import Word
+from bayesplate.diagnosis.wording.diagnosis import Errors, diagnosis_json
+from bayesplate.diagnosis.wording.exports import before_after_csv, before_after_tex, write_before_after
+from bayesplate.diagnosis.wording.tables import averaged_table, candidates_table, errors_table, shift_table
+from bayesplate.diagnosis.wording.told import remarks, verdict_sentence, verdict_sentences
+from bayesplate.diagnosis.wording.words import MERITS, VERDICTS
+from bayesplate.workflow.shown import show_diagnosis
+
+KEYS = [
+    "format", "name", "seed", "card_sha256", "verdict", "claim", "effects", "refitted", "reason", "sentences",
+    "declared", "probability_of_none", "probability_of_none_with_doubled_priors", "gate", "before", "after",
+    "gain_null_percentile", "null_control", "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates",
+    "recommendation", "notes",
+]  # fmt: skip
+ERRORS = [
+    "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
+]  # fmt: skip
+EFFECT = [
+    "name", "setup", "raw_rms_cents", "visible_rms_cents", "visible_cents", "below_sight", "bias_percent",
+    "inclusion_probability", "inclusion_probability_with_doubled_priors", "log_bayes_factor", "ockham_log_factor",
+    "gate", "amplitude", "look_alikes", "rejected_because",
+]  # fmt: skip
+EXCHANGED = [
+    "name", "setup", "labels", "raw_rms_cents", "visible_rms_cents", "bias_percent", "inclusion_probability",
+    "log_bayes_factor", "amplitude", "look_alikes", "rejected_because",
+]  # fmt: skip
+NAMED = replace(DIAGNOSES["named"], candidates=(TENSION, AIR, GRAIN, EXCHANGE))
+
+
+def test_the_json_has_the_names_and_the_order_of_the_contract():
+    """Files of this format are read by others: a name that is changed here breaks their scripts."""
+    content = diagnosis_json(NAMED)
+
+    assert list(content) == KEYS
+    assert list(content["before"]) == list(content["after"]) == ERRORS
+    assert [list(one) for one in content["candidates"]] == [EFFECT, EFFECT, EFFECT, EXCHANGED]
+    assert list(content["candidates"][0]["amplitude"]) == ["parameter", "form", "q05", "q50", "q95", "unit"]
+    assert list(content["gate"]) == ["before", "after"]
+    assert list(content["null_control"]) == ["n_sets", "flagged_percent", "nested_ratio", "nested_ratio_to_beat"]
+    assert list(content["elastic_shift"]["E_x"]) == ["before", "after", "shift_in_sd"]
+    spread = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
+    assert list(content["elastic_averaged"]["G_xy"]) == spread
+    assert list(content["answers"][0]) == ["effects", "probability"]
+    (finalist,) = content["finalists"]
+    assert list(finalist) == [
+        "effects", "probability", "in_sample_rms_cents", "leave_one_out_rms_cents", "elastic", "sizes",
+    ]  # fmt: skip
+    assert list(finalist["sizes"]["clamped"]["membrane_tension"]["tension"]) == spread
+
+
+def test_the_json_has_the_values_and_nothing_that_json_lacks():
+    content = diagnosis_json(NAMED)
+
+    assert json.loads(json.dumps(content, allow_nan=False)) == content
+    assert content["format"] == 1
+    assert content["effects"] == ["membrane_tension"]
+    assert content["before"]["log_score"] == -24.75
+    assert content["candidates"][3]["labels"] == ["(1,0)", "(0,1)"]
+    assert content["candidates"][3]["bias_percent"] is None
+
+
+def test_every_word_of_the_verdict_and_every_error_has_its_words():
+    assert set(VERDICTS) == set(get_args(Word))
+    read = [one.of(Errors(**{name: i for i, name in enumerate(ERRORS)})) for one in MERITS]
+    assert read == list(range(len(fields(Errors))))
+
+
+@pytest.mark.parametrize(
+    ("word", "words"),
+    [
+        ("none needed", "no more than their noise would make them"),
+        ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
+         "the gain is larger than on 99 % of simulated boards"),
+        ("indistinguishable group", "cannot tell which: membrane tension or air loading."),
+        ("unexplained", "no effect that was tried explains it"),
+        ("undetectable", "could not show them even if they were there"),
+    ],
+)  # fmt: skip
+def test_the_terminal_and_the_page_tell_the_same(word, words):
+    one = DIAGNOSES[word]
+    closing = verdict_sentence(one)
+
+    assert closing.startswith(f"Verdict: {word}. {verdict_sentences(one)[0]}")
+    assert words in closing
+    assert ("reduced" in closing) is one.claim
+    assert ("No improvement is claimed" in closing) is (one.is_refitted and not one.claim)
+    assert verdict_sentences(one)[-1] == closing[-len(verdict_sentences(one)[-1]) :] or not one.is_refitted
+
+
+def test_the_page_says_what_the_constants_include():
+    assert "The constants take membrane tension into account." in verdict_sentences(DIAGNOSES["named"])
+    not_refitted = replace(DIAGNOSES["named"], refitted=())
+    assert "The constants are those of the ideal plate." in verdict_sentences(not_refitted)
+    assert not any("The constants take" in one for one in verdict_sentences(DIAGNOSES["none needed"]))
+    assert remarks(replace(NAMED, notes=("mind this",))) == [
+        "Probability that no effect of the library is at work: 2 %.", "the reason of it", "mind this",
+    ]  # fmt: skip
+
+
+def test_errors_before_and_after_or_as_they_are():
+    both, alone = errors_table(NAMED), errors_table(DIAGNOSES["none needed"])
+
+    assert (both.title, both.columns) == ("Error before and after: a-board", ("", "before", "after: membrane tension"))
+    assert both.rows == (
+        ("error in the fit, rms cents", "21.2", "4.2"),
+        ("error of a mode left out, rms cents", "46.5", "9.5"),
+        ("error left out, search and all, rms cents", "46.5", "12.5"),
+        ("log score", "-24.75", "-15.50"),
+        ("readings inside their 90 % intervals", "50 %", "100 %"),
+    )
+    assert (alone.title, alone.columns) == ("Error: a-board", ("", "as it is"))
+    assert [row[1] for row in alone.rows] == [row[1] for row in both.rows]
+    unknown = replace(DIAGNOSES["none needed"], before=replace(BEFORE, leave_one_out_rms_cents=None))
+    assert errors_table(unknown).rows[1][1] == "–"
+
+
+def test_constants_shift_only_where_something_was_added():
+    assert shift_table(NAMED).rows[0] == ("E_x", "10.25", "11.50", "+2.5")
+    assert shift_table(DIAGNOSES["none needed"]) is None
+    assert averaged_table(NAMED).rows[0] == ("E_x", "10.2 ± 1.0", "8.7 to 11.8")
+
+
+def test_candidates_stand_in_the_order_of_their_probability():
+    wide, narrow = candidates_table(NAMED), candidates_table(NAMED, narrow=True)
+    by_name = {row[0]: dict(zip(wide.columns, row, strict=True)) for row in wide.rows}
+
+    assert list(by_name) == ["membrane tension", "relabelling (1,0) and (0,1)", "air loading", "grain angle"]
+    assert by_name["membrane tension"] == {
+        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "probability": "0.970",
+        "E_x / E_y / G_xy off by, %": "+1.5 / -2.5 / +0.5", "size (90 %)": "tension 120 (10 to 230) N/m",
+        "looks like": "–", "rejected because": "–",
+    }  # fmt: skip
+    assert by_name["air loading"]["looks like"] == "attached mass"
+    assert by_name["air loading"]["size (90 %)"] == by_name["relabelling (1,0) and (0,1)"]["shift"] == "–"
+    assert [row[-1] for row in narrow.rows] == ["in the verdict", "less probable", "below sight", "less probable"]
+    assert candidates_table(DIAGNOSES["undetectable"]) is None
+
+
+def test_an_exchange_of_labels_that_is_out_of_the_question_is_not_shown():
+    """Any two neighbours are a candidate: from one per cent on they are shown."""
+    for share, shown in ((0.0099, False), (0.01, True)):
+        one = replace(NAMED, candidates=(TENSION, replace(EXCHANGE, inclusion_probability=share)))
+        assert (len(candidates_table(one).rows) == 2) is shown
+
+
+def test_a_setup_is_named_where_there_are_several():
+    several = replace(NAMED, candidates=(candidate("air_loading", "one"), candidate("air_loading", "two")))
+    assert [row[0] for row in candidates_table(several).rows] == ["air loading, one", "air loading, two"]
+
+
+def test_the_terminal_shows_only_tables_that_there_are():
+    shown, bare = show_diagnosis(NAMED), show_diagnosis(DIAGNOSES["undetectable"])
+    assert [table.title.partition(":")[0] for table in shown.tables] == [
+        "Error before and after", "Shift of the constants, GPa", "Candidates at their usual size",
+    ]  # fmt: skip
+    assert [table.title for table in bare.tables] == ["Error: a-board"]
+    assert shown.remarks == (*NAMED.sentences, NEXT)
+
+
+def test_before_and_after_in_one_csv():
+    header, *rows = csv.reader(io.StringIO(before_after_csv(DIAGNOSES["named"])))
+    by_name = {row[0]: dict(zip(header, row, strict=True)) for row in rows}
+
+    assert by_name["error in the fit, rms cents"] | {"quantity": ""} == {
+        "quantity": "", "before": "21.25", "after": "4.25", "shift_in_sd": "",
+    }  # fmt: skip
+    assert float(by_name["E_x, GPa"]["before"]) == pytest.approx(10.25)
+    assert float(by_name["E_x, GPa"]["shift_in_sd"]) == 2.5
+
+
+@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
+def test_a_title_cannot_break_the_latex(payload):
+    """It stands in a comment of one line: below it the table begins, and every row has as many cells as columns."""
+    table = before_after_tex(DIAGNOSES["named"], payload)
+    comment, begin, *body, last = table.splitlines()
+
+    assert comment.startswith("% ")
+    assert (begin, last) == (r"\begin{tabular}{lrrr}", r"\end{tabular}")
+    assert {line.count(" & ") for line in body if line.endswith(r"\\")} == {3}
+    assert payload not in table or not set('\\{}$&#^_~%<>|"') & set(payload)
+
+
+def test_the_latex_by_hand(tmp_path):
+    undetectable = replace(DIAGNOSES["undetectable"], before=replace(BEFORE, log_score=None))
+    assert r"$E_{x}$, GPa & 10.250 & 11.500 & $+2.5$ \\" in before_after_tex(NAMED, "x")
+    assert r"log score & -- & -24.75 &  \\" in before_after_tex(undetectable, "x")
+    assert [path.name for path in write_before_after(tmp_path, NAMED, "x")] == ["before-after.csv", "before-after.tex"]
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+class _Tags(HTMLParser):
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        assert not attrs
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_it_shows_itself():
+    assert repr(NAMED) == "<Diagnosis of a-board, named: membrane_tension, error reduced>"
+    assert repr(DIAGNOSES["none needed"]) == "<Diagnosis of a-board, none needed>"
+    page = _Tags(NAMED._repr_html_())
+    assert page.tags.count("table") == 3
+    for words in ("An effect was found", "point to membrane tension", "46.5", f"{AFTER.leave_one_out_rms_cents}", NEXT):
+        assert words in page.text
+
+
+@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
+def test_a_text_stays_a_text_in_a_notebook(payload):
+    told = replace(NAMED, name=payload, recommendation=payload, notes=(payload,), candidates=(candidate(payload),))
+    page = _Tags(told._repr_html_())
+    assert set(page.tags) == {"h3", "p", "table", "caption", "tr", "th", "td"}
+    assert page.text.count(payload) >= 4
