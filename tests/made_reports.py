@@ -12,10 +12,11 @@ import pytest
 
 from bayesplate.cards import BoardCard
 from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.report.page import render, write_report
-from bayesplate.results.draws import Draws
+from bayesplate.results.summary import Summary
 from bayesplate.workflow.fit import fit
 from bayesplate.workflow.prepare import prepare
 
@@ -30,7 +31,7 @@ class Fit:
     card: BoardCard
     inference: Inference
     draws: Draws
-    summary: Mapping[str, Any]
+    summary: Summary
 
     def write(self, folder: Path, diagnosis: Mapping[str, Any] | None = None) -> Path:
         """Its report in a folder."""

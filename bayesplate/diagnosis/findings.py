@@ -19,7 +19,8 @@ from bayesplate.diagnosis.verdict import Answer, Verdict, answers
 from bayesplate.effects import EFFECTS
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI
-from bayesplate.results.draws import Draws, spread
+from bayesplate.posterior.draws import Draws
+from bayesplate.results.contract import Spread, as_json
 from bayesplate.results.summary import Summary
 
 Floats = NDArray[np.float64]
@@ -54,7 +55,7 @@ class Case:
     is_clear_of_zero : bool
         Whether every effect that was added has a size whose 95 % interval excludes zero.
     recommendation : str
-    finalists : sequence of (Answer, dict)
+    finalists : sequence of (Answer, Summary)
         Explanations that were fitted again, best first, each with the summary of its fit.
     notes : tuple of str
     """
@@ -97,9 +98,9 @@ def diagnosis(case: Case) -> Diagnosis:
     doubled = inclusion_with_width(found, 2.0)
     return {
         "format": FORMAT,
-        "name": case.before.summary["name"],
-        "seed": case.before.summary["seed"],
-        "card_sha256": case.before.summary["card_sha256"],
+        "name": case.before.summary.name,
+        "seed": case.before.summary.seed,
+        "card_sha256": case.before.summary.card_sha256,
         "verdict": verdict.word,
         "claim": case.claim,
         "effects": list(verdict.effects),
@@ -138,7 +139,7 @@ def _refitted(case: Case) -> list[str]:
 
 def _errors(case: Case, side: Side) -> Diagnosis:
     found = case.found
-    error = side.summary["error"]
+    error = side.summary.error
     folded = case.folded
     nested = None
     if folded is not None:
@@ -146,8 +147,8 @@ def _errors(case: Case, side: Side) -> Diagnosis:
     low, high = np.quantile(side.draws.predictive.reshape(-1, found.ground.baseline.n_modes), [0.05, 0.95], axis=0)
     measured = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
     return {
-        "in_sample_rms_cents": error["in_sample_rms_cents"],
-        "leave_one_out_rms_cents": error["leave_one_out_rms_cents"],
+        "in_sample_rms_cents": error.in_sample_rms_cents,
+        "leave_one_out_rms_cents": error.leave_one_out_rms_cents,
         "nested_leave_one_out_rms_cents": nested,
         "log_score": log_score(found.ground, side.index, found.residual) if folded is not None else None,
         "hits_90": float(np.mean((measured >= low) & (measured <= high))),
@@ -155,12 +156,12 @@ def _errors(case: Case, side: Side) -> Diagnosis:
 
 
 def _elastic_shift(case: Case) -> Diagnosis:
-    before, after = case.before.summary["elastic"], case.after.summary["elastic"]
+    before, after = case.before.summary.elastic, case.after.summary.elastic
     return {
         name: {
-            "before": before[name]["mean"],
-            "after": after[name]["mean"],
-            "shift_in_sd": (after[name]["mean"] - before[name]["mean"]) / before[name]["sd"],
+            "before": before[name].mean,
+            "after": after[name].mean,
+            "shift_in_sd": (after[name].mean - before[name].mean) / before[name].sd,
         }
         for name in MODULI
     }
@@ -168,9 +169,9 @@ def _elastic_shift(case: Case) -> Diagnosis:
 
 def _elastic_averaged(case: Case) -> Diagnosis:
     """The constants averaged over everything that may be the case, in the linear approximation of the search."""
-    rng = np.random.default_rng([case.before.summary["seed"], _AVERAGE_LINE])
+    rng = np.random.default_rng([case.before.summary.seed, _AVERAGE_LINE])
     drawn = draw_constants(case.found, rng, _N_AVERAGED)
-    return {name: spread(drawn.values[name], "Pa") for name in MODULI}
+    return {name: as_json(Spread.of(drawn.values[name], "Pa")) for name in MODULI}
 
 
 def _finalist(answer: Answer, summary: Summary) -> Diagnosis:
@@ -178,11 +179,11 @@ def _finalist(answer: Answer, summary: Summary) -> Diagnosis:
     return {
         "effects": list(answer.members),
         "probability": answer.support,
-        "in_sample_rms_cents": summary["error"]["in_sample_rms_cents"],
-        "leave_one_out_rms_cents": summary["error"]["leave_one_out_rms_cents"],
-        "elastic": summary["elastic"],
+        "in_sample_rms_cents": summary.error.in_sample_rms_cents,
+        "leave_one_out_rms_cents": summary.error.leave_one_out_rms_cents,
+        "elastic": as_json(summary.elastic),
         "sizes": {
-            owner: {name: sizes for name, sizes in effects.items() if name in answer.members}
-            for owner, effects in summary["effects"].items()
+            owner: {name: as_json(sizes) for name, sizes in effects.items() if name in answer.members}
+            for owner, effects in summary.effects.items()
         },
     }

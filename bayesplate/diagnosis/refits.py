@@ -9,7 +9,7 @@ from bayesplate.diagnosis.forms import Form, with_forms, with_labels_exchanged
 from bayesplate.diagnosis.search import Found
 from bayesplate.diagnosis.verdict import size_posterior
 from bayesplate.plate.board import Board
-from bayesplate.results.draws import Draws
+from bayesplate.posterior.draws import Draws
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesplate.effects.words import effect_name, effect_names
-from bayesplate.results.tables import Table, decimals
+from bayesplate.results.tables import Table
+from bayesplate.results.words import decimals
 
 _GPA = 1e9
 _MEANING = {

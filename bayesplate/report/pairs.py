@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Problem
 from bayesplate.report.priors import input_words
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, plain_axes, short
 from bayesplate.results.budget import input_shares
-from bayesplate.results.draws import Draws
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

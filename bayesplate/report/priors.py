@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from bayesplate.effects import effects_of, is_effect_parameter
 from bayesplate.effects.words import effect_name
 from bayesplate.plate.board import Board
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Problem
 from bayesplate.quantities import Quantity
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, legend_below, plain_axes, short
-from bayesplate.results.draws import Draws
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

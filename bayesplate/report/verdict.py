@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.report.signatures import candidate_name, has_several_setups, is_refitted, worth_showing
-from bayesplate.report.words import (
-    GPA,
-    MISSING,
-    effect_sentence,
-    interval,
-    number,
-    percent,
-    plus_minus,
-)
+from bayesplate.report.words import effect_sentence
 from bayesplate.results.exports import ERROR_WORDS
 from bayesplate.results.tables import Table
+from bayesplate.results.words import GPA, MISSING, interval, number, percent, plus_minus
 
 HEADINGS = {
     "none needed": "These readings need no further effect",
@@ -155,7 +149,8 @@ def averaged_table(diagnosis: Mapping[str, Any]) -> Table | None:
     averaged = diagnosis.get("elastic_averaged")
     if not averaged:
         return None
-    rows = tuple((name, plus_minus(one, GPA), interval(one, GPA)) for name, one in averaged.items())
+    spreads = ((name, SimpleNamespace(**one)) for name, one in averaged.items())
+    rows = tuple((name, plus_minus(one, GPA), interval(one, GPA)) for name, one in spreads)
     title = "The constants if any of the effects may be there, each by its probability, GPa"
     return Table(title, ("constant", "mean ± sd", "90 % interval"), rows)
 

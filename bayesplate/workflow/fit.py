@@ -10,12 +10,13 @@ from typing import Any
 
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.draws import Draws
 from bayesplate.results.folder import ARCHIVE, SUMMARY, OutputFolder, json_text, write_text
 from bayesplate.results.store import write_posterior
-from bayesplate.results.summary import Summary, unconverged_summary
+from bayesplate.results.summarise import unconverged_summary
+from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed
 from bayesplate.workflow.prepare import Prepared, prepare
@@ -29,8 +30,7 @@ class FitResult:
     ----------
     folder : Path or None
         Where its files are; None if none were asked for.
-    summary : dict
-        As in summary.json.
+    summary : Summary
     inference : Inference
     draws : Draws
     """

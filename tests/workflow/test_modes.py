@@ -8,7 +8,7 @@ import runs
 from click.testing import CliRunner
 
 from bayesplate.cli import main
-from bayesplate.results.sheet import Precision
+from bayesplate.estimates.sheet import Precision
 from bayesplate.workflow.modes import modes
 
 UNMEASURED = """\
@@ -87,39 +87,39 @@ def test_the_sheet_is_written_once_and_replaced_only_if_forced(finnish_sheet):
 
 
 def test_shear_has_a_share_where_it_is_declared():
-    (setup,) = modes("fiemme-spruce-clamped", effects=["transverse_shear"], write=False).report["setups"]
+    (setup,) = modes("fiemme-spruce-clamped", effects=["transverse_shear"], write=False).report.setups
 
-    assert setup["theory"] == "shear-flexible"
-    assert all(0 < mode["share_percent"]["effects"] < 15 for mode in setup["modes"])
+    assert setup.theory == "shear-flexible"
+    assert all(0 < mode.share_percent.effects < 15 for mode in setup.modes)
 
 
 def test_a_board_not_measured_yet_is_computed_from_the_prior(unmeasured):
     """Supported all round: closed form, omega^2 = pi^4 (D_x m^4 / L_x^4 + ... ) / rho h, at the median of the prior."""
     result = modes(unmeasured, write=False)
-    (setup,) = result.report["setups"]
+    (setup,) = result.report.setups
     E_x, E_y, G, h, rho, nu = 11e9, 0.95e9, 0.67e9, 3e-3, 450.0, 0.4
     D_x, D_y = (E * h**3 / 12 / (1 - nu**2 * E_y / E_x) for E in (E_x, E_y))
     D_s = G * h**3 / 3
 
-    for mode in setup["modes"][:6]:
-        m, n = (int(number) + 1 for number in mode["label"].strip("()").split(","))
+    for mode in setup.modes[:6]:
+        m, n = (int(number) + 1 for number in mode.label.strip("()").split(","))
         x, y = m * np.pi / 0.4, n * np.pi / 0.2
         squared = (D_x * x**4 + D_y * y**4 + (2 * nu * D_y + D_s) * x**2 * y**2) / (rho * h)
-        assert mode["hz"] == pytest.approx(np.sqrt(squared) / (2 * np.pi), rel=1e-3)
-        low, high = mode["likely_hz"]
-        assert low < mode["hz"] < high
-    assert "median of the prior" in result.report["basis"]
+        assert mode.hz == pytest.approx(np.sqrt(squared) / (2 * np.pi), rel=1e-3)
+        low, high = mode.likely_hz
+        assert low < mode.hz < high
+    assert "median of the prior" in result.report.basis
 
 
 def test_the_band_follows_the_prior(unmeasured):
     """To first order ln f has half the shares times the prior's log sds; two thirds of a normal lie within 0.967 sd."""
-    (setup,) = modes(unmeasured, write=False).report["setups"]
+    (setup,) = modes(unmeasured, write=False).report.setups
     log_sds = np.log([1.35, 1.75, 1.5])
 
-    for mode in setup["modes"]:
-        shares = np.array([mode["share_percent"][name] for name in ("D_x", "D_y", "D_s")]) / 100
+    for mode in setup.modes:
+        shares = np.array([mode.share_percent.D_x, mode.share_percent.D_y, mode.share_percent.D_s]) / 100
         half_width = 0.967 * np.sqrt(np.sum((shares * log_sds / 2) ** 2))
-        low, high = np.log(np.array(mode["likely_hz"]))
+        low, high = np.log(np.array(mode.likely_hz))
         assert (high - low) / 2 == pytest.approx(half_width, rel=0.1)
 
 
