@@ -108,8 +108,8 @@ def summarise(
         least_squares=_paper_least_squares(system),
         weighted_least_squares=_weighted(problem),
         percentile=_percentile(system),
-        linear_means=_means(*assessment.means["linear"]),
-        exact_means=_means(*assessment.means["exact"]),
+        linear_means=law_means(*assessment.means["linear"]),
+        exact_means=law_means(*assessment.means["exact"]),
         modes=rows,
         unlabelled=unlabelled_peaks(board, assessment.named),
         error=ErrorFigures(
@@ -120,7 +120,7 @@ def summarise(
         ),
         sampler=sampler_health(inference.chains, inference.convergence),
         identifiability=(*remarks(board, problem.identifiability), *input_remarks(draws)),
-        warnings=tuple(_warnings(problem, assessment)),
+        warnings=tuple(warnings_of(problem, assessment)),
     )
 
 
@@ -164,7 +164,7 @@ def _values_of(key: str, problem: Problem, draws: Draws) -> Floats:
     return np.broadcast_to(problem.board.inputs[key].mean, draws.log_posterior.shape)
 
 
-def _means(means: Mapping[str, float], effective: float) -> LawMeans:
+def law_means(means: Mapping[str, float], effective: float) -> LawMeans:
     """Posterior means under a law; none where the two laws are too far apart for one to stand for the other."""
     known = effective >= FEWEST_WEIGHTED_DRAWS
     return LawMeans(**{name: value if known else None for name, value in means.items()}, effective_draws=effective)
@@ -199,7 +199,8 @@ def _percentile(system: PaperSystem) -> Percentile | None:
     return Percentile(**values, n_subsets=found.n_subsets)
 
 
-def _warnings(problem: Problem, assessment: Assessment) -> list[str]:
+def warnings_of(problem: Problem, assessment: Assessment) -> list[str]:
+    """What a reader of the summary must know, one sentence each."""
     sentences = list(problem.board.notes)
     if not problem.estimate.converged:
         sentences.append("the least-squares steps did not settle: two modes near one frequency may swap their labels")

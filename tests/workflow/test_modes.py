@@ -8,7 +8,6 @@ import runs
 from click.testing import CliRunner
 
 from bayesplate.cli import main
-from bayesplate.estimates.sheet import Precision
 from bayesplate.workflow.modes import modes
 
 UNMEASURED = """\
@@ -149,18 +148,3 @@ def test_modes_not_measured_have_the_range_that_the_others_foretell(finnish_shee
         assert mode["hz"] == pytest.approx(np.sqrt(low * high))
         # No less than the expected noise of a clamped board, 0.8 %; no more than an error of 10 % in a stiffness makes.
         assert 0.967 * 0.008 <= half_width < 0.5 * 0.10
-
-
-def test_the_range_foretells_readings_that_were_left_out():
-    """Simulated at first order: of readings from known constants, two thirds fall within the band, to 3 sd of 4000."""
-    rng = np.random.default_rng(1)
-    root = rng.normal(size=(3, 3)) * 0.02
-    precision, shares = Precision(root @ root.T, {"bench": 0.01}), np.array([0.5, 0.3, 0.2])
-    log_constants = rng.normal(size=(4000, 3)) @ root.T
-    readings = 100 * np.exp(0.5 * log_constants @ shares + 0.01 * rng.normal(size=4000))
-    low, high = precision.band(100.0, shares, "bench")
-
-    share = np.mean((readings > low) & (readings < high))
-    assert share == pytest.approx(2 / 3, abs=3 * np.sqrt(2 / 9 / 4000))
-    narrow_low, narrow_high = Precision(0 * root, {"bench": 0.01}).band(100.0, shares, "bench")
-    assert np.mean((readings > narrow_low) & (readings < narrow_high)) < 2 / 3 - 3 * np.sqrt(2 / 9 / 4000)
