@@ -43,7 +43,7 @@ def print_shown(shown: Shown) -> None:
     click.echo(printed.get(), nl=False)  # rich itself would exit with 1 where a reader like `head` has closed the pipe
 
 
-def print_json(content: Mapping[str, Any]) -> None:
+def print_json(content: Any) -> None:
     """What a command found, for other programs."""
     from bayesplate.workflow.shown import json_text
 

@@ -40,14 +40,14 @@ def run(
     result = bayesplate.fit(card, write=False, seed=seed)
     summary = result.summary
     numbers = {}
-    for name, entry in summary["elastic"].items():
-        percentile = summary["percentile"][name]
-        half_width = percentile["mean"] * percentile["sd_percent"] / 100
-        inside = abs(result.draws.moduli[name] - percentile["mean"]) < half_width
+    for name, entry in summary.elastic.items():
+        percentile = summary.percentile[name]
+        half_width = percentile.mean * percentile.sd_percent / 100
+        inside = abs(result.draws.moduli[name] - percentile.mean) < half_width
         numbers[name] = {
-            "mean": entry["mean"] / 1e9,
-            "sd": entry["sd"] / 1e9,
-            "least_squares": summary["least_squares"][name] / 1e9,
+            "mean": entry.mean / 1e9,
+            "sd": entry.sd / 1e9,
+            "least_squares": summary.least_squares[name] / 1e9,
             "within_percentile_band": float(inside.mean()),
         }
     if figure is not None:

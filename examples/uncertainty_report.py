@@ -27,10 +27,10 @@ import numpy as np
 
 import bayesplate
 from bayesplate.plate.board import Board
+from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
-from bayesplate.results.draws import named_draws
 from bayesplate.workflow.prepare import prepare
 
 CARD = "spruce-free-2R"
@@ -84,7 +84,7 @@ def run(folder: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
             "by_hand": {one: power * percent(board.inputs[one]) for one, power in powers.items()},
             "exact_inputs_percent": alone[name],
         }
-    effective = result.summary["sampler"]["ess_min"]
+    effective = result.summary.sampler.ess_min
     numbers = {"budget": budget, "widths": widths(result), "effective_draws": effective}
     if folder is not None:
         figure_of(board, numbers).savefig(folder / "uncertainty.png", dpi=150)

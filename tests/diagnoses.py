@@ -16,9 +16,9 @@ from bayesplate.diagnosis.wording.diagnosis import (
     Finalist,
     Gates,
     NullControlSummary,
-    Spread,
 )
 from bayesplate.effects import EFFECTS
+from bayesplate.results.contract import Spread
 
 BEFORE = Errors(
     in_sample_rms_cents=21.25,

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from bayesplate.cards import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.report.page import render, write_report
-from bayesplate.results.draws import Draws
+from bayesplate.results.summary import Summary
 from bayesplate.workflow.fit import fit
 from bayesplate.workflow.prepare import prepare
 
@@ -31,7 +30,7 @@ class Fit:
     card: BoardCard
     inference: Inference
     draws: Draws
-    summary: Mapping[str, Any]
+    summary: Summary
 
     def write(self, folder: Path, diagnosis: Diagnosis | None = None) -> Path:
         """Its report in a folder."""

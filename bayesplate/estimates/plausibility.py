@@ -11,11 +11,11 @@ from scipy.special import chdtrc
 from bayesplate.cards import PriorCard
 from bayesplate.errors import Fault
 from bayesplate.estimates.least_squares import log_measured, starting_rigidities
+from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.board import Board, Values, density
-from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
+from bayesplate.plate.board import Board, density
 
 Floats = NDArray[np.float64]
 
@@ -102,21 +102,6 @@ def prior_predictive(board: Board, prior: PriorCard, rng: np.random.Generator) -
     squared = np.column_stack(columns)
     possible = np.all(np.isfinite(squared) & (squared > 0), axis=1)
     return PriorPredictive(0.5 * np.log(squared[possible]) - np.log(2.0 * np.pi))
-
-
-def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int) -> dict[str, Floats]:
-    """Draws of the constants and of the board's inputs: dict of (n,) array, SI."""
-    drawn = {name: one.sample(rng, n) for name, one in prior.constants.items()}
-    inputs = {name: quantity.value(rng.standard_normal(n)) for name, quantity in board.inputs.items()}
-    return with_rigidities({**inputs, **drawn})
-
-
-def with_rigidities(values: Values) -> dict[str, Floats]:
-    """The same values with D_x, D_y, D_s, from the moduli where these are given."""
-    if set(RIGIDITIES) <= set(values):
-        return dict(values)
-    E_x, E_y, G_xy = (values[name] for name in MODULI)
-    return {**values, **rigidities(E_x, E_y, G_xy, values["thickness"], values["poisson_xy"])._asdict()}
 
 
 def unit_faults(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Fault]:

@@ -1,11 +1,13 @@
-"""Every mode of a setup up to a frequency, with its label; and the signs that hammer and sensor should see."""
+"""Every mode of a setup up to a frequency, with its label; what labels, peaks and signs say against it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, name_modes
@@ -15,6 +17,9 @@ from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.plate.setup import Setup
 
 _NODAL_LINE = 0.05
+_FEWEST_MODES, _MOST_MODES = 12, 96
+_SPARE = 1.5
+"""Modes solved for each measured peak: some peaks are missed on the bench."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,44 @@ def spectrum(
         label = Label(i + first.m, j + first.n) if correlation >= CERTAIN else None
         named.append(NamedMode(label, float(np.sqrt(eigenvalue) / (2.0 * np.pi)), correlation))
     return modes, tuple(named)
+
+
+def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Modes, tuple[NamedMode, ...]]]:
+    """Spectrum of every setup with a peak or a sign to compare it with.
+
+    Parameters
+    ----------
+    models : sequence of SetupModel
+    values : dict of float
+        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
+
+    Returns
+    -------
+    dict of (Modes, tuple of NamedMode)
+        By setup; up to above its highest peak, and at least two modes per reading.
+    """
+    found = {}
+    for model in models:
+        setup = model.setup
+        if not setup.unlabelled and setup.hammer is None:
+            continue
+        n_modes = max(_FEWEST_MODES, 2 * len(setup.readings), round(_SPARE * len(setup.readings + setup.unlabelled)))
+        found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
+        while found[setup.name][1][-1].frequency < max(setup.unlabelled, default=0.0) and n_modes < _MOST_MODES:
+            n_modes *= 2
+            found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
+    return found
+
+
+def doubtful_labels(models: Sequence[SetupModel]) -> tuple[str, ...]:
+    """One sentence per labelled mode whose shape does not clearly fit its label."""
+    return tuple(
+        f"setup {model.setup.name}: the shape of mode {label} fits its label only to {place.correlation:.2f}; "
+        "it may be its neighbour at a veering"
+        for model in models
+        for label, place in zip(model.setup.labels, model.places, strict=True)
+        if place.correlation < CERTAIN
+    )
 
 
 def sign_conflicts(setup: Setup, modes: Modes, named: tuple[NamedMode, ...], values: Values) -> tuple[str, ...]:

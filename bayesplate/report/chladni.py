@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.report.style import drawable
-from bayesplate.results.sheet import CombinedMode, Sheet, SheetMode, points
+from bayesplate.results.words import STIFFNESS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,11 +29,6 @@ _LONGEST_HEADING = 62
 _MOST_COLUMNS = 4
 _N_COMBINED = 3
 _SAND, _LOW = "black", "0.86"
-_STIFFNESS = {
-    "E_x": "stiffness along the grain, E_x",
-    "E_y": "stiffness across it, E_y",
-    "G_xy": "shear stiffness, G_xy",
-}
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,7 @@ def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> No
     for column, one in enumerate(sheet.combined):
         panel = _panel(figure, wide, _left(wide, column, len(sheet.combined)), top - _BETWEEN + _GAP / 2, sheet)
         _draw_mixture(panel, one)
-        _caption(panel, one.name, _STIFFNESS[one.modulus])
+        _caption(panel, one.name, f"{STIFFNESS[one.modulus]}, {one.modulus}")
 
 
 def _left(plan: Layout, column: int, in_row: int) -> float:

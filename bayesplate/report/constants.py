@@ -8,31 +8,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.plate.material import MODULI
 from bayesplate.report.style import PAPER, POSTERIOR, SMALL, WEIGHTED, WORDS, Picture, legend_below, plain_axes, stacked
+from bayesplate.results.summary import Percentile, Summary
+from bayesplate.results.words import GPA, STIFFNESS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_GPA = 1e9
-TITLES = {
-    "E_x": "E_x: stiffness along the grain",
-    "E_y": "E_y: stiffness across the grain",
-    "G_xy": "G_xy: shear stiffness",
-}
 _BINS = 60
 _SHOWN = (0.002, 0.998)
 _FARTHEST = 1.5
 """How far beyond the posterior a panel reaches for a point estimate, in widths of the posterior."""
 
 
-def constants_figure(summary: Mapping[str, Any], moduli: Mapping[str, NDArray[np.float64]]) -> Figure:
+def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Figure:
     """Posterior of E_x, E_y and G_xy side by side, with the point estimates that people know.
 
     Parameters
     ----------
-    summary : dict
-        As in summary.json.
+    summary : Summary
     moduli : dict of array, Pa
         Draws of each modulus.
 
@@ -45,25 +41,25 @@ def constants_figure(summary: Mapping[str, Any], moduli: Mapping[str, NDArray[np
 
     figure = Figure(figsize=(9.0, 3.4), layout="constrained")
     panels = figure.subplots(1, 3)
-    for panel, name in zip(panels, TITLES, strict=True):
+    for panel, name in zip(panels, MODULI, strict=True):
         plain_axes(panel)
         _draw(panel, name, summary, moduli[name])
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=WORDS)
-    figure.suptitle(f"{summary['name']}: what {len(summary['modes'])} modes tell", fontsize=11)
+    figure.suptitle(f"{summary.name}: what {len(summary.modes)} modes tell", fontsize=11)
     return figure
 
 
-def constants_picture(summary: Mapping[str, Any], moduli: Mapping[str, NDArray[np.float64]]) -> Picture:
+def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Picture:
     """The same below each other, for a page; parameters as of `constants_figure`."""
     figure, panels = stacked([0.95] * 3, left=0.2, right=0.2, top=0.3, bottom=0.95, gap=0.72)
-    for panel, name in zip(panels, TITLES, strict=True):
+    for panel, name in zip(panels, MODULI, strict=True):
         _draw(panel, name, summary, moduli[name])
     legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
     told = "; ".join(
-        f"{name} {entry['mean'] / _GPA:.3g} GPa, nine times in ten between {entry['q05'] / _GPA:.3g} and "
-        f"{entry['q95'] / _GPA:.3g}"
-        for name, entry in summary["elastic"].items()
+        f"{name} {entry.mean * GPA:.3g} GPa, nine times in ten between {entry.q05 * GPA:.3g} and "
+        f"{entry.q95 * GPA:.3g}"
+        for name, entry in summary.elastic.items()
     )
     caption = (
         "How probable each value is, given the readings: the higher, the more probable; the blue bar holds nine "
@@ -72,31 +68,36 @@ def constants_picture(summary: Mapping[str, Any], moduli: Mapping[str, NDArray[n
     return Picture("constants", "The elastic constants", f"Three distributions: {told}.", caption, figure)
 
 
-def _draw(panel: Axes, name: str, summary: Mapping[str, Any], moduli: NDArray[np.float64]) -> None:
+def modulus_title(name: str) -> str:
+    """What stands above the panel of a modulus."""
+    return f"{name}: {STIFFNESS[name]}"
+
+
+def _draw(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64]) -> None:
     """One constant: its draws, its 90 % interval, and the estimates of the older methods."""
-    draws = np.asarray(moduli).ravel() / _GPA
-    entry = {key: value / _GPA for key, value in summary["elastic"][name].items() if key != "unit"}
+    draws = np.asarray(moduli).ravel() * GPA
+    entry = summary.elastic[name]
     low, high = np.quantile(draws, _SHOWN)
-    points = {method: _point(summary[method][name]) for method in ("least_squares", "weighted_least_squares")}
-    band = _band(summary["percentile"], name)
+    paper, weighted = (_point(one[name]) for one in (summary.least_squares, summary.weighted_least_squares))
+    band = _band(summary.percentile, name)
     reach = _FARTHEST * (high - low)
-    others = [v for v in (*points.values(), *(band or ())) if v is not None]
+    others = [v for v in (paper, weighted, *(band or ())) if v is not None]
     seen = [low, high, *(v for v in others if low - reach < v < high + reach)]
     margin = 0.03 * (max(seen) - min(seen))
     limits = (min(seen) - margin, max(seen) + margin)
     density, bins = np.histogram(draws, bins=_BINS, range=(low, high))
     panel.stairs(density / density.max(), bins, fill=True, color=POSTERIOR, alpha=0.35, lw=0)
-    panel.plot([entry["q05"], entry["q95"]], [0.03] * 2, color=POSTERIOR, lw=5, solid_capstyle="butt",
+    panel.plot([entry.q05 * GPA, entry.q95 * GPA], [0.03] * 2, color=POSTERIOR, lw=5, solid_capstyle="butt",
                label="posterior, bar: 90 %")  # fmt: skip
     if band is not None:
         ends = np.clip(band, *limits)
         panel.plot(ends, [0.13] * 2, color="black", lw=6.4, solid_capstyle="butt")  # its rim, to be seen in grey
         panel.plot(ends, [0.13] * 2, color=PAPER, lw=5, solid_capstyle="butt", label="percentile method ± its sd")
-    _mark(panel, points["least_squares"], limits, "paper's least squares", color="#9A6A00", ls=":", lw=2.0)
-    _mark(panel, points["weighted_least_squares"], limits, "weighted least squares", color=WEIGHTED, ls="--", lw=1.2)
+    _mark(panel, paper, limits, "paper's least squares", color="#9A6A00", ls=":", lw=2.0)
+    _mark(panel, weighted, limits, "weighted least squares", color=WEIGHTED, ls="--", lw=1.2)
     panel.set(xlim=limits, ylim=(0, 1.04), yticks=[])
-    panel.set_title(TITLES[name], fontsize=WORDS, loc="left", weight="bold")
-    panel.set_xlabel(f"GPa    ({entry['mean']:.3g} ± {entry['sd']:.2g})", fontsize=SMALL)
+    panel.set_title(modulus_title(name), fontsize=WORDS, loc="left", weight="bold")
+    panel.set_xlabel(f"GPa    ({entry.mean * GPA:.3g} ± {entry.sd * GPA:.2g})", fontsize=SMALL)
     panel.spines["left"].set_visible(False)
 
 
@@ -113,13 +114,12 @@ def _mark(panel: Axes, at: float | None, limits: tuple[float, float], label: str
 
 
 def _point(value: float | None) -> float | None:
-    return None if value is None else value / _GPA
+    return None if value is None else value * GPA
 
 
-def _band(percentile: Mapping[str, Any] | None, name: str) -> tuple[float, float] | None:
+def _band(percentile: Percentile | None, name: str) -> tuple[float, float] | None:
     """Mean less and plus the percentile method's own spread, GPa; None where it gave none."""
-    if percentile is None or percentile[name]["mean"] is None:
+    if percentile is None or (mean := percentile[name].mean) is None:
         return None
-    mean = percentile[name]["mean"] / _GPA
-    sd = mean * (percentile[name]["sd_percent"] or 0.0) / 100.0
-    return mean - sd, mean + sd
+    sd = mean * (percentile[name].sd_percent or 0.0) / 100.0
+    return (mean - sd) * GPA, (mean + sd) * GPA

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from bayesplate.cards import PriorCard
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import unit_of_people
+from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.quantities import Quantity
 from bayesplate.report.priors import input_words
-from bayesplate.report.words import (
+from bayesplate.report.words import effect_sentence
+from bayesplate.results.budget import input_shares
+from bayesplate.results.contract import Spread
+from bayesplate.results.summary import Percentile, Summary
+from bayesplate.results.tables import Table, modes_table, unlabelled_table
+from bayesplate.results.words import (
+    CONSTANTS,
     GPA,
     MISSING,
-    effect_sentence,
+    constant_name,
+    decimals,
     interval,
     number,
     percent,
     plus_minus,
 )
-from bayesplate.results.budget import input_shares
-from bayesplate.results.draws import Draws
-from bayesplate.results.tables import Table, decimals, modes_table, unlabelled_table
 
-_NAMES = {"E_x": "E_x, along the grain", "E_y": "E_y, across the grain", "G_xy": "G_xy, shear"}
 _ALIKE = 1e-9
 _MAKERS = (
     ("wave_speed", "wave speed c", 1.0, "m/s"),
@@ -36,21 +38,20 @@ _MAKERS = (
 _RATIOS = (("anisotropy", "E_x / E_y"), ("E_x_over_G_xy", "E_x / G_xy"))
 
 
-def summary_sentences(summary: Mapping[str, Any]) -> list[str]:
+def summary_sentences(summary: Summary) -> list[str]:
     """The fit in three plain sentences."""
-    elastic, error = summary["elastic"], summary["error"]
-    E_x, E_y, G_xy = (plus_minus(elastic[name], GPA) for name in ("E_x", "E_y", "G_xy"))
-    n = len(summary["modes"])
+    error = summary.error
+    E_x, E_y, G_xy = (plus_minus(entry, GPA) for _, entry in summary.elastic.items())
+    n = len(summary.modes)
     sentences = [f"From {n} modes: {E_x} GPa along the grain, {E_y} GPa across it, and a shear modulus of {G_xy} GPa."]
-    left_out = error["leave_one_out_rms_cents"]
-    missed = f"The fit misses the frequencies by {_cents(error['in_sample_rms_cents'])}"
+    left_out = error.leave_one_out_rms_cents
+    missed = f"The fit misses the frequencies by {_cents(error.in_sample_rms_cents)}"
     if left_out is None:
         sentences.append(f"{missed}; there are too few modes to test it on one that it has not seen.")
     else:
         sentences.append(f"{missed}; a mode that it has not seen, by {_cents(left_out)}.")
-    weakest = max(elastic, key=lambda name: elastic[name]["sd"] / elastic[name]["mean"])
-    share = elastic[weakest]["sd"] / elastic[weakest]["mean"]
-    sentences.append(f"Least well known is {_NAMES[weakest]}: ± {percent(share, 1)}.")
+    share, weakest = max((entry.sd / entry.mean, name) for name, entry in summary.elastic.items())
+    sentences.append(f"Least well known is {constant_name(weakest)}: ± {percent(share, 1)}.")
     return sentences
 
 
@@ -58,33 +59,32 @@ def _cents(value: float) -> str:
     return f"{value:.0f} cents ({100 * (2 ** (value / 1200) - 1):.1f} %)"
 
 
-def constants_table(summary: Mapping[str, Any]) -> Table:
+def constants_table(summary: Summary) -> Table:
     """The constants beside the older methods."""
-    percentile = summary["percentile"]
     rows = []
-    for name, told in _NAMES.items():
-        entry = summary["elastic"][name]
-        digits = decimals(entry["sd"] * GPA)
-        one = percentile[name] if percentile is not None else {"mean": None, "sd_percent": None}
-        mean, sd_percent = one["mean"], one["sd_percent"]
-        spread = "" if mean is None or sd_percent is None else f" ± {mean * GPA * sd_percent / 100:.{digits}f}"
-        rows.append(
-            (
-                told,
-                plus_minus(entry, GPA),
-                interval(entry, GPA),
-                number(summary["least_squares"][name], digits, factor=GPA),
-                number(summary["weighted_least_squares"][name], digits, factor=GPA),
-                number(mean, digits, factor=GPA) + spread,
-            )
-        )
+    for name in CONSTANTS:
+        entry = summary.elastic[name]
+        digits = decimals(entry.sd * GPA)
+        points = (summary.least_squares, summary.weighted_least_squares)
+        cells = (number(estimate[name], digits, factor=GPA) for estimate in points)
+        trimmed = _trimmed(summary.percentile, name, digits)
+        rows.append((constant_name(name), plus_minus(entry, GPA), interval(entry, GPA), *cells, trimmed))
     columns = ("GPa", "mean ± sd", "90 % interval", "paper's least squares", "weighted", "percentile method")
     return Table("Elastic constants", columns, tuple(rows))
 
 
-def makers_table(summary: Mapping[str, Any]) -> Table:
+def _trimmed(percentile: Percentile | None, name: str, digits: int) -> str:
+    """The percentile method's mean and its own spread, GPa."""
+    if percentile is None or (mean := percentile[name].mean) is None:
+        return MISSING
+    sd_percent = percentile[name].sd_percent
+    spread = "" if sd_percent is None else f" ± {mean * GPA * sd_percent / 100:.{digits}f}"
+    return number(mean, digits, factor=GPA) + spread
+
+
+def makers_table(summary: Summary) -> Table:
     """What makers derive from the constants, along and across the grain."""
-    derived = summary["derived"]
+    derived = summary.derived
     rows = [
         (words, *(plus_minus(derived[f"{name}_{axis}"], factor) for axis in "xy"), unit)
         for name, words, factor, unit in _MAKERS
@@ -92,71 +92,67 @@ def makers_table(summary: Mapping[str, Any]) -> Table:
     return Table("What makers compare", ("", "along", "across", "unit"), tuple(rows))
 
 
-def ratios_table(summary: Mapping[str, Any]) -> Table:
+def ratios_table(summary: Summary) -> Table:
     """Ratios of the constants, and the density."""
-    derived = summary["derived"]
+    derived = summary.derived
     rows = [(words, plus_minus(derived[name])) for name, words in _RATIOS]
     rows.append(("density ρ, kg/m³", plus_minus(derived["density"])))
-    rows += [(f"{name}, N m", plus_minus(entry)) for name, entry in summary["rigidity"].items()]
+    rows += [(f"{name}, N m", plus_minus(entry)) for name, entry in summary.rigidity.items()]
     return Table("Ratios, density, rigidities", ("", "mean ± sd"), tuple(rows))
 
 
-def effects_table(summary: Mapping[str, Any]) -> Table | None:
+def effects_table(summary: Summary) -> Table | None:
     """Parameters of the declared effects; None if none is declared."""
     rows = [
         (f"{effect_name(effect)}, {where}", parameter, *_measured(entry))
-        for where, effects in summary["effects"].items()
+        for where, effects in summary.effects.items()
         for effect, parameters in effects.items()
         for parameter, entry in parameters.items()
     ]
     return Table("Declared effects", ("effect", "parameter", "mean ± sd", "unit"), tuple(rows)) if rows else None
 
 
-def _measured(entry: Mapping[str, Any]) -> tuple[str, str]:
+def _measured(entry: Spread) -> tuple[str, str]:
     """Mean ± sd and the unit, in the unit that people use."""
-    factor, unit = unit_of_people(entry["unit"])
-    return _spread({key: entry[key] * factor for key in ("mean", "sd")}), unit or MISSING
+    factor, unit = unit_of_people(entry.unit)
+    return _spread(entry, factor), unit or MISSING
 
 
-def _spread(entry: Mapping[str, Any]) -> str:
+def _spread(entry: Spread, factor: float) -> str:
     """Mean ± sd of a number of any size."""
-    if entry["sd"] <= _ALIKE * abs(entry["mean"]):
-        return f"{entry['mean']:.4g}"
-    return f"{entry['mean']:.3g} ± {entry['sd']:.2g}"
+    mean, sd = entry.mean * factor, entry.sd * factor
+    return f"{mean:.4g}" if sd <= _ALIKE * abs(mean) else f"{mean:.3g} ± {sd:.2g}"
 
 
-def effect_sentences(summary: Mapping[str, Any]) -> list[str]:
+def effect_sentences(summary: Summary) -> list[str]:
     """One plain sentence a declared effect."""
-    return [f"{effect_name(name)}: {effect_sentence(name)}" for name in summary["model"]["effects"]]
+    return [f"{effect_name(name)}: {effect_sentence(name)}" for name in summary.model.effects]
 
 
-def budget_table(inference: Inference, draws: Draws, summary: Mapping[str, Any]) -> Table:
+def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
     """Where the uncertainty of each constant comes from."""
     shares = input_shares(draws)
-    alone = dict(zip(_NAMES, inference.problem.identifiability.standard_errors, strict=True))
+    alone = dict(zip(CONSTANTS, inference.problem.identifiability.standard_errors, strict=True))
     rows = []
-    for name in _NAMES:
-        entry = summary["elastic"][name]
+    for name in CONSTANTS:
+        entry = summary.elastic[name]
         largest = sorted(shares[name].items(), key=lambda item: -item[1])[:2]
         board = inference.problem.board
         named = {one.name: input_words(one, board)[0] for one in board.uncertain}
         told = [f"{named[key]} {percent(share)}" for key, share in largest if share >= 0.05]
-        both = (f"{100 * entry['sd'] / entry['mean']:.1f} %", f"{100 * alone[name]:.1f} %")
+        both = (f"{100 * entry.sd / entry.mean:.1f} %", f"{100 * alone[name]:.1f} %")
         rows.append((name, *both, ", ".join(told) or MISSING))
     columns = ("constant", "sd", "from the expected noise alone", "share of the variance from inputs")
     return Table("Where the uncertainty comes from", columns, tuple(rows))
 
 
-def inputs_table(board: Board, summary: Mapping[str, Any]) -> Table:
+def inputs_table(board: Board, summary: Summary) -> Table:
     """What the card states, and what became of it where it was uncertain."""
     rows = []
     for one in board.parameters:
         words, factor, unit = input_words(one, board)
-        after = summary["inputs"].get(one.name)
-        rows.append(
-            (f"{words}, {unit}" if unit else words, _stated(one.prior, factor), MISSING if after is None else
-             _spread({key: after[key] * factor for key in ("mean", "sd")}))
-        )  # fmt: skip
+        after = _spread(summary.inputs[one.name], factor) if one.name in summary.inputs else MISSING
+        rows.append((f"{words}, {unit}" if unit else words, _stated(one.prior, factor), after))
     return Table("Inputs", ("quantity", "as stated", "after the fit"), tuple(rows))
 
 
@@ -195,49 +191,49 @@ def _prior(quantity: Quantity) -> str:
     return f"log-uniform, {quantity.lower * factor:.4g} to {quantity.upper * factor:.4g} {unit}"
 
 
-def modes_tables(summary: Mapping[str, Any]) -> list[Table]:
+def modes_tables(summary: Summary) -> list[Table]:
     """The labelled modes, and the peaks without a label."""
     unlabelled = unlabelled_table(summary)
     return [modes_table(summary), *([unlabelled] if unlabelled else [])]
 
 
-def laws_table(summary: Mapping[str, Any]) -> Table:
+def laws_table(summary: Summary) -> Table:
     """Posterior means under both laws."""
     rows = []
-    for name in _NAMES:
-        both = (summary[f"{law}_means"][name] for law in ("linear", "exact"))
-        rows.append((name, *(number(value, 3, factor=GPA) for value in both)))
+    for name in CONSTANTS:
+        both = (summary.linear_means, summary.exact_means)
+        rows.append((name, *(number(means[name], 3, factor=GPA) for means in both)))
     return Table("Means under both frequency laws, GPa", ("constant", "linear law", "exact law"), tuple(rows))
 
 
-def model_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+def model_rows(summary: Summary) -> list[tuple[str, str]]:
     """What was fitted, as pairs of a name and a value."""
-    model, error = summary["model"], summary["error"]
-    effects = joined([effect_name(name) for name in model["effects"]]) or "none"
-    noise = "Student's distribution (robust)" if model["robust"] else "normal distribution"
+    model, error = summary.model, summary.error
+    effects = joined([effect_name(name) for name in model.effects]) or "none"
+    noise = "Student's distribution (robust)" if model.robust else "normal distribution"
     return [
-        ("plate theory", model["theory"]),
-        ("frequency law", f"{model['law']}; the linear one is off by {error['linearisation_rms_cents']:.1f} cents"),
+        ("plate theory", model.theory),
+        ("frequency law", f"{model.law}; the linear one is off by {number(error.linearisation_rms_cents, 1)} cents"),
         ("declared effects", effects),
         ("noise of a reading", noise),
-        ("prior card", model["prior"]),
-        ("exact law checked", f"within {error['exact_law_worst_cents']:.2g} cents of full solves"),
+        ("prior card", model.prior),
+        ("exact law checked", f"within {error.exact_law_worst_cents:.2g} cents of full solves"),
     ]
 
 
-def sampler_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+def sampler_rows(summary: Summary) -> list[tuple[str, str]]:
     """How the sampler fared, beside what the gate asks for."""
-    one = summary["sampler"]
+    one, gate = summary.sampler, Gate()
     return [
-        ("ensembles, walkers, steps", f"{one['ensembles']}, {one['walkers']}, {one['steps']}"),
-        ("largest R-hat (at most 1.01)", number(one["rhat_max"], 4)),
-        ("smallest effective size (at least 400)", number(one["ess_min"], 0)),
-        ("largest autocorrelation time, steps", number(one["tau_max"], 1)),
-        ("accepted proposals", percent(one["acceptance"])),
+        ("ensembles, walkers, steps", f"{one.ensembles}, {one.walkers}, {one.steps}"),
+        (f"largest R-hat (at most {gate.rhat_max:g})", number(one.rhat_max, 4)),
+        (f"smallest effective size (at least {gate.ess_min:g})", number(one.ess_min, 0)),
+        ("largest autocorrelation time, steps", number(one.tau_max, 1)),
+        ("accepted proposals", percent(one.acceptance)),
     ]
 
 
-def run_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+def run_rows(summary: Summary) -> list[tuple[str, str]]:
     """What made the numbers, so that they can be made again."""
-    versions = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
-    return [("seed", str(summary["seed"])), ("versions", versions), ("SHA-256 of the card", summary["card_sha256"])]
+    versions = ", ".join(f"{name} {version}" for name, version in summary.versions.items())
+    return [("seed", str(summary.seed)), ("versions", versions), ("SHA-256 of the card", summary.card_sha256)]

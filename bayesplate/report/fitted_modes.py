@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bayesplate.plate.setup import Setup
 from bayesplate.report.chladni import draw_edge, draw_sand
 from bayesplate.report.style import DARK, SMALL, WIDTH, WORDS, Picture
+from bayesplate.results.modes import ModeRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +29,7 @@ CAPTION = (
 
 def fitted_modes_picture(
     setup: Setup,
-    modes: Sequence[Mapping[str, Any]],
+    modes: Sequence[ModeRow],
     shapes: Mapping[str, NDArray[np.float64]],
     aspect_ratio: float,
     name: str = "modes",
@@ -38,8 +39,8 @@ def fitted_modes_picture(
     Parameters
     ----------
     setup : Setup
-    modes : sequence of dict
-        Its entries of summary.json's modes.
+    modes : sequence of ModeRow
+        Its rows of the summary.
     shapes : dict of (n_x, n_y) array
         By label.
     aspect_ratio : float
@@ -60,7 +61,7 @@ def fitted_modes_picture(
     row = size[1] + _CAPTION
     height = n_rows * row + _MARGIN
     figure = Figure(figsize=(WIDTH, height))
-    ordered = sorted(modes, key=lambda mode: mode["measured_hz"])
+    ordered = sorted(modes, key=lambda mode: mode.measured_hz)
     for i, mode in enumerate(ordered):
         at_row, column = divmod(i, _N_COLUMNS)
         left = _SIDE + column * cell + (cell - _GAP - side) / 2
@@ -70,22 +71,22 @@ def fitted_modes_picture(
         panel.set_axis_off()
         for edge, word in setup.edges.items():
             draw_edge(panel, edge, word, _BAND / size[0] if edge[0] == "x" else _BAND / size[1])
-        draw_sand(panel, shapes[mode["label"]])
+        draw_sand(panel, shapes[mode.label])
         _caption(panel, mode)
     told = "; ".join(
-        f"{mode['label']} measured {mode['measured_hz']:.5g} Hz, predicted {mode['predicted_hz']['mean']:.5g} Hz"
+        f"{mode.label} measured {mode.measured_hz:.5g} Hz, predicted {mode.predicted_hz.mean:.5g} Hz"
         for mode in ordered
     )
     title = f"Chladni figures of the fitted modes, setup {setup.name}"
     return Picture(name, title, f"Nodal lines of {len(ordered)} modes: {told}.", CAPTION, figure)
 
 
-def _caption(panel: Axes, mode: Mapping[str, Any]) -> None:
+def _caption(panel: Axes, mode: ModeRow) -> None:
     """Name, measured and predicted frequency below a panel."""
     common: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
-    panel.annotate(mode["label"], (0.5, 0.0), (0, -5), fontsize=WORDS, weight="bold", **common)
-    panel.annotate(f"measured {_hertz(mode['measured_hz'])}", (0.5, 0.0), (0, -16), fontsize=SMALL, **common)
-    predicted = f"predicted {_hertz(mode['predicted_hz']['mean'])}"
+    panel.annotate(mode.label, (0.5, 0.0), (0, -5), fontsize=WORDS, weight="bold", **common)
+    panel.annotate(f"measured {_hertz(mode.measured_hz)}", (0.5, 0.0), (0, -16), fontsize=SMALL, **common)
+    predicted = f"predicted {_hertz(mode.predicted_hz.mean)}"
     panel.annotate(predicted, (0.5, 0.0), (0, -26), fontsize=SMALL, color=DARK, **common)
 
 

@@ -19,7 +19,9 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.exports import write_before_after
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
+from bayesplate.estimates.shapes import labelled_shapes
 from bayesplate.plate.board import vibrating_lengths
+from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
 from bayesplate.report.board import board_picture
@@ -35,11 +37,10 @@ from bayesplate.report.shares import shares_picture
 from bayesplate.report.signatures import before_after_picture, signatures_picture
 from bayesplate.report.style import Picture, visible
 from bayesplate.report.verdict import diagnosis_section
-from bayesplate.results.draws import Draws
 from bayesplate.results.exports import write_exports
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
 from bayesplate.results.references import references
-from bayesplate.results.shapes import fitted_shapes
+from bayesplate.results.summary import Summary
 
 MOST_MODES_OF_PERCENTILES = 12
 """4017 subsets; with more modes the estimates are too many to be drawn, and take seconds."""
@@ -72,7 +73,7 @@ def write_report(
     card: BoardCard,
     inference: Inference,
     draws: Draws,
-    summary: Mapping[str, Any],
+    summary: Summary,
     diagnosis: Diagnosis | None = None,
 ) -> Path:
     """Write report.html, its figures as PNG and SVG, and the tables for other programs.
@@ -85,8 +86,7 @@ def write_report(
     inference : Inference
         Of a run that passed the gate.
     draws : Draws
-    summary : dict
-        As in summary.json.
+    summary : Summary
     diagnosis : Diagnosis, optional
         Then `inference`, `draws` and `summary` are those of the refitted model.
 
@@ -102,7 +102,7 @@ def write_report(
         every = [one for found in groups.values() for one in found]
         vector = save_pictures(every, folder / FIGURES, "svg")
         shown = {place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}
-        title = inference.problem.board.title or summary["name"]
+        title = inference.problem.board.title or summary.name
         write_exports(folder, summary, title)
         if diagnosis is not None:
             write_before_after(folder, diagnosis, title)
@@ -124,7 +124,7 @@ def _uncollected() -> Iterator[None]:
 
 
 def pictures(
-    inference: Inference, draws: Draws, summary: Mapping[str, Any], diagnosis: Diagnosis | None = None
+    inference: Inference, draws: Draws, summary: Summary, diagnosis: Diagnosis | None = None
 ) -> dict[str, list[Picture]]:
     """Every figure of the page, by the place where it stands."""
     problem = inference.problem
@@ -138,9 +138,9 @@ def pictures(
         "weak": [shares_picture(summary, problem.identifiability)],
         "board": [board_picture(board)],
         "modes": _modes(inference, draws, summary),
-        "errors": [residuals_picture(board, summary)],
+        "errors": [residuals_picture(summary)],
         "folded": [
-            predictive_picture(board, summary, draws.predictive),
+            predictive_picture(summary, draws.predictive),
             priors_picture(problem, draws),
             pairs_picture(problem, draws),
             health_picture(inference),
@@ -167,15 +167,16 @@ def _percentiles(inference: Inference, draws: Draws) -> list[Picture]:
     return [percentiles_picture(found, n_modes, draws.moduli)]
 
 
-def _modes(inference: Inference, draws: Draws, summary: Mapping[str, Any]) -> list[Picture]:
+def _modes(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
     """One picture a setup."""
-    board = inference.problem.board
-    shapes = fitted_shapes(inference.problem, draws)
+    problem = inference.problem
+    board = problem.board
+    shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
     values = board.nominal()
     found = []
     for setup in board.setups:
         length_x, length_y = vibrating_lengths(values, setup)
-        own = [mode for mode in summary["modes"] if mode["setup"] == setup.name]
+        own = [mode for mode in summary.modes if mode.setup == setup.name]
         name = "modes" if len(board.setups) == 1 else f"modes-{setup.name}"
         found.append(fitted_modes_picture(setup, own, shapes[setup.name], float(length_x / length_y), name))
     return found
@@ -193,7 +194,7 @@ def render(
     card: BoardCard,
     inference: Inference,
     draws: Draws,
-    summary: Mapping[str, Any],
+    summary: Summary,
     shown: Mapping[str, Sequence[Shown]],
     diagnosis: Diagnosis | None = None,
 ) -> str:
@@ -209,8 +210,8 @@ def render(
         title=board.title or board.name,
         name=board.name,
         sentences=content.summary_sentences(summary),
-        warnings=summary["warnings"],
-        weak=summary["identifiability"],
+        warnings=summary.warnings,
+        weak=summary.identifiability,
         effects=content.effect_sentences(summary),
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
         pictures=_with_all_places(shown),

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Problem
 from bayesplate.report.priors import input_words
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, plain_axes, short
 from bayesplate.results.budget import input_shares
-from bayesplate.results.draws import Draws
+from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,7 +79,7 @@ def pairs_picture(problem: Problem, draws: Draws) -> Picture:
 
 def chosen(problem: Problem, draws: Draws) -> dict[str, Floats]:
     """Moduli in GPa, the noise of each setup in %, and the inputs with the largest share in the moduli's variance."""
-    columns = {f"{name}, GPa": values.ravel() / 1e9 for name, values in draws.moduli.items()}
+    columns = {f"{name}, GPa": values.ravel() * GPA for name, values in draws.moduli.items()}
     setups = problem.board.setups
     for i, setup in enumerate(setups[: MOST - len(columns) - 1]):
         columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i].ravel()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.percentile import PercentileEstimate
 from bayesplate.plate.material import MODULI
-from bayesplate.report.constants import TITLES
+from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
     PAPER,
     POSTERIOR,
@@ -23,12 +23,12 @@ from bayesplate.report.style import (
     plain_axes,
     stacked,
 )
+from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_GPA = 1e9
 _SHOWN = (0.002, 0.998)
 _BINS = 60
 _MANY, _MANY_MODES = 200, 12
@@ -76,7 +76,7 @@ def percentiles_picture(
     figure, panels = stacked(heights, left=0.55, top=0.3, bottom=0.95, gap=0.72)
     for panel, name in zip(panels, MODULI, strict=True):
         _draw(panel, name, percentile, n_modes, moduli[name])
-        panel.set_title(TITLES[name], fontsize=WORDS, loc="left", weight="bold")
+        panel.set_title(modulus_title(name), fontsize=WORDS, loc="left", weight="bold")
         panel.set_ylabel("modes used", fontsize=SMALL)
     legend_below(figure, _handles(panels[0]), 2)
     kept = ", ".join(f"{int(n)} of {name}" for n, name in zip(percentile.kept.sum(axis=0), MODULI, strict=True))
@@ -96,9 +96,9 @@ def _draw(panel: Axes, name: str, percentile: PercentileEstimate, n_modes: int, 
     """One constant: the posterior at the foot, the band, and a dot an estimate."""
     i = MODULI.index(name)
     sizes = np.concatenate([np.full(comb(n_modes, size), size) for size in range(3, n_modes + 1)])
-    draws = np.asarray(moduli).ravel() / _GPA
-    estimates, kept = percentile.estimates[:, i] / _GPA, percentile.kept[:, i]
-    mean, sd = percentile.mean[name] / _GPA, percentile.sd[name] / _GPA
+    draws = np.asarray(moduli).ravel() * GPA
+    estimates, kept = percentile.estimates[:, i] * GPA, percentile.kept[:, i]
+    mean, sd = percentile.mean[name] * GPA, percentile.sd[name] * GPA
     low, high = _limits(draws, estimates[kept], mean, sd)
     density, bins = np.histogram(draws, bins=_BINS, range=(low, high))
     panel.stairs(2.2 * density / density.max(), bins, baseline=0, fill=True, color=POSTERIOR, alpha=0.35)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter, unit_of_people
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Problem
 from bayesplate.quantities import Quantity
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, legend_below, plain_axes, short
-from bayesplate.results.draws import Draws
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

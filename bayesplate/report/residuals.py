@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.board import Board
-from bayesplate.posterior.likelihood import Readings
 from bayesplate.report.style import (
     BLUE,
     DARK,
@@ -24,6 +22,10 @@ from bayesplate.report.style import (
     short,
     stacked,
 )
+from bayesplate.results.modes import ModeRow
+from bayesplate.results.summary import Summary
+from bayesplate.results.tables import noise_cents
+from bayesplate.results.words import mode_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,35 +34,35 @@ _ROW = 0.235
 _QUANTILES = (0.05, 0.25, 0.75, 0.95)
 
 
-def residuals_picture(board: Board, summary: Mapping[str, Any]) -> Picture:
-    """What the best fit leaves of each mode, with and without having seen it.
+def residuals_picture(summary: Summary) -> Picture:
+    """How far the fitted model misses each reading, and a refit that has not seen it.
 
     Parameters
     ----------
-    board : Board
-    summary : dict
-        As in summary.json.
+    summary : Summary
 
     Returns
     -------
     Picture
     """
-    modes = summary["modes"]
-    below, above = rounding_cents(board)
-    residual = np.array([mode["residual_cents"] for mode in modes])
-    left_out = np.array([np.nan if m["left_out_cents"] is None else m["left_out_cents"] for m in modes], dtype=float)
-    noise = np.array([cents(summary["noise"][mode["setup"]]["q50"]) for mode in modes])
+    modes = summary.modes
+    residual = np.array([mode.residual_cents for mode in modes])
+    low, high = np.array([mode.residual_interval_cents for mode in modes]).T
+    below, above = _rounding(modes)
+    left_out = np.array([np.nan if mode.left_out_cents is None else mode.left_out_cents for mode in modes])
+    noise = np.array([noise_cents(summary, mode) for mode in modes])
     figure, panel = _rows(modes)
     rows = np.arange(len(modes))
     panel.barh(rows, 2 * noise, left=-noise, height=0.9, color=LIGHT, label="noise, ± its sd")
     if (above > below).any():
         panel.hlines(rows, residual + below, residual + above, color=ORANGE, lw=5, label="what rounding may hide")
+    panel.hlines(rows, low, high, color=BLUE, lw=1.4, label="its 90 % interval")
     panel.plot(residual, rows, "o", color=BLUE, ms=6, mec="black", mew=0.6, label="error of the fit")
     panel.plot(left_out, rows, "D", mfc="white", mec="black", ms=5, label="error if left out of the fit")
     panel.axvline(0, color=DARK, lw=0.8)
     panel.set_xlabel("measured above (+) or below (-) the fit, cents", fontsize=SMALL)
     legend_below(figure, panel.get_legend_handles_labels()[0], 2)
-    told = "; ".join(f"{mode['label']} {value:+.0f}" for mode, value in zip(modes, residual, strict=True))
+    told = "; ".join(f"{mode.label} {mode.residual_cents:+.0f}" for mode in modes)
     caption = (
         "17 cents are about 1 % of a frequency, 100 cents are a semitone. An open diamond beyond the grey band is a "
         "mode that the others do not foretell. Where two modes lie close together, the two kinds of error can differ "
@@ -69,13 +71,12 @@ def residuals_picture(board: Board, summary: Mapping[str, Any]) -> Picture:
     return Picture("residuals", "How far each mode is missed", f"Errors of the fit, cents: {told}.", caption, figure)
 
 
-def predictive_picture(board: Board, summary: Mapping[str, Any], predictive: NDArray[np.float64]) -> Picture:
+def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Picture:
     """What the model expects to be read, beside what was read.
 
     Parameters
     ----------
-    board : Board
-    summary : dict
+    summary : Summary
     predictive : (..., n_modes) array, Hz
         Draws of the next reading.
 
@@ -83,11 +84,11 @@ def predictive_picture(board: Board, summary: Mapping[str, Any], predictive: NDA
     -------
     Picture
     """
-    modes = summary["modes"]
-    measured = np.array([mode["measured_hz"] for mode in modes])
+    modes = summary.modes
+    measured = np.array([mode.measured_hz for mode in modes])
     draws = cents(np.log(np.maximum(predictive.reshape(-1, len(modes)), 1e-9) / measured))
     q05, q25, q75, q95 = np.quantile(draws, _QUANTILES, axis=0)
-    below, above = rounding_cents(board)
+    below, above = _rounding(modes)
     figure, panel = _rows(modes)
     rows = np.arange(len(modes))
     panel.hlines(rows, q05, q95, color=BLUE, alpha=0.35, lw=9, label="expected, 90 %")
@@ -110,19 +111,17 @@ def predictive_picture(board: Board, summary: Mapping[str, Any], predictive: NDA
     return Picture("predictive", "What the model would expect you to read", alt, caption, figure)
 
 
-def rounding_cents(board: Board) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rounding(modes: Sequence[ModeRow]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """How far below and above each reading its rounding interval reaches: two (n_modes,) arrays, cents."""
-    readings = [Readings.of(setup) for setup in board.setups]
-    below = np.concatenate([cents(one.log_low - one.log_frequency) for one in readings])
-    above = np.concatenate([cents(one.log_high - one.log_frequency) for one in readings])
+    below, above = np.array([mode.rounding_cents or (0.0, 0.0) for mode in modes]).T
     return below, above
 
 
-def _rows(modes: Sequence[Mapping[str, Any]]) -> tuple[Any, Axes]:
+def _rows(modes: Sequence[ModeRow]) -> tuple[Any, Axes]:
     """A panel with a row a mode, the first on top; a long list of setups has their names beside the labels."""
-    setups = list(dict.fromkeys(mode["setup"] for mode in modes))
+    setups = list(dict.fromkeys(mode.setup for mode in modes))
     several = len(setups) > 1
-    names = [f"{mode['label']} {mode['setup']}" if several else mode["label"] for mode in modes]
+    names = [mode_name(mode.label, mode.setup, several=several) for mode in modes]
     left = 0.62 if not several else min(1.6, 0.62 + 0.075 * (1 + max(len(name) for name in setups)))
     figure, (panel,) = stacked([_ROW * len(modes) + 0.1], left=left, bottom=0.95)
     panel.set(ylim=(len(modes) - 0.5, -0.5))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from bayesplate.estimates.identifiability import Identifiability
 from bayesplate.report.style import BLUE, DARK, GREEN, GREY, ORANGE, SMALL, WORDS, Picture, legend_below, short, stacked
+from bayesplate.results.summary import Summary
+from bayesplate.results.words import mode_name
 
 _STYLES = {
     "E_x": (BLUE, "", "bending along the grain, E_x"),
@@ -19,13 +18,12 @@ _STYLES = {
 _ROW = 0.27
 
 
-def shares_picture(summary: Mapping[str, Any], found: Identifiability) -> Picture:
+def shares_picture(summary: Summary, found: Identifiability) -> Picture:
     """Draw the energy of each mode.
 
     Parameters
     ----------
-    summary : dict
-        As in summary.json.
+    summary : Summary
     found : Identifiability
         Its shares belong to the summary's modes.
 
@@ -33,9 +31,9 @@ def shares_picture(summary: Mapping[str, Any], found: Identifiability) -> Pictur
     -------
     Picture
     """
-    modes = summary["modes"]
-    several = len({mode["setup"] for mode in modes}) > 1
-    names = [f"{mode['label']} {short(mode['setup'], 14)}" if several else mode["label"] for mode in modes]
+    modes = summary.modes
+    several = len({mode.setup for mode in modes}) > 1
+    names = [mode_name(mode.label, short(mode.setup, 14), several=several) for mode in modes]
     left = 0.62 if not several else min(1.6, 0.3 + 0.075 * max(len(name) for name in names))
     shares = np.column_stack([found.shares, 1.0 - found.shares.sum(axis=1)])
     if np.abs(shares[:, 3]).max() < 0.005:
@@ -52,7 +50,7 @@ def shares_picture(summary: Mapping[str, Any], found: Identifiability) -> Pictur
         start = start + wide
     for row, mode in zip(rows, modes, strict=True):
         panel.text(
-            102, float(row), f"{mode['leverage']:.2f}", fontsize=SMALL, va="center", color=DARK, clip_on=False,
+            102, float(row), f"{mode.leverage:.2f}", fontsize=SMALL, va="center", color=DARK, clip_on=False,
         )  # fmt: skip
     panel.text(102, -0.85, "leverage", fontsize=SMALL, va="center", color=DARK, clip_on=False)
     panel.set(xlim=(0, 100), ylim=(len(modes) - 0.5, -0.5))

@@ -45,38 +45,6 @@ class Archive:
     attributes: dict[str, str]
 
 
-def thin_walker_major(
-    draws: NDArray[np.float64], burn_in: int, tau_max: float, *, n_draws_max: int | None = None
-) -> NDArray[np.float64]:
-    """Thin the draws to half an autocorrelation time and order them for ArviZ: chain = ensemble.
-
-    Within a chain come all steps of the first walker, then all of the second, and so on.  In this order neighbours are
-    steps of one walker, so that ArviZ's effective sizes see the true autocorrelation; step by step across walkers it
-    would take the walkers of a step for consecutive draws.
-
-    Parameters
-    ----------
-    draws : (n_ensembles, n_steps, n_walkers, ...) array
-        Draws, or anything else with these first axes, as the log posterior.
-    burn_in : int
-        Steps to drop first.
-    tau_max : float, steps
-        Largest autocorrelation time.
-    n_draws_max : int, optional
-        Thin further until a chain holds at most so many draws (but at least one a walker).
-
-    Returns
-    -------
-    (n_ensembles, n_draws, ...) array
-    """
-    n_ensembles, n_steps, n_walkers = draws.shape[:3]
-    every = max(1, int(tau_max / 2.0)) if np.isfinite(tau_max) else 1
-    if n_draws_max is not None:
-        every = max(every, -(-(n_steps - burn_in) // max(1, n_draws_max // n_walkers)))
-    walkers_first = np.swapaxes(draws[:, burn_in::every], 1, 2)
-    return walkers_first.reshape(n_ensembles, -1, *draws.shape[3:])
-
-
 def write_archive(
     path: Path,
     *,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesplate.plate.board import Board
-from bayesplate.results.draws import Draws
+from bayesplate.posterior.draws import Draws
 
 LARGE_SHARE = 0.5
 

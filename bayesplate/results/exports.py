@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+from bayesplate.results.contract import ByConstant, Spread
 from bayesplate.results.folder import CONSTANTS, write_text
-from bayesplate.results.tables import decimals
+from bayesplate.results.summary import Percentile, Summary
+from bayesplate.results.words import GPA, decimals, interval
 
-_PA_TO_GPA = 1e-9
 _STARTS_A_FORMULA = ("=", "+", "-", "@")
 _LATEX = {
     "\\": r"\textbackslash{}",
@@ -33,15 +33,14 @@ _LATEX = {
 Cell = str | float | int | None
 
 
-def write_exports(folder: Path, summary: Mapping[str, Any], title: str) -> tuple[Path, ...]:
+def write_exports(folder: Path, summary: Summary, title: str) -> tuple[Path, ...]:
     """Write the tables of a fit.
 
     Parameters
     ----------
     folder : Path
         Must be there.
-    summary : dict
-        As in summary.json.
+    summary : Summary
     title : str
         Of the board; any text.
 
@@ -55,32 +54,43 @@ def write_exports(folder: Path, summary: Mapping[str, Any], title: str) -> tuple
     return tuple(folder / name for name in texts)
 
 
-def constants_csv(summary: Mapping[str, Any]) -> str:
+def constants_csv(summary: Summary) -> str:
     """Moduli in GPa and rigidities in N m: mean, sd, quantiles, and the older methods' estimates, at full precision."""
     header = ["constant", "unit", "mean", "sd", "q05", "q25", "q50", "q75", "q95"]
     header += ["least_squares", "weighted_least_squares", "percentile_mean", "percentile_sd_percent"]
     rows: list[list[Cell]] = [list(header)]
-    for place, unit, factor in (("elastic", "GPa", _PA_TO_GPA), ("rigidity", "N m", 1.0)):
-        for name, entry in summary[place].items():
-            spread = [entry[key] * factor for key in header[2:9]]
-            points = [_scaled(summary[method][name], factor) for method in header[9:11]]
-            trimmed = (summary["percentile"] or {}).get(name) or {"mean": None, "sd_percent": None}
-            rows.append([name, unit, *spread, *points, _scaled(trimmed["mean"], factor), trimmed["sd_percent"]])
+    groups: tuple[tuple[ByConstant[Spread], str, float], ...] = (
+        (summary.elastic, "GPa", GPA),
+        (summary.rigidity, "N m", 1.0),
+    )
+    for group, unit, factor in groups:
+        for name, one in group.items():
+            spread = [value * factor for value in (one.mean, one.sd, one.q05, one.q25, one.q50, one.q75, one.q95)]
+            both = (summary.least_squares, summary.weighted_least_squares)
+            points = [_scaled(estimate[name], factor) for estimate in both]
+            rows.append([name, unit, *spread, *points, *_trimmed(summary.percentile, name)])
     return csv_text(rows)
 
 
-def constants_tex(summary: Mapping[str, Any], title: str) -> str:
+def _trimmed(percentile: Percentile | None, name: str) -> tuple[float | None, float | None]:
+    """Mean (GPa) and spread (per cent) of the percentile method, which estimates moduli alone."""
+    if percentile is None or name not in percentile.NAMES:
+        return None, None
+    return _scaled(percentile[name].mean, GPA), percentile[name].sd_percent
+
+
+def constants_tex(summary: Summary, title: str) -> str:
     """The moduli as a table to paste into a paper: a tabular that needs no package."""
     rows = []
-    for name, entry in summary["elastic"].items():
-        mean, sd, low, high = (entry[key] * _PA_TO_GPA for key in ("mean", "sd", "q05", "q95"))
-        digits = decimals(sd)
+    for name, entry in summary.elastic.items():
+        digits = decimals(entry.sd * GPA)
         symbol = f"${name[0]}_{{{name[2:]}}}$"
-        points = [_rounded(summary[method][name], digits) for method in ("least_squares", "weighted_least_squares")]
-        spread = rf"${mean:.{digits}f} \pm {sd:.{digits}f}$"
-        rows.append([symbol, spread, f"{low:.{digits}f} to {high:.{digits}f}", *points])
+        both = (summary.least_squares, summary.weighted_least_squares)
+        points = [_rounded(estimate[name], digits) for estimate in both]
+        spread = rf"${entry.mean * GPA:.{digits}f} \pm {entry.sd * GPA:.{digits}f}$"
+        rows.append([symbol, spread, interval(entry, GPA), *points])
     header = ["GPa", r"mean $\pm$ sd", r"90\,\% interval", "least squares", "weighted"]
-    source = f"% Elastic constants of {latex(title)}, seed {summary['seed']}, {len(summary['modes'])} modes"
+    source = f"% Elastic constants of {latex(title)}, seed {summary.seed}, {len(summary.modes)} modes"
     return tabular(source, header, rows)
 
 
@@ -118,5 +128,5 @@ def _scaled(value: float | None, factor: float) -> float | None:
     return None if value is None else value * factor
 
 
-def _rounded(value: float | None, digits: int, factor: float = _PA_TO_GPA) -> str:
+def _rounded(value: float | None, digits: int, factor: float = GPA) -> str:
     return "--" if value is None else f"{value * factor:.{digits}f}"

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from bayesplate.errors import CheckpointError, Fault, InputError
+from bayesplate.results.contract import as_json
 
 SUMMARY = "summary.json"
 ARCHIVE = "posterior.nc"
@@ -147,9 +148,9 @@ def make_folder(folder: Path) -> None:
         raise InputError(fault) from error
 
 
-def json_text(content: Mapping[str, Any]) -> str:
+def json_text(content: Any) -> str:
     """JSON of a result, as it is written and printed; refuses numbers that JSON does not have."""
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(as_json(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_text(path: Path, text: str) -> None:

@@ -1,123 +1,144 @@
-"""The modes of a summary: measured beside predicted, errors in sample and left out, and the peaks without a label."""
+"""The modes of a summary: each reading beside what the fitted model predicts, and the peaks without a label."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.estimates.identifiability import identifiability
-from bayesplate.estimates.least_squares import log_measured
-from bayesplate.estimates.leave_one_out import Errors, prediction_errors
 from bayesplate.frequencies.laws import cents
-from bayesplate.frequencies.spectrum import NamedMode, spectrum
-from bayesplate.modes.solve import Modes
-from bayesplate.posterior.inference import Inference, Problem
-from bayesplate.posterior.region import predictor
-from bayesplate.results.draws import Draws, finite
-
-Spectrum = tuple[Modes, tuple[NamedMode, ...]]
-
-_FEWEST_MODES, _MOST_MODES = 12, 96
-_SPARE = 1.5
-"""Modes solved for each measured peak: some peaks are missed on the bench."""
+from bayesplate.frequencies.spectrum import NamedMode
+from bayesplate.plate.board import Board
+from bayesplate.posterior.assessment import Assessment
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Problem
+from bayesplate.results.contract import finite
 
 
-def mode_errors(inference: Inference, draws: Draws) -> Errors:
-    """Errors of the weighted least-squares fit under the exact law, in sample and left out.
+@dataclass(frozen=True)
+class Prediction:
+    """What the posterior says of a frequency, Hz."""
 
-    One estimator for both, at the posterior's median noise; uncertain inputs move within their priors. The posterior
-    itself may lie closer to a reading that is coarsely rounded, because it knows the interval.
+    mean: float
+    q05: float
+    q95: float
+
+
+@dataclass(frozen=True)
+class ModeRow:
+    """A labelled mode; but for `left_out_cents` and `leverage` every number belongs to the posterior.
+
+    Attributes
+    ----------
+    setup, label : str
+    measured_hz : float
+    predicted_hz : Prediction
+    residual_cents : float
+        Measured over the posterior mean of the prediction.
+    residual_interval_cents : tuple of float
+        Measured over the ends of the predicted 90 % interval, the lower one first.
+    rounding_cents : tuple of float or None
+        Ends of the rounding interval over the reading; None where it is not rounded.
+    left_out_cents : float or None
+        Measured over predicted by a least-squares refit that has not seen the reading; None where too few are left.
+    leverage : float
+        Share of the reading in its own prediction.
+    label_correlation : float
+        Of the mode's shape with what its label names.
     """
-    problem = inference.problem
-    predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
-    start = problem.centre[problem.parameters.fitted_columns]
-    scales = reading_scales(inference, draws)
-    bounds = problem.parameters.fitted_bounds
-    return prediction_errors(predict, log_measured(problem.board), scales, start, bounds)
+
+    setup: str
+    label: str
+    measured_hz: float
+    predicted_hz: Prediction
+    residual_cents: float
+    residual_interval_cents: tuple[float, float]
+    rounding_cents: tuple[float, float] | None
+    left_out_cents: float | None
+    leverage: float
+    label_correlation: float
 
 
-def reading_scales(inference: Inference, draws: Draws) -> NDArray[np.float64]:
-    """Relative uncertainty of each reading at the posterior's median noise: (n_modes,) array."""
-    medians = np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0)
-    setups = inference.problem.board.setups
-    return np.concatenate([np.hypot(m, setup.relative_sd) for m, setup in zip(medians, setups, strict=True)])
+@dataclass(frozen=True)
+class UnlabelledPeak:
+    """A peak without a label beside the predicted mode nearest to it; it is shown, not fitted."""
+
+    setup: str
+    measured_hz: float
+    nearest: str
+    predicted_hz: float
+    cents: float
 
 
-def mode_entries(inference: Inference, draws: Draws, errors: Errors) -> list[dict[str, Any]]:
-    """One entry a labelled mode, as in summary.json."""
-    problem = inference.problem
-    predicted = np.exp(draws.log_frequency).reshape(-1, draws.log_frequency.shape[-1])
-    low, high = np.quantile(predicted, [0.05, 0.95], axis=0)
-    leverages = identifiability(problem.estimate.sensitivities, reading_scales(inference, draws)).leverages
-    rows = [
-        (setup.name, reading, place)
-        for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True)
-        for reading, place in zip(setup.readings, model.places, strict=True)
-    ]
-    return [
-        {
-            "setup": setup,
-            "label": str(reading.label),
-            "measured_hz": reading.frequency.mean,
-            "predicted_hz": {"mean": float(predicted[:, i].mean()), "q05": float(low[i]), "q95": float(high[i])},
-            "residual_cents": float(cents(errors.in_sample[i])),
-            "left_out_cents": finite(float(cents(errors.left_out[i]))),
-            "leverage": float(leverages[i]),
-            "label_correlation": place.correlation,
-        }
-        for i, (setup, reading, place) in enumerate(rows)
-    ]
+def over(measured: float, predicted: float) -> float:
+    """A frequency over another, cents."""
+    return float(cents(np.log(measured / predicted)))
 
 
-def spectra(problem: Problem, draws: Draws) -> dict[str, Spectrum]:
-    """Spectrum at the posterior mean of every setup with a peak or a sign to compare it with; each solved once.
+def mode_rows(problem: Problem, draws: Draws, assessment: Assessment) -> tuple[ModeRow, ...]:
+    """One row per labelled mode, setup after setup.
 
     Parameters
     ----------
     problem : Problem
     draws : Draws
+    assessment : Assessment
 
     Returns
     -------
-    dict of (Modes, tuple of NamedMode)
-        By setup; up to above its highest peak, and at least two modes a reading.
+    tuple of ModeRow
     """
-    values = posterior_mean_values(problem, draws)
-    found = {}
-    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
-        if not setup.unlabelled and setup.hammer is None:
-            continue
-        n_modes = max(_FEWEST_MODES, 2 * len(setup.readings), round(_SPARE * len(setup.readings + setup.unlabelled)))
-        found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
-        while found[setup.name][1][-1].frequency < max(setup.unlabelled, default=0.0) and n_modes < _MOST_MODES:
-            n_modes *= 2
-            found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
+    predicted = np.exp(draws.log_frequency).reshape(-1, draws.log_frequency.shape[-1])
+    low, high = np.quantile(predicted, [0.05, 0.95], axis=0)
+    rounding = rounding_intervals(problem)
+    rows = [
+        (setup.name, reading, place)
+        for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True)
+        for reading, place in zip(setup.readings, model.places, strict=True)
+    ]
+    made = []
+    for i, (setup, reading, place) in enumerate(rows):
+        hertz = reading.frequency.mean
+        prediction = Prediction(float(predicted[:, i].mean()), float(low[i]), float(high[i]))
+        row = ModeRow(
+            setup=setup,
+            label=str(reading.label),
+            measured_hz=hertz,
+            predicted_hz=prediction,
+            residual_cents=over(hertz, prediction.mean),
+            residual_interval_cents=(over(hertz, prediction.q95), over(hertz, prediction.q05)),
+            rounding_cents=rounding[i],
+            left_out_cents=finite(float(cents(assessment.left_out[i]))),
+            leverage=float(assessment.leverages[i]),
+            label_correlation=place.correlation,
+        )
+        made.append(row)
+    return tuple(made)
+
+
+def rounding_intervals(problem: Problem) -> list[tuple[float, float] | None]:
+    """Ends of the rounding interval of each reading, cents over it; None where a reading is not rounded."""
+    found: list[tuple[float, float] | None] = []
+    for one in problem.posterior.readings:
+        ends = zip(cents(one.log_low - one.log_frequency), cents(one.log_high - one.log_frequency), strict=True)
+        found += [(float(low), float(high)) if high > low else None for low, high in ends]
     return found
 
 
-def unlabelled_entries(problem: Problem, found: Mapping[str, Spectrum]) -> list[dict[str, Any]]:
-    """Each unlabelled peak beside the predicted mode nearest to it; they are shown, not fitted."""
-    entries = []
-    for setup in problem.board.setups:
-        for peak in setup.unlabelled:
-            _, named = found[setup.name]
-            nearest = min(named, key=lambda mode, peak=peak: abs(np.log(mode.frequency / peak)))  # type: ignore[misc]
-            entries.append(
-                {
-                    "setup": setup.name,
-                    "measured_hz": peak,
-                    "nearest": nearest.name,
-                    "predicted_hz": nearest.frequency,
-                    "cents": float(cents(np.log(peak / nearest.frequency))),
-                }
-            )
-    return entries
+def unlabelled_peaks(board: Board, named: Mapping[str, Sequence[NamedMode]]) -> tuple[UnlabelledPeak, ...]:
+    """Every peak without a label beside its nearest mode.
 
-
-def posterior_mean_values(problem: Problem, draws: Draws) -> dict[str, NDArray[np.float64]]:
-    """Constants and inputs at their posterior means."""
-    means = {name: np.asarray(v.mean()) for name, v in {**draws.rigidities, **draws.inputs}.items()}
-    return {**problem.board.nominal(), **means}
+    Parameters
+    ----------
+    board : Board
+    named : dict of sequence of NamedMode
+        By setup.
+    """
+    peaks = []
+    for setup in board.setups:
+        for hertz in setup.unlabelled:
+            nearest = min(named[setup.name], key=lambda mode: abs(np.log(mode.frequency / hertz)))
+            miss = over(hertz, nearest.frequency)
+            peaks.append(UnlabelledPeak(setup.name, hertz, nearest.name, nearest.frequency, miss))
+    return tuple(peaks)

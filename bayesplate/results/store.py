@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from bayesplate.cards import StatedPrior
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.archive import write_archive
-from bayesplate.results.draws import Draws
+from bayesplate.results.contract import as_json
 from bayesplate.results.summary import Summary
 
 
@@ -23,7 +24,7 @@ def write_posterior(path: Path, inference: Inference, draws: Draws, summary: Sum
     path : Path
     inference : Inference
     draws : Draws
-    summary : dict
+    summary : Summary
         Its header and sampler entries become attributes.
     card_text : str
         The board card as it was read.
@@ -56,11 +57,11 @@ def write_posterior(path: Path, inference: Inference, draws: Draws, summary: Sum
             "card": card_text,
             "prior": problem.prior.name,
             "priors": json.dumps({name: _stated(one) for name, one in problem.prior.stated_constants.items()}),
-            "model": json.dumps(summary["model"]),
-            "sampler": json.dumps(summary["sampler"]),
-            "versions": json.dumps(summary["versions"]),
-            "card_sha256": summary["card_sha256"],
-            "seed": str(summary["seed"]),
+            "model": json.dumps(as_json(summary.model)),
+            "sampler": json.dumps(as_json(summary.sampler)),
+            "versions": json.dumps(as_json(summary.versions)),
+            "card_sha256": summary.card_sha256,
+            "seed": str(summary.seed),
         },
     )
 

@@ -1,252 +1,182 @@
-"""summary.json: everything a reader of a fit needs, in SI units, the same bytes for the same seed."""
+"""summary.json as types: everything a reader of a fit needs, in SI units, fields in the order of the file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
 
-import numpy as np
-from numpy.typing import NDArray
-
-from bayesplate.estimates.identifiability import remarks
-from bayesplate.estimates.paper import PaperSystem, paper_system
-from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.spectrum import sign_conflicts
-from bayesplate.modes.naming import CERTAIN
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
-from bayesplate.posterior.convergence import Convergence
-from bayesplate.posterior.inference import Inference, Problem
-from bayesplate.posterior.region import worst_cents
-from bayesplate.posterior.sampling import Chains
-from bayesplate.results.budget import input_remarks
-from bayesplate.results.draws import (
-    FEWEST_WEIGHTED_DRAWS,
-    Draws,
-    finite,
-    linear_is_enough,
-    linearisation,
-    means_under,
-    spread,
-)
-from bayesplate.results.modes import (
-    Spectrum,
-    mode_entries,
-    mode_errors,
-    posterior_mean_values,
-    spectra,
-    unlabelled_entries,
-)
+from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
+from bayesplate.results.modes import ModeRow, UnlabelledPeak
+from bayesplate.results.words import GPA, constant_name, interval, plus_minus
 
 FORMAT = 1
-_HIGH_EXACT_ERROR = 0.5
-
-Summary = dict[str, Any]
 
 
-def header(problem: Problem, seed: int, versions: Mapping[str, str], card_sha256: str) -> Summary:
-    """What was fitted, before any result."""
-    return {
-        "format": FORMAT,
-        "name": problem.board.name,
-        "seed": seed,
-        "versions": dict(versions),
-        "card_sha256": card_sha256,
-        "model": {
-            "theory": problem.posterior.models[0].system.theory,
-            "law": problem.posterior.law,
-            "effects": list(problem.board.effects),
-            "robust": problem.posterior.robust,
-            "prior": problem.prior.name,
-        },
-    }
+@dataclass(frozen=True)
+class ModelHeader:
+    """What was fitted: plate theory, frequency law, declared effects, whether the noise is Student's, prior card."""
+
+    theory: str
+    law: str
+    effects: tuple[str, ...]
+    robust: bool
+    prior: str
 
 
-def unconverged_summary(
-    problem: Problem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
-) -> Summary:
-    """The summary of a run that failed the gate: its diagnostics, and no constants."""
-    return {
-        **header(problem, seed, versions, sha256),
-        "converged": False,
-        "sampler": sampler_health(chains, convergence),
-        "warnings": [*convergence.reasons, f"suggested steps: {convergence.suggested_steps}"],
-    }
+@dataclass(frozen=True)
+class SamplerHealth:
+    """How the sampler fared; None where a number does not exist yet."""
+
+    ensembles: int
+    walkers: int
+    steps: int
+    tau_max: float | None
+    rhat_max: float | None
+    ess_min: float | None
+    acceptance: float | None
 
 
-def summarise(
-    inference: Inference,
-    draws: Draws,
-    seed: int,
-    versions: Mapping[str, str],
-    card_sha256: str,
-    linear_errors: NDArray[np.float64] | None = None,
-) -> Summary:
-    """The summary of a converged fit.
+@dataclass(frozen=True)
+class PointEstimate(Constants[float | None]):
+    """Constants without an uncertainty; None where the estimate is no plate's."""
 
-    Parameters
+    condition_number: float
+
+
+@dataclass(frozen=True)
+class PercentileValue:
+    """Mean (Pa) and spread (per cent) of the trimmed estimates of one modulus."""
+
+    mean: float | None
+    sd_percent: float | None
+
+
+@dataclass(frozen=True)
+class Percentile(Elastic[PercentileValue]):
+    """The paper's percentile method."""
+
+    n_subsets: int
+
+
+@dataclass(frozen=True)
+class LawMeans(Constants[float | None]):
+    """Posterior means under one frequency law; None where too few draws stand for it."""
+
+    effective_draws: float
+
+
+@dataclass(frozen=True)
+class ErrorFigures:
+    """Errors of the fit, cents.
+
+    Attributes
     ----------
-    inference : Inference
-    draws : Draws
+    in_sample_rms_cents : float
+        Of the residuals of `Summary.modes`: readings over posterior mean predictions.
+    leave_one_out_rms_cents : float or None
+        Of readings that a least-squares refit has not seen; None where too few are left.
+    linearisation_rms_cents : float or None
+        Linear less exact law over the posterior.
+    exact_law_worst_cents : float
+        Exact law against full solves.
+    """
+
+    in_sample_rms_cents: float
+    leave_one_out_rms_cents: float | None
+    linearisation_rms_cents: float | None
+    exact_law_worst_cents: float
+
+
+@dataclass(frozen=True)
+class Run:
+    """What was run, before any result.
+
+    Attributes
+    ----------
+    format : int
+    name : str
+        Of the board.
     seed : int
     versions : dict of str
     card_sha256 : str
-    linear_errors : (n_some, n_modes) array, cents, optional
-        Those of `bayesplate.results.draws.linearisation`, where they are known already.
-
-    Returns
-    -------
-    dict
-        As design and glossary name it: elastic, rigidity, effects, noise, inputs, derived, the point estimates, modes,
-        errors, sampler, identifiability, warnings.
+    model : ModelHeader
     """
-    problem = inference.problem
-    board = problem.board
-    system = paper_system(board, problem.estimate, compared=False)
-    errors = mode_errors(inference, draws)
-    found = spectra(problem, draws)
-    if linear_errors is None:
-        linear_errors = linearisation(inference, draws)
-    means = {law: _means(inference, draws, law, linear_errors) for law in ("linear", "exact")}
-    return {
-        **header(problem, seed, versions, card_sha256),
-        "converged": True,
-        "elastic": {name: spread(values, "Pa") for name, values in draws.moduli.items()},
-        "rigidity": {name: spread(values, "N m") for name, values in draws.rigidities.items()},
-        "effects": _effects(problem, draws),
-        "noise": {setup.name: spread(draws.noise[..., i], "1") for i, setup in enumerate(board.setups)},
-        "inputs": {
-            one.name: spread(draws.inputs[one.name], one.unit) for one in board.uncertain if not one.is_of_effect
-        },
-        "derived": {name: spread(item.values, item.unit) for name, item in draws.derived.items()},
-        "least_squares": _paper_least_squares(system),
-        "weighted_least_squares": _weighted(problem),
-        "percentile": _percentile(system),
-        "linear_means": means["linear"],
-        "exact_means": means["exact"],
-        "modes": mode_entries(inference, draws, errors),
-        "unlabelled": unlabelled_entries(problem, found),
-        "error": {
-            "in_sample_rms_cents": _rms(cents(errors.in_sample)),
-            "leave_one_out_rms_cents": _rms(cents(errors.left_out)),
-            "linearisation_rms_cents": _rms(linear_errors),
-            "exact_law_worst_cents": worst_cents(problem.posterior.models),
-        },
-        "sampler": sampler_health(inference.chains, inference.convergence),
-        "identifiability": [*remarks(board, problem.identifiability), *input_remarks(draws, board)],
-        "warnings": _warnings(inference, draws, found, linear_errors),
-    }
+
+    format: int
+    name: str
+    seed: int
+    versions: Mapping[str, str]
+    card_sha256: str
+    model: ModelHeader
 
 
-def _effects(problem: Problem, draws: Draws) -> Summary:
-    """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
-    result: Summary = {}
-    for model in problem.posterior.models:
-        for effect in model.system.effects:
-            owner = result.setdefault(effect.owner.title, {})
-            owner[effect.name] = {
-                parameter.key: spread(_values_of(parameter.name, problem, draws), parameter.unit)
-                for parameter in effect.parameters()
-            }
-    return result
+@dataclass(frozen=True)
+class Unconverged(Run):
+    """The summary of a run that failed the convergence gate: its diagnostics, and no constants."""
+
+    converged: bool
+    sampler: SamplerHealth
+    warnings: tuple[str, ...]
 
 
-def _values_of(key: str, problem: Problem, draws: Draws) -> NDArray[np.float64]:
-    exact = np.broadcast_to(problem.board.inputs[key].mean, draws.log_posterior.shape)
-    return draws.inputs.get(key, exact)
+@dataclass(frozen=True, repr=False)
+class Summary(Run):
+    """The summary of a converged fit: `summary.elastic.E_x.mean` is a number in Pa.
 
+    Attributes
+    ----------
+    converged : bool
+    elastic : Elastic of Spread, Pa
+        E_x, E_y, G_xy.
+    rigidity : Rigidity of Spread, N m
+        D_x, D_y, D_s.
+    effects : dict of dict of dict of Spread
+        Parameters of the declared effects by board or setup, effect and name.
+    noise : dict of Spread
+        Relative, by setup.
+    inputs, derived : dict of Spread
+        Uncertain inputs of the card, and what makers derive from the constants, by name.
+    least_squares, weighted_least_squares : PointEstimate
+        The paper's, and that of relative errors.
+    percentile : Percentile or None
+        None where there are too many modes, or no estimate is positive.
+    linear_means, exact_means : LawMeans
+    modes : tuple of ModeRow
+    unlabelled : tuple of UnlabelledPeak
+    error : ErrorFigures
+    sampler : SamplerHealth
+    identifiability, warnings : tuple of str
+    """
 
-def sampler_health(chains: Chains, convergence: Convergence) -> Summary:
-    """How the sampler fared."""
-    n_ensembles, n_steps, n_walkers, _ = chains.draws.shape
-    return {
-        "ensembles": n_ensembles,
-        "walkers": n_walkers,
-        "steps": n_steps,
-        "tau_max": finite(convergence.tau_max),
-        "rhat_max": finite(convergence.rhat_max),
-        "ess_min": finite(convergence.ess_min),
-        "acceptance": finite(convergence.acceptance),
-    }
+    converged: bool
+    elastic: Elastic[Spread]
+    rigidity: Rigidity[Spread]
+    effects: Mapping[str, Mapping[str, Mapping[str, Spread]]]
+    noise: Mapping[str, Spread]
+    inputs: Mapping[str, Spread]
+    derived: Mapping[str, Spread]
+    least_squares: PointEstimate
+    weighted_least_squares: PointEstimate
+    percentile: Percentile | None
+    linear_means: LawMeans
+    exact_means: LawMeans
+    modes: tuple[ModeRow, ...]
+    unlabelled: tuple[UnlabelledPeak, ...]
+    error: ErrorFigures
+    sampler: SamplerHealth
+    identifiability: tuple[str, ...]
+    warnings: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        constants = ", ".join(f"{name} = {plus_minus(entry, GPA)} GPa" for name, entry in self.elastic.items())
+        return f"<Summary of {self.name}: {constants}; {len(self.modes)} modes, {self.model.law} law>"
 
-def _means(inference: Inference, draws: Draws, law: LawName, linear_errors: NDArray[np.float64]) -> Summary:
-    """Posterior means under a law; none where the two laws are too far apart for one to stand for the other."""
-    means, effective = means_under(inference, draws, law, linear_errors)
-    if effective < FEWEST_WEIGHTED_DRAWS:
-        return {**dict.fromkeys(means, None), "effective_draws": effective}
-    return {**means, "effective_draws": effective}
-
-
-def _paper_least_squares(system: PaperSystem) -> Summary:
-    constants = system.solve()
-    elastic = system.moduli(constants)
-    return _point(np.stack(elastic), constants, system.condition_number)
-
-
-def _weighted(problem: Problem) -> Summary:
-    estimate = problem.estimate
-    values = estimate.values
-    D_x, D_y, D_s = estimate.rigidities
-    elastic = moduli(D_x, D_y, D_s, values["thickness"], values["poisson_xy"])
-    return _point(np.stack(elastic), estimate.rigidities, problem.identifiability.condition_number)
-
-
-def _point(elastic: NDArray[np.float64], constants: NDArray[np.float64], condition_number: float) -> Summary:
-    return {
-        **{name: finite(float(v)) for name, v in zip(MODULI, elastic, strict=True)},
-        **{name: float(v) for name, v in zip(RIGIDITIES, constants, strict=True)},
-        "condition_number": condition_number,
-    }
-
-
-def _percentile(system: PaperSystem) -> Summary | None:
-    found = percentile_estimate(system)
-    if found is None:
-        return None
-    return {
-        **{
-            name: {
-                "mean": finite(found.mean[name]),
-                "sd_percent": finite(100.0 * found.sd[name] / found.mean[name]),
-            }
-            for name in MODULI
-        },
-        "n_subsets": found.n_subsets,
-    }
-
-
-def _warnings(
-    inference: Inference, draws: Draws, found: Mapping[str, Spectrum], linear_errors: NDArray[np.float64]
-) -> list[str]:
-    problem = inference.problem
-    sentences = list(problem.board.notes)
-    if not problem.estimate.converged:
-        sentences.append("the least-squares steps did not settle: two modes near one frequency may swap their labels")
-    for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True):
-        for label, place in zip(setup.labels, model.places, strict=True):
-            if place.correlation < CERTAIN:
-                sentences.append(
-                    f"setup {setup.name}: the shape of mode {label} fits its label only to {place.correlation:.2f}; "
-                    "it may be its neighbour at a veering"
-                )
-    values = posterior_mean_values(problem, draws)
-    for setup in problem.board.setups:
-        if setup.hammer is not None:
-            sentences += sign_conflicts(setup, *found[setup.name], values)
-    if problem.posterior.law == "linear" and not linear_is_enough(inference, draws, linear_errors):
-        sentences.append(
-            "the linear law is off by more than a quarter of the noise over the posterior: its constants may be "
-            "shifted, use the exact law"
+    def _repr_html_(self) -> str:
+        """The constants as a notebook shows them."""
+        rows = "".join(
+            f"<tr><th>{constant_name(name)}</th><td>{plus_minus(entry, GPA)}</td><td>{interval(entry, GPA)}</td></tr>"
+            for name, entry in self.elastic.items()
         )
-    if worst_cents(problem.posterior.models) > _HIGH_EXACT_ERROR:
-        sentences.append(
-            f"the exact law misses full solves by up to {worst_cents(problem.posterior.models):.2f} cents at the rim "
-            "of the posterior"
-        )
-    return sentences
-
-
-def _rms(values: NDArray[np.float64] | Sequence[float]) -> float | None:
-    finite = np.asarray(values)[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if finite.size else None
+        head = "<tr><th>GPa</th><th>mean ± sd</th><th>90 % interval</th></tr>"
+        return f"<table><caption>{escape(self.name)}</caption>{head}{rows}</table>"

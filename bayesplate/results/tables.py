@@ -1,17 +1,25 @@
-"""The tables that people read: constants with plus-minus, modes in cents; text cells only, no layout."""
+"""The tables that people read of a fit: constants with plus-minus, modes in cents; text cells only, no layout."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-_GPA = 1e9
-_WORDS = {
-    "E_x": "along grain",
-    "E_y": "across grain",
-    "G_xy": "shear",
-}
+import numpy as np
+
+from bayesplate.frequencies.laws import cents
+from bayesplate.results.modes import ModeRow
+from bayesplate.results.summary import Summary
+from bayesplate.results.words import (
+    CONSTANTS,
+    GPA,
+    MISSING,
+    decimals,
+    interval,
+    mode_name,
+    narrow_name,
+    number,
+    plus_minus,
+)
 
 
 @dataclass(frozen=True)
@@ -30,119 +38,73 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-def constants_table(summary: Mapping[str, Any]) -> Table:
+def constants_table(summary: Summary) -> Table:
     """The elastic constants of a fit: mean, plus-minus, 90 % interval, beside the least-squares figure."""
     rows = []
-    for name, words in _WORDS.items():
-        entry = summary["elastic"][name]
-        mean, sd, low, high = (entry[key] / _GPA for key in ("mean", "sd", "q05", "q95"))
-        digits = decimals(sd)
-        rows.append(
-            (
-                f"{name}, {words}",
-                f"{mean:.{digits}f} ± {sd:.{digits}f}",
-                f"{low:.{digits}f} to {high:.{digits}f}",
-                f"{100 * sd / mean:.1f}",
-                f"{summary['weighted_least_squares'][name] / _GPA:.{digits}f}",
-            )
-        )
+    for name in CONSTANTS:
+        entry = summary.elastic[name]
+        least_squares = number(summary.weighted_least_squares[name], decimals(entry.sd * GPA), factor=GPA)
+        share = f"{100 * entry.sd / entry.mean:.1f}"
+        rows.append((narrow_name(name), plus_minus(entry, GPA), interval(entry, GPA), share, least_squares))
     return Table(
-        f"Elastic constants of {summary['name']}, GPa",
+        f"Elastic constants of {summary.name}, GPa",
         ("constant", "mean ± sd", "90 % interval", "sd, %", "least squares"),
         tuple(rows),
     )
 
 
-def modes_table(summary: Mapping[str, Any]) -> Table:
-    """Each labelled mode: measured, predicted, and how far the best fit misses it, with and without having seen it."""
-    several = len({mode["setup"] for mode in summary["modes"]}) > 1
-    rows = [
-        (
-            f"{mode['label']} {mode['setup']}" if several else mode["label"],
-            f"{mode['measured_hz']:.6g}",
-            f"{mode['predicted_hz']['mean']:.1f}",
-            f"{mode['predicted_hz']['q05']:.1f} to {mode['predicted_hz']['q95']:.1f}",
-            f"{mode['residual_cents']:+.1f}",
-            "-" if mode["left_out_cents"] is None else f"{mode['left_out_cents']:+.1f}",
-            f"{mode['leverage']:.2f}",
+def modes_table(summary: Summary) -> Table:
+    """Each labelled mode: measured, predicted, the one over the other with its interval, and the error left out.
+
+    The rounding interval stands beside the error where it is wider than the noise: there it decides.
+    """
+    several = len({mode.setup for mode in summary.modes}) > 1
+    halves = [rounding_that_decides(summary, mode) for mode in summary.modes]
+    is_rounded = any(half is not None for half in halves)
+    rows = []
+    for mode, half in zip(summary.modes, halves, strict=True):
+        low, high = mode.residual_interval_cents
+        rounding = (MISSING if half is None else f"± {half:.1f}",) if is_rounded else ()
+        rows.append(
+            (
+                mode_name(mode.label, mode.setup, several=several),
+                f"{mode.measured_hz:.6g}",
+                f"{mode.predicted_hz.mean:.1f}",
+                number(mode.residual_cents, 1, signed=True),
+                f"{low:+.1f} to {high:+.1f}",
+                *rounding,
+                number(mode.left_out_cents, 1, signed=True),
+            )
         )
-        for mode in summary["modes"]
-    ]
+    rounded = ("rounding",) if is_rounded else ()
     return Table(
-        "Modes, Hz and cents (17 cents are about 1 %)",
-        ("mode", "measured", "predicted", "90 % interval", "error", "left out", "leverage"),
+        "Modes, Hz; errors, cents (17 cents are about 1 %)",
+        ("mode", "measured", "predicted", "error", "90 % interval", *rounded, "left out"),
         tuple(rows),
     )
 
 
-def unlabelled_table(summary: Mapping[str, Any]) -> Table | None:
+def rounding_that_decides(summary: Summary, mode: ModeRow) -> float | None:
+    """Half the width of a reading's rounding interval, cents, where that is wider than the noise; None elsewhere."""
+    if mode.rounding_cents is None:
+        return None
+    width = mode.rounding_cents[1] - mode.rounding_cents[0]
+    return 0.5 * width if width > noise_cents(summary, mode) else None
+
+
+def noise_cents(summary: Summary, mode: ModeRow) -> float:
+    """Standard deviation of the noise of a mode's setup, cents."""
+    return float(cents(np.asarray(summary.noise[mode.setup].q50)))
+
+
+def unlabelled_table(summary: Summary) -> Table | None:
     """Peaks without a label beside the nearest predicted mode; None if there are none."""
-    if not summary["unlabelled"]:
+    if not summary.unlabelled:
         return None
     rows = [
-        (f"{peak['measured_hz']:.6g}", peak["nearest"], f"{peak['predicted_hz']:.1f}", f"{peak['cents']:+.0f}")
-        for peak in summary["unlabelled"]
+        (f"{peak.measured_hz:.6g}", peak.nearest, f"{peak.predicted_hz:.1f}", f"{peak.cents:+.0f}")
+        for peak in summary.unlabelled
     ]
     return Table(
         "Peaks without a label: kept, not fitted", ("measured Hz", "nearest mode", "predicted Hz", "cents"), tuple(rows)
     )
-
-
-def check_tables(report: Mapping[str, Any]) -> tuple[Table, ...]:
-    """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
-    constants = tuple(
-        (
-            f"{name}, {words}",
-            f"{report['estimate'][name] / _GPA:.4g}",
-            f"± {report['expected_sd_percent'][name]:.1f} %",
-        )
-        for name, words in _WORDS.items()
-    )
-    modes = tuple(
-        (
-            f"{mode['label']} {mode['setup']}" if len(report["setups"]) > 1 else mode["label"],
-            f"{mode['measured_hz']:.6g}",
-            f"{mode['residual_cents']:+.1f}",
-            " / ".join(f"{share:.0f}" for share in mode["share_percent"]),
-            f"{mode['leverage']:.2f}",
-        )
-        for mode in report["modes"]
-    )
-    return (
-        Table(
-            f"What {report['name']} can tell, GPa", ("constant", "least squares", "uncertainty to expect"), constants
-        ),
-        Table("Modes", ("mode", "measured Hz", "error, cents", "energy in D_x/D_y/D_s, %", "leverage"), modes),
-        *([signatures_table(report)] if report["signatures"] else []),
-    )
-
-
-def signatures_table(report: Mapping[str, Any]) -> Table:
-    """What effects that are not declared would do: in all, to be seen, and to the constants if ignored.
-
-    No name of an effect may be cut off on a terminal of 80 columns, so look-alikes stand below each other.
-    """
-    rows = tuple(
-        (
-            one["effect"],
-            f"{one['raw_rms_cents']:.1f}",
-            f"{one['visible_rms_cents']:.1f}" + (" *" if one["below_sight"] else "  "),
-            "/".join(f"{one['bias_percent'][name]:+.1f}" for name in _WORDS),
-            "\n".join(one["look_alikes"]) or "-",
-        )
-        for one in report["signatures"]
-    )
-    return Table(
-        "Effects not declared, at a usual size: cents rms (*: lost in noise)",
-        ("effect", "shift", "visible", "E_x/E_y/G_xy\noff by, %", "looks like"),
-        rows,
-    )
-
-
-def decimals(sd: float) -> int:
-    """Decimals that show two significant digits of a standard deviation, at most six."""
-    digits = 0
-    while sd < 9.95 and digits < 6 and sd > 0:
-        sd *= 10
-        digits += 1
-    return digits

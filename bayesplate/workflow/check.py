@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.material import MODULI, moduli
 from bayesplate.posterior.inference import Problem, pose
+from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
+from bayesplate.results.contract import Constants, Elastic
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import prepare
 
 _N_DRAWS = 4000
 
 
-def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) -> dict[str, Any]:
+def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) -> CheckReport:
     """Say what would be fitted.
 
     Parameters
@@ -29,10 +30,7 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
 
     Returns
     -------
-    dict
-        name, title, setups, law, estimate (least squares, with the standard deviation to expect from noise, misfit and
-        uncertain inputs), modes with their residuals and leverages, condition_number, what each further effect would do
-        (signatures), identifiability and notes.
+    CheckReport
 
     Raises
     ------
@@ -47,63 +45,58 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
     D_x, D_y, D_s = estimate.rigidities
     elastic = moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"])
     expected = expected_sd(problem)
-    constants = {**dict(zip(MODULI, elastic, strict=True)), **dict(zip(RIGIDITIES, estimate.rigidities, strict=True))}
     rows = [(setup.name, reading) for setup in board.setups for reading in setup.readings]
     residuals = cents(estimate.residuals)
     correlations = [place.correlation for model in estimate.models for place in model.places]
-    return {
-        "name": board.name,
-        "title": board.title,
-        "prior": board.prior,
-        "law": problem.posterior.law,
-        "setups": [
-            {
-                "name": setup.name,
-                "edges": setup.edges,
-                "labelled": len(setup.readings),
-                "unlabelled": len(setup.unlabelled),
-                "noise_percent": 100.0 * setup.noise.median,
-            }
+    return CheckReport(
+        name=board.name,
+        title=board.title,
+        prior=board.prior,
+        law=problem.posterior.law,
+        setups=tuple(
+            CheckedSetup(
+                setup.name, setup.edges, len(setup.readings), len(setup.unlabelled), 100.0 * setup.noise.median
+            )
             for setup in board.setups
-        ],
-        "uncertain_inputs": list(board.uncertain_inputs),
-        "estimate": {name: float(value) for name, value in constants.items()},
-        "expected_sd_percent": {name: 100.0 * value for name, value in expected.items()},
-        "condition_number": found.condition_number,
-        "modes": [
-            {
-                "setup": setup,
-                "label": str(reading.label),
-                "measured_hz": reading.frequency.mean,
-                "residual_cents": float(residuals[i]),
-                "leverage": float(found.leverages[i]),
-                "share_percent": [round(100.0 * float(share), 1) for share in found.shares[i]],
-                "label_correlation": correlations[i],
-            }
+        ),
+        uncertain_inputs=tuple(board.uncertain_inputs),
+        estimate=Constants(*(float(value) for value in (*elastic, *estimate.rigidities))),
+        expected_sd_percent=Elastic(**{name: 100.0 * value for name, value in expected.items()}),
+        condition_number=found.condition_number,
+        modes=tuple(
+            CheckedMode(
+                setup=setup,
+                label=str(reading.label),
+                measured_hz=reading.frequency.mean,
+                residual_cents=float(residuals[i]),
+                leverage=float(found.leverages[i]),
+                share_percent=tuple(round(100.0 * float(share), 1) for share in found.shares[i]),
+                label_correlation=correlations[i],
+            )
             for i, (setup, reading) in enumerate(rows)
-        ],
-        "in_sample_rms_cents": float(np.sqrt(np.mean(residuals**2))),
-        "signatures": [_signature(one, alike) for one, alike in _alike(signatures(problem))],
-        "invisible": INVISIBLE,
-        "identifiability": list(remarks(board, found)),
-        "notes": list(board.notes),
-    }
+        ),
+        in_sample_rms_cents=float(np.sqrt(np.mean(residuals**2))),
+        signatures=tuple(_effects(signatures(problem))),
+        invisible=INVISIBLE,
+        identifiability=tuple(remarks(board, found)),
+        notes=tuple(board.notes),
+    )
 
 
-def _alike(found: Sequence[Signature]) -> list[tuple[Signature, tuple[str, ...]]]:
-    return [(one, look_alikes(found)[one.effect]) for one in found]
-
-
-def _signature(one: Signature, alike: tuple[str, ...]) -> dict[str, Any]:
-    return {
-        "effect": one.effect,
-        "size": dict(one.size),
-        "raw_rms_cents": one.raw_rms,
-        "visible_rms_cents": one.visible_rms,
-        "below_sight": one.is_below_sight,
-        "bias_percent": dict(one.bias_percent),
-        "look_alikes": list(alike),
-    }
+def _effects(found: Sequence[Signature]) -> list[CheckedEffect]:
+    alike = look_alikes(found)
+    return [
+        CheckedEffect(
+            effect=one.effect,
+            size=dict(one.size),
+            raw_rms_cents=one.raw_rms,
+            visible_rms_cents=one.visible_rms,
+            below_sight=one.is_below_sight,
+            bias_percent=Elastic(**one.bias_percent),
+            look_alikes=alike[one.effect],
+        )
+        for one in found
+    ]
 
 
 def expected_sd(problem: Problem) -> dict[str, float]:

@@ -12,10 +12,13 @@ from bayesplate.errors import NotConvergedError
 from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.methods import Method, point_methods, posterior_method
+from bayesplate.posterior.mode_errors import mode_errors
+from bayesplate.posterior.reweighting import effective_draws, law_weights
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.comparison import Entries, Method, point_methods, posterior_method, theory_entry, verdict
-from bayesplate.results.draws import Draws, effective_draws, law_weights, named_draws
+from bayesplate.results.comparison import FORMAT, Comparison, better_theory, theory_row
 from bayesplate.results.folder import json_text, make_folder, require_new, write_text
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
@@ -26,7 +29,6 @@ COMPARISON = "compare.json"
 FEWEST_DRAWS = 1000
 """With fewer effective draws left by the weights, the other law is sampled itself."""
 
-_FORMAT = 1
 _SHEAR = tuple(name for name, effect in EFFECTS.items() if effect.theory == "shear-flexible")
 """Effects that make the plate shear-flexible."""
 Tell = Callable[[Progress], None] | None
@@ -41,7 +43,7 @@ def compare(
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     progress: Tell = None,
-) -> Entries:
+) -> Comparison:
     """Compare all methods on a board, as a thin and as a shear-flexible plate.
 
     Parameters
@@ -65,8 +67,7 @@ def compare(
 
     Returns
     -------
-    dict
-        name, seed, theories (thin, then shear-flexible: coefficients, methods, modes, error) and verdict.
+    Comparison
 
     Raises
     ------
@@ -95,17 +96,17 @@ def compare(
     for problem, system in zip(problems, systems, strict=True):
         methods = point_methods(problem, system, expected_sd(problem))
         posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
-        theories.append(theory_entry(problem, system, [*methods, *posteriors], inference, draws))
-    result = {
-        "format": _FORMAT,
-        "name": problems[0].board.name,
-        "seed": seed,
-        "versions": versions(),
-        "card_sha256": prepared[0].card.sha256,
-        "prior": problems[0].prior.name,
-        "theories": theories,
-        "verdict": verdict(*theories),
-    }
+        theories.append(theory_row(problem, system, [*methods, *posteriors], mode_errors(inference, draws)))
+    result = Comparison(
+        format=FORMAT,
+        name=problems[0].board.name,
+        seed=seed,
+        versions=versions(),
+        card_sha256=prepared[0].card.sha256,
+        prior=problems[0].prior.name,
+        theories=tuple(theories),
+        verdict=better_theory(*theories),
+    )
     for path in files:
         make_folder(path.parent)
         write_text(path, json_text(result))

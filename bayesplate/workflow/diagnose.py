@@ -19,7 +19,7 @@ from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
-from bayesplate.diagnosis.wording.findings import Case, FitFigures, Side, diagnosis_of
+from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.errors import NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
@@ -172,12 +172,12 @@ def _case(
         verdict=verdict,
         control=control,
         folded=nested(found.ground, found.residual[None, :]),
-        before=Side(0, FitFigures.of(before.summary), before.draws),
-        after=Side(verdict.index if is_refitted else 0, FitFigures.of(after.summary), after.draws),
+        before=Side(0, before.summary, before.draws),
+        after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
         is_clear_of_zero=clear,
         recommendation=recommendation(found, asked_about(found, verdict)),
         finalists=[
-            (one, FitFigures.of(refits[one.index].summary))
+            (one, refits[one.index].summary)
             for one in finalists(found, verdict)
             if one.index in refits
         ],

@@ -10,12 +10,13 @@ from pathlib import Path
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.errors import NotConvergedError
 from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.draws import Draws
 from bayesplate.results.folder import ARCHIVE, SUMMARY, json_text, write_text
 from bayesplate.results.store import write_posterior
-from bayesplate.results.summary import Summary, unconverged_summary
+from bayesplate.results.summarise import unconverged_summary
+from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fitting import Fitted, Request, fitted, opened
@@ -30,8 +31,7 @@ class FitResult:
     ----------
     folder : Path or None
         Where its files are; None if none were asked for.
-    summary : dict
-        As in summary.json.
+    summary : Summary
     inference : Inference
     draws : Draws
     """

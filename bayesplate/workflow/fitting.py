@@ -12,12 +12,15 @@ from pathlib import Path
 from bayesplate.errors import CheckpointError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
+from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
+from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.draws import Draws, linear_is_enough, linearisation, named_draws
 from bayesplate.results.folder import OutputFolder
-from bayesplate.results.summary import Summary, summarise
+from bayesplate.results.summarise import summarise
+from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.prepare import Prepared
 
@@ -48,7 +51,7 @@ class Fitted:
     prepared : Prepared
     inference : Inference
     draws : Draws
-    summary : dict
+    summary : Summary
     """
 
     prepared: Prepared
@@ -189,7 +192,8 @@ def fitted(
         # The choice was made on a normal approximation; the draws know better.
         inference, draws = sampled(problem.under("exact"))
         errors = linearisation(inference, draws)
-    summary = summarise(inference, draws, request.seed, versions(), prepared.card.sha256, errors)
+    assessment = assess(inference, draws, errors)
+    summary = summarise(inference, draws, assessment, request.seed, versions(), prepared.card.sha256)
     return Fitted(prepared, inference, draws, summary)
 
 

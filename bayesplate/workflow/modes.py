@@ -6,20 +6,20 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
+from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.region import noise_widenings
 from bayesplate.results.folder import make_folder, require_new
-from bayesplate.results.prior_bands import prior_bands, prior_medians
-from bayesplate.results.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
+from bayesplate.results.sheets import ModesReport, sheet_report
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import Prepared, prepare
 
@@ -31,7 +31,7 @@ _AT_PRIOR = "at the median of the prior"
 class ModesResult:
     """What `modes` leaves: the report, the sheets behind it, and the files that were written."""
 
-    report: dict[str, Any]
+    report: ModesReport
     sheets: tuple[Sheet, ...]
     files: tuple[Path, ...]
 
@@ -85,14 +85,14 @@ def modes(
     sheets = tuple(_sheets(prepared, values, precision, np.random.default_rng(seed)))
     if write:
         _draw(sheets, folder, files)
-    report = {
-        "name": board.name,
-        "title": board.title,
-        "basis": basis,
-        "setups": [_entry(one) for one in sheets],
-        "notes": [*why, *board.notes],
-        "files": [str(path) for path in files],
-    }
+    report = ModesReport(
+        name=board.name,
+        title=board.title,
+        basis=basis,
+        setups=tuple(sheet_report(one) for one in sheets),
+        notes=(*why, *board.notes),
+        files=tuple(str(path) for path in files),
+    )
     return ModesResult(report, sheets, files)
 
 
@@ -138,30 +138,3 @@ def _draw(sheets: Sequence[Sheet], folder: Path, files: Sequence[Path]) -> None:
         figure = chladni_sheet(one)
         for path in files[2 * i : 2 * i + 2]:
             save_figure(figure, path)
-
-
-def _entry(one: Sheet) -> dict[str, Any]:
-    return {
-        "setup": one.setup,
-        "edges": dict(one.edges),
-        "theory": one.theory,
-        "modes": [
-            {
-                "label": mode.name,
-                "hz": mode.hertz,
-                "measured_hz": mode.measured_hz,
-                "miss_cents": mode.miss_cents,
-                "likely_hz": None if mode.band_hz is None else list(mode.band_hz),
-                "share_percent": {
-                    name: round(100.0 * float(share), 1)
-                    for name, share in zip(("D_x", "D_y", "D_s", "effects"), mode.shares, strict=True)
-                },
-                **{name: float(value) for name, value in zip("abc", mode.coefficients, strict=True)},
-            }
-            for mode in one.modes
-        ],
-        "combined": [
-            {"name": combined.name, "modulus": combined.modulus, "weights": dict(combined.weights)}
-            for combined in one.combined
-        ],
-    }

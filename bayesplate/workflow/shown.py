@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.tables import candidates_table, errors_table, shift_table
 from bayesplate.diagnosis.wording.told import verdict_sentence
+from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.comparison_tables import METHODS_REMARK, forward_table, methods_table, sheet_table
+from bayesplate.results.checking import CheckReport
+from bayesplate.results.command_tables import METHODS_REMARK, check_tables, forward_table, methods_table, sheet_tables
+from bayesplate.results.comparison import Comparison
 from bayesplate.results.folder import json_text
-from bayesplate.results.tables import Table, check_tables, constants_table, modes_table, unlabelled_table
+from bayesplate.results.sheets import ModesReport
+from bayesplate.results.summary import Summary
+from bayesplate.results.tables import Table, constants_table, modes_table, unlabelled_table
+from bayesplate.results.words import number, percent
 
 __all__ = [
     "Progress",
@@ -38,40 +42,38 @@ class Shown:
     closing: str
 
 
-def show_check(report: Mapping[str, Any]) -> Shown:
+def show_check(report: CheckReport) -> Shown:
     """The report of `bayesplate.workflow.check.check` for a person."""
-    closing = f"{report['law']} law; nothing was sampled. Next: bayesplate fit, with the same card"
-    return Shown(
-        check_tables(report), (*report["identifiability"], report["invisible"]), tuple(report["notes"]), closing
-    )
+    closing = f"{report.law} law; nothing was sampled. Next: bayesplate fit, with the same card"
+    return Shown(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
 
 
-def show_fit(summary: Mapping[str, Any]) -> Shown:
+def show_fit(summary: Summary) -> Shown:
     """The summary of `bayesplate.workflow.fit.fit` for a person."""
     unlabelled = unlabelled_table(summary)
     tables = (constants_table(summary), modes_table(summary), *([unlabelled] if unlabelled else []))
-    error, model = summary["error"], summary["model"]
-    left_out = error["leave_one_out_rms_cents"]
-    noise = ", ".join(f"{100 * entry['q50']:.2f} %" for entry in summary["noise"].values())
+    error, model = summary.error, summary.model
+    left_out = error.leave_one_out_rms_cents
+    noise = ", ".join(percent(entry.q50, 2) for entry in summary.noise.values())
     closing = (
-        f"{model['theory']} plate, {model['law']} law. Error rms {error['in_sample_rms_cents']:.1f} cents in sample, "
+        f"{model.theory} plate, {model.law} law. Error rms {error.in_sample_rms_cents:.1f} cents in sample, "
         + (f"{left_out:.1f} left out" if left_out is not None else "too few modes to leave one out")
-        + f"; noise {noise}; the linear law is off by {error['linearisation_rms_cents']:.1f} cents."
+        + f"; noise {noise}; the linear law is off by {number(error.linearisation_rms_cents, 1)} cents."
     )
-    return Shown(tables, tuple(summary["identifiability"]), tuple(summary["warnings"]), closing)
+    return Shown(tables, summary.identifiability, summary.warnings, closing)
 
 
-def show_compare(comparison: Mapping[str, Any]) -> Shown:
+def show_compare(comparison: Comparison) -> Shown:
     """The result of `bayesplate.workflow.compare.compare` for a person."""
-    theories = comparison["theories"]
-    tables = [table for one in theories for table in (methods_table(comparison["name"], one), forward_table(one))]
+    theories = comparison.theories
+    tables = [table for one in theories for table in (methods_table(comparison.name, one), forward_table(one))]
     told: dict[str, list[str]] = {}
     for one in theories:
-        for origin in one["coefficients"]:
-            setup = f", setup {origin['setup']}" if len(one["coefficients"]) > 1 else ""
-            told.setdefault(origin["sentence"], []).append(one["theory"] + setup)
+        for origin in one.coefficients:
+            setup = f", setup {origin.setup}" if len(one.coefficients) > 1 else ""
+            told.setdefault(origin.sentence, []).append(one.theory + setup)
     remarks = [f"coefficients of paper and percentile ({', '.join(where)}): {text}" for text, where in told.items()]
-    return Shown(tuple(tables), (*remarks, METHODS_REMARK), (), comparison["verdict"]["sentence"])
+    return Shown(tuple(tables), (*remarks, METHODS_REMARK), (), comparison.verdict.sentence)
 
 
 def show_diagnosis(diagnosis: Diagnosis) -> Shown:
@@ -85,11 +87,10 @@ def show_diagnosis(diagnosis: Diagnosis) -> Shown:
     )
 
 
-def show_modes(report: Mapping[str, Any]) -> Shown:
+def show_modes(report: ModesReport) -> Shown:
     """The report of `bayesplate.workflow.modes.modes` for a person."""
-    tables = tuple(sheet_table(report["name"], setup) for setup in report["setups"])
-    files = f"; sheet to print: {', '.join(report['files'])}" if report["files"] else ""
-    return Shown(tables, (), tuple(report["notes"]), f"Frequencies {report['basis']}{files}")
+    files = f"; sheet to print: {', '.join(report.files)}" if report.files else ""
+    return Shown(sheet_tables(report), (), report.notes, f"Frequencies {report.basis}{files}")
 
 
 def progress_text(progress: Progress) -> str:
@@ -99,4 +100,4 @@ def progress_text(progress: Progress) -> str:
     if verdict is None:
         return text
     n_taus = verdict.n_kept_steps / verdict.tau_max
-    return f"{text}; {n_taus:.0f} of 50 autocorrelation times, R-hat {verdict.rhat_max:.4f}"
+    return f"{text}; {n_taus:.0f} of {Gate().tau_count_min:.0f} autocorrelation times, R-hat {verdict.rhat_max:.4f}"

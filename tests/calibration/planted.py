@@ -24,10 +24,12 @@ from bayesplate.errors import BayesplateError
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.convergence import Gate
+from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.reweighting import linear_is_enough
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
-from bayesplate.results.draws import Draws, linear_is_enough, named_draws, spread
+from bayesplate.results.contract import Spread
 from bayesplate.workflow.prepare import Prepared, prepare
 
 NOISE = "{ median = 0.3, factor = 1.65 }"
@@ -166,13 +168,16 @@ def intervals(board: Board, truth: Truth, draws: Draws) -> dict[str, dict[str, f
     found: dict[str, dict[str, float]] = {}
     by_name = {**draws.moduli, **draws.inputs}
     for name, values in by_name.items():
-        quantiles = spread(values, "")
-        found[name] = {"truth": truth.values[name], **{q: float(quantiles[q]) for q in ("q05", "q50", "q95")}}
+        found[name] = {"truth": truth.values[name], **_quantiles(values)}
     for name, quantity in board.uncertain_inputs.items():
         found[name]["narrowing"] = float(np.std(quantity.standard(draws.inputs[name])) / _prior_sd(quantity))
-    noise = spread(draws.noise[..., 0], "")
-    found["noise"] = {"truth": truth.noise, **{q: float(noise[q]) for q in ("q05", "q50", "q95")}}
+    found["noise"] = {"truth": truth.noise, **_quantiles(draws.noise[..., 0])}
     return found
+
+
+def _quantiles(values: np.ndarray) -> dict[str, float]:
+    one = Spread.of(values, "")
+    return {"q05": one.q05, "q50": one.q50, "q95": one.q95}
 
 
 def _prior_sd(quantity: Quantity) -> float:

@@ -98,7 +98,7 @@ def test_a_table_must_fit_a_board_made_without_a_card(estimates):
     """The aspect ratio may differ by one per cent, as it does between measured sides and nominal ones."""
     board, _ = estimates[FINNISH, ()]
     width = board.inputs["length_y"]
-    close, far = (replace(board, inputs={**board.inputs, "length_y": width.scaled(s)}) for s in (1.0098, 1.0102))
+    close, far = (board.with_priors({"length_y": width.scaled(s)}) for s in (1.0098, 1.0102))
     readings = board.setups[0].readings
     other = replace(readings[0], label=Label(5, 7))
     renamed = replace(far, setups=(replace(board.setups[0], readings=(other, *readings[1:])),))

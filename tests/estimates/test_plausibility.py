@@ -11,7 +11,8 @@ import ritz
 
 from bayesplate.cards import card_names, load_board, load_prior
 from bayesplate.estimates.plausibility import FASTEST, SLOWEST, plate_speed, prior_predictive, unit_faults
-from bayesplate.plate.board import Board, board_from_card, density
+from bayesplate.plate.board import Board, board_from_card, density, made_board
+from bayesplate.plate.parameter import BOARD
 from bayesplate.quantities import Quantity
 
 PRIORS = ("spruce", "weakly-informative")
@@ -25,7 +26,8 @@ def board_of(name: str, prior: str) -> Board:
     if "mass" not in board.inputs:
         return board
     stated = Quantity.exact(float(density(board.nominal())))
-    return replace(board, inputs={**{k: q for k, q in board.inputs.items() if k != "mass"}, "density": stated})
+    own = {one.key: one.prior for one in board.parameters if one.owner == BOARD and one.key != "mass"}
+    return made_board(board.name, own | {"density": stated}, board.setups)
 
 
 def read_as(board: Board, factor: float) -> Board:
@@ -39,8 +41,8 @@ def read_as(board: Board, factor: float) -> Board:
 
 def measured_as(board: Board, factor: float, names: tuple[str, ...]) -> Board:
     """The same with some lengths, and what clamps cover, times a factor."""
-    inputs = {k: q.scaled(factor) if k in names or k.startswith("clamped") else q for k, q in board.inputs.items()}
-    return replace(board, inputs=inputs)
+    changed = [one for one in board.parameters if one.name in names or one.owner != BOARD]
+    return board.with_priors({one.name: one.prior.scaled(factor) for one in changed})
 
 
 def asked(board: Board, prior: str) -> str:
@@ -94,12 +96,12 @@ def test_the_prior_predictive_is_that_of_the_prior():
     """Its median at the prior's medians, by an independent solver; one constant alone spreads ln f by half its own."""
     prior, board = load_prior("spruce"), board_of("spruce-free-2R", "spruce")
     exact = {name: Quantity.exact(quantity.mean) for name, quantity in board.inputs.items()}
-    board = replace(board, inputs=exact)
+    board = board.with_priors(exact)
     found = prior_predictive(board, prior, np.random.default_rng(1))
     labels = [reading.beams for reading in board.setups[0].readings]
     sizes = {name: quantity.mean for name, quantity in exact.items()}
     plate = ritz.Plate.from_moduli(
-        *(prior.densities[name].median for name in ("E_x", "E_y", "G_xy")), sizes["poisson_xy"], rho=sizes["density"],
+        *(prior.constants[name].median for name in ("E_x", "E_y", "G_xy")), sizes["poisson_xy"], rho=sizes["density"],
         h=sizes["thickness"], L_x=sizes["length_x"], L_y=sizes["length_y"], edges=ritz.ALL_FREE,
     )  # fmt: skip
     by_label = ritz.simulate(plate, labels)

@@ -14,10 +14,12 @@ from bayesplate.cards import load_prior
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
+from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, moduli
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer, pose
+from bayesplate.posterior.mode_errors import mode_errors
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -42,29 +44,35 @@ def board(request):
 
 def test_least_squares_and_errors_of_the_paper_boards(board):
     fit, constants, (in_sample, left_out) = board
-    found = [fit.summary["weighted_least_squares"][name] for name in MODULI]
+    found = [fit.summary.weighted_least_squares[name] for name in MODULI]
     assert found == pytest.approx(constants, rel=0.005)
-    assert fit.summary["error"]["in_sample_rms_cents"] == pytest.approx(in_sample, abs=ROUNDING)
-    assert fit.summary["error"]["leave_one_out_rms_cents"] == pytest.approx(left_out, abs=ROUNDING)
+    errors = mode_errors(fit.inference, fit.draws)
+    rms = [np.sqrt(np.mean(cents(one) ** 2)) for one in (errors.in_sample, errors.left_out)]
+    assert rms == pytest.approx([in_sample, left_out], abs=ROUNDING)
+    assert fit.summary.error.leave_one_out_rms_cents == pytest.approx(rms[1], rel=1e-12)
+    # one estimator: a reading that is left out is missed on the same side, and by more
+    assert np.all(np.sign(errors.left_out) == np.sign(errors.in_sample))
+    assert np.all(np.abs(errors.left_out) > np.abs(errors.in_sample))
 
 
 def test_posterior_medians_lie_within_a_standard_deviation_of_least_squares(board):
     fit, *_ = board
     for name in MODULI:
-        spread = fit.summary["elastic"][name]
-        assert abs(spread["q50"] - fit.summary["weighted_least_squares"][name]) < spread["sd"]
+        spread = fit.summary.elastic[name]
+        assert abs(spread.q50 - fit.summary.weighted_least_squares[name]) < spread.sd
 
 
 def test_the_two_laws_differ_for_the_cantilever_and_agree_for_the_clamped_board(finnish, fiemme):
     """physics.md 1: the linear law moves E_x of the Finnish board by 0.8 standard deviations."""
     shifts = {}
     for fit in (finnish, fiemme):
-        means = [fit.summary[f"{law}_means"] for law in ("linear", "exact")]
-        shifts[fit.summary["model"]["law"]] = {
-            name: (means[0][name] - means[1][name]) / fit.summary["elastic"][name]["sd"] for name in MODULI
+        summary = fit.summary
+        means = {"linear": summary.linear_means, "exact": summary.exact_means}
+        shifts[summary.model.law] = {
+            name: (means["linear"][name] - means["exact"][name]) / entry.sd for name, entry in summary.elastic.items()
         }
-        own = fit.summary[f"{fit.summary['model']['law']}_means"]
-        assert own == pytest.approx({**own, **{name: fit.summary["elastic"][name]["mean"] for name in MODULI}})
+        own = {name: means[summary.model.law][name] for name in MODULI}
+        assert own == pytest.approx({name: entry.mean for name, entry in summary.elastic.items()})
     assert set(shifts) == {"exact", "linear"}  # Finnish and Fiemme
     assert abs(shifts["exact"]["E_x"]) == pytest.approx(0.8, abs=0.1)
     # two means of some 6000 effective draws, of the same draws but for the weights: 0.02 sd is four errors and more

@@ -120,7 +120,7 @@ def test_a_normal_posterior_is_recovered(known):
 
 
 def test_the_thinned_draws_are_of_the_same_posterior(known):
-    from bayesplate.results.archive import thin_walker_major
+    from bayesplate.posterior.draws import thin_walker_major
 
     inference, _, mean, covariance = known
     thinned = thin_walker_major(inference.chains.draws, inference.chains.burn_in, inference.convergence.tau_max)

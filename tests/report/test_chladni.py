@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.report.chladni import A4, chladni_sheet, layout
 from bayesplate.report.saving import save_figure
-from bayesplate.results.sheet import CombinedMode, Sheet, SheetMode, points
 
 EDGES = {"x0": "clamped", "x1": "free", "y0": "supported", "y1": "free"}
 

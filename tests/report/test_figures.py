@@ -11,7 +11,6 @@ from payloads import PAYLOADS
 from bayesplate.report.page import pictures
 from bayesplate.report.percentiles import percentiles_figure
 from bayesplate.report.priors import Compared, compared
-from bayesplate.report.residuals import rounding_cents
 from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
 
 LONG_NAME = "a-cantilever-with-a-very-long-setup-name-beyond-all-reason"
@@ -68,23 +67,18 @@ def words(figure):
     return [text for text in found if text.get_text().strip()]
 
 
-def test_rounding_by_hand(clamped):
-    """57 Hz read to 1 Hz: between 56.5 and 57.5 Hz, 15.26 cents below and 15.12 above."""
-    below, above = rounding_cents(clamped.inference.problem.board)
-
-    assert below[0] == pytest.approx(1200 * np.log2(56.5 / 57))
-    assert above[0] == pytest.approx(1200 * np.log2(57.5 / 57))
-    assert (below[0], above[0]) == pytest.approx((-15.26, 15.12), abs=0.01)
-
-
 def test_residuals_lie_where_the_summary_says(drawn, clamped):
     (panel,) = drawn["residuals"].figure.axes
     lines = {line.get_label(): line.get_xydata() for line in panel.lines}
-    modes = clamped.summary["modes"]
+    modes = clamped.summary.modes
 
-    np.testing.assert_allclose(lines["error of the fit"][:, 0], [mode["residual_cents"] for mode in modes])
-    np.testing.assert_allclose(lines["error if left out of the fit"][:, 0], [mode["left_out_cents"] for mode in modes])
-    assert [tick.get_text() for tick in panel.get_yticklabels()] == [mode["label"] for mode in modes]
+    np.testing.assert_allclose(lines["error of the fit"][:, 0], [mode.residual_cents for mode in modes])
+    np.testing.assert_allclose(lines["error if left out of the fit"][:, 0], [mode.left_out_cents for mode in modes])
+    bars = {one.get_label(): np.array([path[:, 0] for path in one.get_segments()]) for one in panel.collections}
+    np.testing.assert_allclose(bars["its 90 % interval"], [mode.residual_interval_cents for mode in modes])
+    rounded = [[mode.residual_cents + end for end in mode.rounding_cents] for mode in modes]
+    np.testing.assert_allclose(bars["what rounding may hide"], rounded)
+    assert [tick.get_text() for tick in panel.get_yticklabels()] == [mode.label for mode in modes]
     assert panel.get_ylim()[0] > panel.get_ylim()[1]  # the first on top
 
 
@@ -100,13 +94,13 @@ def test_the_board_is_to_scale(drawn):
 
 
 def test_the_bars_of_the_constants_hold_ninety_per_cent(drawn, clamped):
-    for panel, (name, entry) in zip(drawn["constants"].figure.axes, clamped.summary["elastic"].items(), strict=True):
+    for panel, (name, entry) in zip(drawn["constants"].figure.axes, clamped.summary.elastic.items(), strict=True):
         bar = next(line for line in panel.lines if line.get_label() == "posterior, bar: 90 %")
         low, high = np.array(bar.get_xdata()) * 1e9
         draws = clamped.draws.moduli[name]
 
         assert np.mean((draws >= low) & (draws <= high)) == pytest.approx(0.9, abs=0.001)
-        assert (low, high) == pytest.approx((entry["q05"], entry["q95"]))
+        assert (low, high) == pytest.approx((entry.q05, entry.q95))
 
 
 def test_shares_fill_each_mode(drawn):
@@ -206,6 +200,6 @@ def test_what_the_readings_made_of_each_prior(clamped):
     assert told(1.2, 0.5) == "moved, as wide as before"
     found = {one.name: one for one in compared(clamped.inference.problem, clamped.draws)}
     assert found["E_x"].prior_mean == pytest.approx(np.log(3))
-    mean = clamped.summary["elastic"]["E_x"]["mean"] / 1e9
+    mean = clamped.summary.elastic.E_x.mean / 1e9
     assert found["E_x"].posterior_mean == pytest.approx(np.log(mean), rel=1e-3)
     assert found["noise"].prior_mean == pytest.approx(np.log(0.8))

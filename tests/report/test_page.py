@@ -116,16 +116,16 @@ def test_it_says_what_the_summary_says(page, clamped):
     """The constants to two digits of their sd, every mode, the older methods, the seed, the versions."""
     summary = clamped.summary
     for name in ("E_x", "E_y", "G_xy"):
-        mean, sd = summary["elastic"][name]["mean"] / 1e9, summary["elastic"][name]["sd"] / 1e9
+        mean, sd = summary.elastic[name].mean / 1e9, summary.elastic[name].sd / 1e9
         digits = 2 if sd >= 0.0995 else 3
         assert f"{mean:.{digits}f} ± {sd:.{digits}f}" in page.text
-        assert f"{summary['least_squares'][name] / 1e9:.{digits}f}" in page.text
-    for mode in summary["modes"]:
-        assert f"{mode['residual_cents']:+.1f}" in page.text
-    for sentence in (*summary["identifiability"], *summary["warnings"]):
+        assert f"{summary.least_squares[name] / 1e9:.{digits}f}" in page.text
+    for mode in summary.modes:
+        assert f"{mode.residual_cents:+.1f}" in page.text
+    for sentence in (*summary.identifiability, *summary.warnings):
         assert sentence in page.text
-    assert summary["card_sha256"] in page.text
-    assert all(f"{name} {version}" in page.text for name, version in summary["versions"].items())
+    assert summary.card_sha256 in page.text
+    assert all(f"{name} {version}" in page.text for name, version in summary.versions.items())
     for words in ("wave speed", "radiation ratio", "specific stiffness", "impedance", "E_x / E_y"):
         assert words in page.text
     assert "scikit-fem" in page.text
@@ -137,7 +137,7 @@ def test_derived_quantities_by_hand(page, clamped):
 
     The mean of a root lies below the root of the mean by an eighth of the relative variance, here less than 0.02 %.
     """
-    E, rho = clamped.summary["elastic"]["E_x"]["mean"], 399.0
+    E, rho = clamped.summary.elastic.E_x.mean, 399.0
     by_hand = {
         "wave_speed_x": np.sqrt(E / rho),
         "radiation_ratio_x": np.sqrt(E / rho) / rho,
@@ -145,7 +145,7 @@ def test_derived_quantities_by_hand(page, clamped):
         "impedance_x": np.sqrt(E / rho) * rho,
     }
     for name, value in by_hand.items():
-        assert clamped.summary["derived"][name]["mean"] == pytest.approx(value, rel=5e-4), name
+        assert clamped.summary.derived[name].mean == pytest.approx(value, rel=5e-4), name
 
 
 def test_the_same_fit_gives_the_same_bytes(clamped, clamped_folder, tmp_path):
@@ -201,7 +201,8 @@ def test_each_verdict_is_told_in_plain_words(clamped, verdict):
     is_refitted = verdict in ("named", "indistinguishable group")
     assert ("Error before and after" in text) == is_refitted
     assert ("Shift of the constants" in text) == is_refitted
-    assert ("46.5" in text, "9.5" in text, "+2.5" in text) == (True, is_refitted, is_refitted)
+    numbers = set(re.findall(r"[+-]?\d+(?:\.\d+)?", text))
+    assert ("46.5" in numbers, "9.5" in numbers, "+2.5" in numbers) == (True, is_refitted, is_refitted)
     assert ("its visible part drowns in the noise" in text) == (verdict != "undetectable")
     assert ("is reduced" in text) == (verdict == "named")
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 
 import pytest
+from made_summaries import SUMMARY
 from payloads import PAYLOADS
 
 from bayesplate.results.exports import (
@@ -17,21 +19,6 @@ from bayesplate.results.exports import (
 )
 
 SPREAD = {"mean": 10.5, "sd": 0.25, "q05": 10.0, "q25": 10.25, "q50": 10.5, "q75": 10.75, "q95": 11.0}
-POINT = {"E_x": 10.25e9, "E_y": None, "G_xy": 0.5e9, "D_x": 10.0, "D_y": 1.0, "D_s": 2.0}
-SUMMARY = {
-    "seed": 1,
-    "modes": [{}] * 6,
-    "elastic": {
-        name: {**{key: value * 1e9 for key, value in SPREAD.items()}, "unit": "Pa"} for name in ("E_x", "E_y", "G_xy")
-    },
-    "rigidity": {name: {**SPREAD, "unit": "N m"} for name in ("D_x", "D_y", "D_s")},
-    "least_squares": POINT,
-    "weighted_least_squares": POINT,
-    "percentile": {
-        "E_x": {"mean": 10e9, "sd_percent": 2.0}, "E_y": {"mean": None, "sd_percent": None},
-        "G_xy": {"mean": 0.5e9, "sd_percent": None},
-    },
-}  # fmt: skip
 
 
 def read(text):
@@ -52,7 +39,7 @@ def test_constants_keep_their_numbers():
 
 
 def test_no_percentile_leaves_its_cells_empty():
-    assert read(constants_csv(SUMMARY | {"percentile": None}))["E_x"]["percentile_mean"] == ""
+    assert read(constants_csv(replace(SUMMARY, percentile=None)))["E_x"]["percentile_mean"] == ""
 
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1", *PAYLOADS])

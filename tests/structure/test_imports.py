@@ -42,6 +42,11 @@ ROOMS = {
 
 WITHIN = {"diagnosis": ("shifts", "evidence", "decision", "wording")}
 """Folders that are divided again: each part sees the parts before it, and every file stands in one."""
+NAMES_ALONE = {
+    # `system_of` says which theory is to be cited
+    "results": {"modes": set(), "frequencies": {"LawName", "NamedMode", "cents", "system_of"}},
+}
+"""Of some rooms before it a room takes these names and no others: in results nothing is solved."""
 
 DOORS = {
     "emcee": "posterior",
@@ -61,11 +66,12 @@ SEEDED_RANDOM = {"Generator", "BitGenerator", "SeedSequence", "default_rng", "MT
 
 @dataclass(frozen=True)
 class Import:
-    """One module named by an import, the line, and whether it is imported when the file is."""
+    """One module named by an import, the line, whether it is imported when the file is, and what is taken from it."""
 
     module: str
     line: int
     is_at_top: bool
+    names: tuple[str, ...]
 
 
 def faults(package: Path) -> list[str]:
@@ -98,6 +104,8 @@ def _import_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
                 yield item.line, f"{room} imports {target}"
             elif target == room in WITHIN and len(parts) > 2 and _comes_later(parts[2], inner, WITHIN[room]):
                 yield item.line, f"{room}.{inner} imports {room}.{parts[2]}".replace(". ", " ")
+            for name in sorted(set(item.names) - NAMES_ALONE.get(room, {}).get(target, set(item.names))):
+                yield item.line, f"{room} takes {name} from {target}"
         elif parts[0] in EXECUTES_DATA:
             yield item.line, f"imports {parts[0]}"
         elif DOORS.get(parts[0], room) != room:
@@ -116,17 +124,18 @@ def _imports(tree: ast.Module) -> Iterator[Import]:
     for node in ast.walk(tree):
         is_at_top = node in at_top
         if isinstance(node, ast.Import):
-            yield from (Import(alias.name, node.lineno, is_at_top) for alias in node.names)
+            yield from (Import(alias.name, node.lineno, is_at_top, (alias.name,)) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             module = "." * node.level + (node.module or "")
             # `from scipy import stats` and `from bayesplate import modes` name a module after the word import
             names_module = module in {"scipy", "bayesplate", *(f"bayesplate.{room}" for room in WITHIN)}
             names = [f"{module}.{alias.name}" if names_module else module for alias in node.names]
-            yield from (Import(name, node.lineno, is_at_top) for name in dict.fromkeys(names))
+            taken = tuple(alias.name for alias in node.names)
+            yield from (Import(name, node.lineno, is_at_top, taken) for name in dict.fromkeys(names))
         elif isinstance(node, ast.Call) and _called(node) in {"import_module", "__import__"}:
             named = node.args[0] if node.args else None
             if isinstance(named, ast.Constant) and isinstance(named.value, str):
-                yield Import(named.value, node.lineno, is_at_top)
+                yield Import(named.value, node.lineno, is_at_top, (named.value,))
 
 
 def _run_on_import(tree: ast.Module) -> set[ast.AST]:
@@ -236,6 +245,10 @@ BAD_FILES = [
     ("planning/bad.py", "from scipy import stats", "imports scipy.stats at the top"),
     ("planning/bad.py", "from scipy.stats import norm", "imports scipy.stats at the top"),
     ("results/bad.py", "def f():\n    import pickle", "imports pickle"),
+    ("results/bad.py", "from bayesplate.frequencies.spectrum import NamedMode, spectra", "results takes spectra from "
+     "frequencies"),
+    ("results/bad.py", "from bayesplate.modes.plate import Weights", "results takes Weights from modes"),
+    ("results/bad.py", "import bayesplate.modes.solve", "results takes bayesplate.modes.solve from modes"),
     ("results/bad.py", "import numpy as np\nnp.load('x', allow_pickle=True)", "allows pickles"),
     ("cards/bad.py", "x = eval('1')", "calls eval"),
     ("cards/bad.py", "exec('x = 1')", "calls exec"),

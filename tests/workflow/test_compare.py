@@ -7,6 +7,7 @@ import runs
 from click.testing import CliRunner
 
 from bayesplate.cli import main
+from bayesplate.results.contract import as_json
 from bayesplate.workflow.compare import compare
 from bayesplate.workflow.shown import show_compare
 
@@ -29,14 +30,20 @@ PERCENTILE = {
 
 
 @pytest.fixture(scope="session")
-def comparisons(tmp_path_factory):
-    """Both boards, one through the command line."""
+def cantilever():
+    """The cantilever board through the library."""
+    return compare("finnish-spruce-cantilever")
+
+
+@pytest.fixture(scope="session")
+def comparisons(cantilever, tmp_path_factory):
+    """Both boards as JSON, one through the command line."""
     folder = tmp_path_factory.mktemp("compare")
     result = CliRunner().invoke(main, ["compare", "fiemme-spruce-clamped", "--json", "--out", str(folder / "out")])
     assert result.exit_code == 0, result.stderr
     assert runs.files_in(folder) == {"out/compare.json": result.stdout.encode()}
     return {
-        "finnish-spruce-cantilever": compare("finnish-spruce-cantilever"),
+        "finnish-spruce-cantilever": as_json(cantilever),
         "fiemme-spruce-clamped": runs.read_json(result.stdout),
     }
 
@@ -67,7 +74,8 @@ def test_every_method_stands_under_both_theories(comparisons, card):
         for one in theory["methods"]:
             for entry in one["elastic"].values():
                 assert entry["mean"] > 0
-                assert ("sd" in entry) == (one["name"] != "paper_least_squares")
+                assert (entry["sd"] is not None) == (one["name"] != "paper_least_squares")
+                assert (entry["q05"] is not None) == one["name"].endswith("_posterior")
 
 
 @pytest.mark.parametrize("card", EXPECTED)
@@ -113,8 +121,8 @@ def test_the_linear_law_gives_other_constants_where_modes_mix(comparisons):
     assert shift("fiemme-spruce-clamped") == pytest.approx((0.0, 1.0), abs=0.05)
 
 
-def test_provenance_is_printed(comparisons):
-    shown = show_compare(comparisons["finnish-spruce-cantilever"])
+def test_provenance_is_printed(cantilever):
+    shown = show_compare(cantilever)
     told = " ".join(shown.remarks)
 
     assert len(shown.tables) == 4

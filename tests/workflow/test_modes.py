@@ -8,7 +8,6 @@ import runs
 from click.testing import CliRunner
 
 from bayesplate.cli import main
-from bayesplate.results.sheet import Precision
 from bayesplate.workflow.modes import modes
 
 UNMEASURED = """\
@@ -87,39 +86,39 @@ def test_the_sheet_is_written_once_and_replaced_only_if_forced(finnish_sheet):
 
 
 def test_shear_has_a_share_where_it_is_declared():
-    (setup,) = modes("fiemme-spruce-clamped", effects=["transverse_shear"], write=False).report["setups"]
+    (setup,) = modes("fiemme-spruce-clamped", effects=["transverse_shear"], write=False).report.setups
 
-    assert setup["theory"] == "shear-flexible"
-    assert all(0 < mode["share_percent"]["effects"] < 15 for mode in setup["modes"])
+    assert setup.theory == "shear-flexible"
+    assert all(0 < mode.share_percent.effects < 15 for mode in setup.modes)
 
 
 def test_a_board_not_measured_yet_is_computed_from_the_prior(unmeasured):
     """Supported all round: closed form, omega^2 = pi^4 (D_x m^4 / L_x^4 + ... ) / rho h, at the median of the prior."""
     result = modes(unmeasured, write=False)
-    (setup,) = result.report["setups"]
+    (setup,) = result.report.setups
     E_x, E_y, G, h, rho, nu = 11e9, 0.95e9, 0.67e9, 3e-3, 450.0, 0.4
     D_x, D_y = (E * h**3 / 12 / (1 - nu**2 * E_y / E_x) for E in (E_x, E_y))
     D_s = G * h**3 / 3
 
-    for mode in setup["modes"][:6]:
-        m, n = (int(number) + 1 for number in mode["label"].strip("()").split(","))
+    for mode in setup.modes[:6]:
+        m, n = (int(number) + 1 for number in mode.label.strip("()").split(","))
         x, y = m * np.pi / 0.4, n * np.pi / 0.2
         squared = (D_x * x**4 + D_y * y**4 + (2 * nu * D_y + D_s) * x**2 * y**2) / (rho * h)
-        assert mode["hz"] == pytest.approx(np.sqrt(squared) / (2 * np.pi), rel=1e-3)
-        low, high = mode["likely_hz"]
-        assert low < mode["hz"] < high
-    assert "median of the prior" in result.report["basis"]
+        assert mode.hz == pytest.approx(np.sqrt(squared) / (2 * np.pi), rel=1e-3)
+        low, high = mode.likely_hz
+        assert low < mode.hz < high
+    assert "median of the prior" in result.report.basis
 
 
 def test_the_band_follows_the_prior(unmeasured):
     """To first order ln f has half the shares times the prior's log sds; two thirds of a normal lie within 0.967 sd."""
-    (setup,) = modes(unmeasured, write=False).report["setups"]
+    (setup,) = modes(unmeasured, write=False).report.setups
     log_sds = np.log([1.35, 1.75, 1.5])
 
-    for mode in setup["modes"]:
-        shares = np.array([mode["share_percent"][name] for name in ("D_x", "D_y", "D_s")]) / 100
+    for mode in setup.modes:
+        shares = np.array([mode.share_percent.D_x, mode.share_percent.D_y, mode.share_percent.D_s]) / 100
         half_width = 0.967 * np.sqrt(np.sum((shares * log_sds / 2) ** 2))
-        low, high = np.log(np.array(mode["likely_hz"]))
+        low, high = np.log(np.array(mode.likely_hz))
         assert (high - low) / 2 == pytest.approx(half_width, rel=0.1)
 
 
@@ -149,18 +148,3 @@ def test_modes_not_measured_have_the_range_that_the_others_foretell(finnish_shee
         assert mode["hz"] == pytest.approx(np.sqrt(low * high))
         # No less than the expected noise of a clamped board, 0.8 %; no more than an error of 10 % in a stiffness makes.
         assert 0.967 * 0.008 <= half_width < 0.5 * 0.10
-
-
-def test_the_range_foretells_readings_that_were_left_out():
-    """Simulated at first order: of readings from known constants, two thirds fall within the band, to 3 sd of 4000."""
-    rng = np.random.default_rng(1)
-    root = rng.normal(size=(3, 3)) * 0.02
-    precision, shares = Precision(root @ root.T, {"bench": 0.01}), np.array([0.5, 0.3, 0.2])
-    log_constants = rng.normal(size=(4000, 3)) @ root.T
-    readings = 100 * np.exp(0.5 * log_constants @ shares + 0.01 * rng.normal(size=4000))
-    low, high = precision.band(100.0, shares, "bench")
-
-    share = np.mean((readings > low) & (readings < high))
-    assert share == pytest.approx(2 / 3, abs=3 * np.sqrt(2 / 9 / 4000))
-    narrow_low, narrow_high = Precision(0 * root, {"bench": 0.01}).band(100.0, shares, "bench")
-    assert np.mean((readings > narrow_low) & (readings < narrow_high)) < 2 / 3 - 3 * np.sqrt(2 / 9 / 4000)

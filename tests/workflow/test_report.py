@@ -23,7 +23,7 @@ def test_a_new_run_takes_the_old_report_away(quick_fit):
 
 def test_the_page_tells_of_the_numbers_beside_it(fiemme, fiemme_files):
     page = fiemme_files["report.html"].decode()
-    mean, sd = (fiemme.summary["elastic"]["E_x"][key] / 1e9 for key in ("mean", "sd"))
+    mean, sd = (value / 1e9 for value in (fiemme.summary.elastic.E_x.mean, fiemme.summary.elastic.E_x.sd))
 
     assert f"{mean:.2f} ± {sd:.2f}" in page
     assert "Fiemme Valley red spruce guitar top, clamped" in page

@@ -9,7 +9,7 @@ from bayesplate.diagnosis.decision.verdict import size_posterior
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.forms import Form, with_forms, with_labels_exchanged
 from bayesplate.plate.board import Board
-from bayesplate.results.draws import Draws
+from bayesplate.posterior.draws import Draws
 
 Floats = NDArray[np.float64]
 

@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.results.contract import NOT_IN_JSON, Spread, as_json
 
 FORMAT = 1
 
 Fate = Literal["in the verdict", "below sight", "not needed", "not established", "does not fit", "less probable"]
 """What became of a candidate, in two words."""
-_NOT_WRITTEN = {"in_json": False}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Spread:
-    """A quantity with its uncertainty: mean, standard deviation and quantiles of draws, in `unit`."""
-
-    mean: float
-    sd: float
-    q05: float
-    q25: float
-    q50: float
-    q75: float
-    q95: float
-    unit: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +175,7 @@ class EffectEntry:
     amplitude: Amplitude | None
     look_alikes: tuple[str, ...]
     rejected_because: str | None
-    fate: Fate = field(metadata=_NOT_WRITTEN)
+    fate: Fate = field(metadata=NOT_IN_JSON)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,7 +199,7 @@ class ExchangeEntry:
     amplitude: None = None
     look_alikes: tuple[()] = ()
     rejected_because: str | None
-    fate: Fate = field(metadata=_NOT_WRITTEN)
+    fate: Fate = field(metadata=NOT_IN_JSON)
 
 
 CandidateEntry = EffectEntry | ExchangeEntry
@@ -308,16 +294,4 @@ class Diagnosis:
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """The content of diagnosis.json."""
-    return dict(_plain(diagnosis))
-
-
-def _plain(value: Any) -> Any:
-    """Dataclasses and dictionaries as dictionaries, tuples as lists, everything else as it is."""
-    if is_dataclass(value):
-        written = (one.name for one in fields(value) if one.metadata.get("in_json", True))
-        return {name: _plain(getattr(value, name)) for name in written}
-    if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items()}
-    if isinstance(value, tuple):
-        return [_plain(one) for one in value]
-    return value
+    return dict(as_json(diagnosis))

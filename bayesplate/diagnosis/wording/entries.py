@@ -17,7 +17,7 @@ from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
-from bayesplate.results.draws import finite
+from bayesplate.results.contract import finite
 
 Floats = NDArray[np.float64]
 

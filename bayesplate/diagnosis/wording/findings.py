@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -22,13 +21,13 @@ from bayesplate.diagnosis.wording.diagnosis import (
     Finalist,
     Gates,
     NullControlSummary,
-    Spread,
 )
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, gate_of, rms
 from bayesplate.effects import EFFECTS
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI
-from bayesplate.results.draws import Draws, spread
+from bayesplate.posterior.draws import Draws
+from bayesplate.results.contract import Spread
 from bayesplate.results.summary import Summary
 
 _AVERAGE_LINE = 11
@@ -37,56 +36,11 @@ _MOST_ANSWERS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class FitFigures:
-    """The figures of a fit that a diagnosis compares.
-
-    Attributes
-    ----------
-    name : str
-    seed : int
-    card_sha256 : str
-    in_sample_rms_cents : float
-    leave_one_out_rms_cents : float or None
-    elastic : dict of Spread
-        By modulus, Pa.
-    sizes : dict
-        "board" or setup -> effect -> parameter -> Spread.
-    """
-
-    name: str
-    seed: int
-    card_sha256: str
-    in_sample_rms_cents: float
-    leave_one_out_rms_cents: float | None
-    elastic: Mapping[str, Spread]
-    sizes: Mapping[str, Mapping[str, Mapping[str, Spread]]]
-
-    @classmethod
-    def of(cls, summary: Summary) -> FitFigures:
-        """The one place where the keys of summary.json are known to the diagnosis."""
-        return cls(
-            name=summary["name"],
-            seed=summary["seed"],
-            card_sha256=summary["card_sha256"],
-            in_sample_rms_cents=summary["error"]["in_sample_rms_cents"],
-            leave_one_out_rms_cents=summary["error"]["leave_one_out_rms_cents"],
-            elastic={name: Spread(**summary["elastic"][name]) for name in MODULI},
-            sizes={
-                owner: {
-                    effect: {parameter: Spread(**one) for parameter, one in parameters.items()}
-                    for effect, parameters in effects.items()
-                }
-                for owner, effects in summary["effects"].items()
-            },
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class Side:
-    """The model before or after: its hypothesis, its figures and its draws."""
+    """The model before or after: its hypothesis, its summary and its draws."""
 
     index: int
-    figures: FitFigures
+    summary: Summary
     draws: Draws
 
 
@@ -105,8 +59,8 @@ class Case:
     is_clear_of_zero : bool
         Whether every effect that was added has a size whose 95 % interval excludes zero.
     recommendation : str
-    finalists : sequence of (Answer, FitFigures)
-        Explanations that were fitted again, best first, each with the figures of its fit.
+    finalists : sequence of (Answer, Summary)
+        Explanations that were fitted again, best first, each with the summary of its fit.
     notes : tuple of str
     """
 
@@ -118,7 +72,7 @@ class Case:
     after: Side
     is_clear_of_zero: bool
     recommendation: str
-    finalists: Sequence[tuple[Answer, FitFigures]] = ()
+    finalists: Sequence[tuple[Answer, Summary]] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -148,9 +102,9 @@ def diagnosis_of(case: Case) -> Diagnosis:
     doubled = inclusion_with_width(found, 2.0)
     effects = found.ground.candidates.values()
     return Diagnosis(
-        name=case.before.figures.name,
-        seed=case.before.figures.seed,
-        card_sha256=case.before.figures.card_sha256,
+        name=case.before.summary.name,
+        seed=case.before.summary.seed,
+        card_sha256=case.before.summary.card_sha256,
         verdict=verdict.word,
         claim=case.claim,
         effects=verdict.effects,
@@ -186,8 +140,8 @@ def _errors(case: Case, side: Side) -> Errors:
     low, high = np.quantile(side.draws.predictive.reshape(-1, found.ground.baseline.n_modes), [0.05, 0.95], axis=0)
     measured = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
     return Errors(
-        in_sample_rms_cents=side.figures.in_sample_rms_cents,
-        leave_one_out_rms_cents=side.figures.leave_one_out_rms_cents,
+        in_sample_rms_cents=side.summary.error.in_sample_rms_cents,
+        leave_one_out_rms_cents=side.summary.error.leave_one_out_rms_cents,
         nested_leave_one_out_rms_cents=nested,
         log_score=log_score(found.ground, side.index, found.residual) if folded is not None else None,
         hits_90=float(np.mean((measured >= low) & (measured <= high))),
@@ -204,34 +158,29 @@ def _null_control(case: Case) -> NullControlSummary:
 
 
 def _elastic_shift(case: Case) -> dict[str, ElasticShift]:
-    both = zip(case.before.figures.elastic.items(), case.after.figures.elastic.values(), strict=True)
+    both = zip(case.before.summary.elastic.items(), case.after.summary.elastic.items(), strict=True)
     return {
         name: ElasticShift(before=old.mean, after=new.mean, shift_in_sd=(new.mean - old.mean) / old.sd)
-        for (name, old), new in both
+        for (name, old), (_, new) in both
     }
 
 
 def _elastic_averaged(case: Case) -> dict[str, Spread]:
     """The constants averaged over everything that may be the case, in the linear approximation of the search."""
-    rng = np.random.default_rng([case.before.figures.seed, _AVERAGE_LINE])
+    rng = np.random.default_rng([case.before.summary.seed, _AVERAGE_LINE])
     drawn = draw_constants(case.found, rng, _N_AVERAGED)
-    return {name: _spread(drawn.values[name]) for name in MODULI}
+    return {name: Spread.of(drawn.values[name], "Pa") for name in MODULI}
 
 
-def _spread(values: Any) -> Spread:
-    summarised: dict[str, Any] = spread(values, "Pa")
-    return Spread(**summarised)
-
-
-def _finalist(answer: Answer, figures: FitFigures) -> Finalist:
+def _finalist(answer: Answer, summary: Summary) -> Finalist:
     return Finalist(
         effects=answer.members,
         probability=answer.support,
-        in_sample_rms_cents=figures.in_sample_rms_cents,
-        leave_one_out_rms_cents=figures.leave_one_out_rms_cents,
-        elastic=figures.elastic,
+        in_sample_rms_cents=summary.error.in_sample_rms_cents,
+        leave_one_out_rms_cents=summary.error.leave_one_out_rms_cents,
+        elastic=dict(summary.elastic.items()),
         sizes={
             owner: {name: sizes for name, sizes in effects.items() if name in answer.members}
-            for owner, effects in figures.sizes.items()
+            for owner, effects in summary.effects.items()
         },
     )

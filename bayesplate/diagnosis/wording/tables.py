@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bayesplate.diagnosis.wording.diagnosis import Amplitude, CandidateEntry, Diagnosis, Spread
+from bayesplate.diagnosis.wording.diagnosis import Amplitude, CandidateEntry, Diagnosis
 from bayesplate.diagnosis.wording.words import MERITS, MISSING, Merit, names_of, worth_showing
 from bayesplate.effects.words import effect_name, effect_names
-from bayesplate.results.tables import Table, decimals
+from bayesplate.results.contract import Spread
+from bayesplate.results.tables import Table
+from bayesplate.results.words import decimals
 
 _GPA = 1e9
 _NARROW = ("effect", "shift", "visible", "probability", "size (90 %)", "fate")

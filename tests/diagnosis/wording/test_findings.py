@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from diagnoses import spread
 from made_searches import NOISE, bare, baseline, candidate, ground_of
+from made_summaries import SUMMARY
 
 from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, answers, decide
 from bayesplate.diagnosis.evidence.folds import Nested, nested
@@ -19,17 +20,24 @@ from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.diagnosis.shifts.tables import nothing
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, EffectEntry, diagnosis_json
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
-from bayesplate.diagnosis.wording.findings import Case, FitFigures, Side, diagnosis_of
+from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.material import RIGIDITIES, moduli
+from bayesplate.results.contract import Elastic
 
 SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "air_loading", "grain_angle")
-FIGURES = FitFigures("made", 3, "0" * 64, 21.25, 46.5, {n: spread(1e9) for n in ("E_x", "E_y", "G_xy")}, {})
+FIGURES = replace(
+    SUMMARY,
+    seed=3,
+    error=replace(SUMMARY.error, in_sample_rms_cents=21.25, leave_one_out_rms_cents=46.5),
+    elastic=Elastic(*(spread(1e9) for _ in range(3))),
+    effects={},
+)
 MOVED = replace(
     FIGURES,
-    in_sample_rms_cents=4.25,
-    elastic={n: spread(1.25e9) for n in ("E_x", "E_y", "G_xy")},
-    sizes={"board": {SHEAR: {"size": spread(1.0, "1")}, "declared": {"x": spread(1.0)}}},
+    error=replace(FIGURES.error, in_sample_rms_cents=4.25),
+    elastic=Elastic(*(spread(1.25e9) for _ in range(3))),
+    effects={"board": {SHEAR: {"size": spread(1.0, "1")}, "declared": {"x": spread(1.0)}}},
 )
 
 

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
-from bayesplate.estimates.plausibility import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.line import N_BEAMS
 from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
 from bayesplate.plate.setup import Setup
 
 WITHIN = (1 / 6, 5 / 6)
@@ -64,3 +64,18 @@ def prior_bands(
             low, high = np.quantile(factors, WITHIN)
             bands[str(label)] = (float(low), float(high))
     return bands
+
+
+def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int) -> dict[str, NDArray[np.float64]]:
+    """Draws of the constants and of the board's inputs: dict of (n,) array, SI."""
+    drawn = {name: one.sample(rng, n) for name, one in prior.constants.items()}
+    inputs = {name: quantity.value(rng.standard_normal(n)) for name, quantity in board.inputs.items()}
+    return with_rigidities({**inputs, **drawn})
+
+
+def with_rigidities(values: Values) -> dict[str, NDArray[np.float64]]:
+    """The same values with D_x, D_y, D_s, from the moduli where these are given."""
+    if set(RIGIDITIES) <= set(values):
+        return dict(values)
+    E_x, E_y, G_xy = (values[name] for name in MODULI)
+    return {**values, **rigidities(E_x, E_y, G_xy, values["thickness"], values["poisson_xy"])._asdict()}

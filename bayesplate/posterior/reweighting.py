@@ -1,139 +1,21 @@
-"""Draws by name: the thinned posterior as rigidities, moduli, noise, inputs, frequencies and likelihoods."""
+"""Draws under one frequency law weighted to be draws under the other, and the error that the linear law makes."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.plate.board import density
-from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, linear_suffices
 from bayesplate.posterior.region import linearisation_errors
-from bayesplate.results.archive import thin_walker_major
 
 Floats = NDArray[np.float64]
 
-QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
-MOST_DRAWS_A_CHAIN = 4000
-_LINE_OF_PREDICTIVE_DRAWS = 1
-_N_LINEARISATION = 2000
 FEWEST_WEIGHTED_DRAWS = 200
+"""With fewer effective draws left by the weights, one law cannot stand for the other."""
 
-
-@dataclass(frozen=True, eq=False)
-class Draws:
-    """Thinned draws of an inference; every array starts with (n_chains, n_draws), chain = ensemble.
-
-    Attributes
-    ----------
-    theta : (n_chains, n_draws, n_dim) array
-    log_posterior : (n_chains, n_draws) array
-    rigidities, moduli, inputs : dict of (n_chains, n_draws) array, SI
-    noise : (n_chains, n_draws, n_setups) array
-        Relative.
-    derived : dict of Derived
-    log_frequency : (n_chains, n_draws, n_modes) array
-        ln f (Hz) under the law of the fit.
-    log_likelihood : (n_chains, n_draws, n_modes) array
-    predictive : (n_chains, n_draws, n_modes) array, Hz
-        Frequencies that the next measurement would read, noise included, rounded where the readings are.
-    """
-
-    theta: Floats
-    log_posterior: Floats
-    rigidities: Mapping[str, Floats]
-    moduli: Mapping[str, Floats]
-    inputs: Mapping[str, Floats]
-    noise: Floats
-    derived: Mapping[str, Derived]
-    log_frequency: Floats
-    log_likelihood: Floats
-    predictive: Floats
-
-    @property
-    def flat(self) -> Floats:
-        """theta of all chains together: (n, n_dim) array."""
-        return self.theta.reshape(-1, self.theta.shape[-1])
-
-
-def named_draws(inference: Inference, seed: int) -> Draws:
-    """Thin the chains of an inference and name what they mean.
-
-    Parameters
-    ----------
-    inference : Inference
-    seed : int
-        Of the predictive draws.
-
-    Returns
-    -------
-    Draws
-    """
-    problem, chains = inference.problem, inference.chains
-    tau = inference.convergence.tau_max
-    theta = thin_walker_major(chains.draws, chains.burn_in, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
-    log_posterior = thin_walker_major(chains.log_prob, chains.burn_in, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
-    shape = theta.shape[:2]
-    flat = theta.reshape(-1, theta.shape[-1])
-    posterior = problem.posterior
-    values = problem.parameters.values(flat)
-    constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    log_noise = problem.parameters.log_noise(flat)
-    by_setup = posterior.log_frequencies(flat)
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
-    predictive, log_likelihood = [], []
-    for i, (setup, readings, predicted) in enumerate(
-        zip(problem.board.setups, posterior.readings, by_setup, strict=True)
-    ):
-        simulated = np.exp(readings.simulate(predicted, log_noise[:, i], rng))
-        rounded = readings.log_high > readings.log_low
-        if setup.resolution:
-            simulated[:, rounded] = np.round(simulated[:, rounded] / setup.resolution) * setup.resolution
-        predictive.append(simulated)
-        log_likelihood.append(readings.log_likelihood(predicted, log_noise[:, i]))
-
-    def shaped(array: Floats) -> Floats:
-        return np.broadcast_to(array, flat.shape[:1] + array.shape[1:]).reshape(*shape, *array.shape[1:])
-
-    derived = derived_quantities(constants, density(values))
-    return Draws(
-        theta=theta,
-        log_posterior=log_posterior,
-        rigidities={name: shaped(values[name]) for name in RIGIDITIES},
-        moduli={name: shaped(array) for name, array in zip(MODULI, constants, strict=True)},
-        inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
-        noise=shaped(np.exp(log_noise)),
-        derived={name: Derived(shaped(item.values), item.unit) for name, item in derived.items()},
-        log_frequency=shaped(np.concatenate(by_setup, axis=1)),
-        log_likelihood=shaped(np.concatenate(log_likelihood, axis=1)),
-        predictive=shaped(np.concatenate(predictive, axis=1)),
-    )
-
-
-def spread(values: Floats, unit: str) -> dict[str, float | str]:
-    """Mean, standard deviation and quantiles of draws, as they stand in the summary.
-
-    Parameters
-    ----------
-    values : array of any shape
-    unit : str
-
-    Returns
-    -------
-    dict
-        mean, sd, q05, q25, q50, q75, q95, unit.
-    """
-    quantiles = np.quantile(values, list(QUANTILES.values()))
-    return {
-        "mean": float(np.mean(values)),
-        "sd": float(np.std(values, ddof=1)),
-        **{name: float(value) for name, value in zip(QUANTILES, quantiles, strict=True)},
-        "unit": unit,
-    }
+_N_LINEARISATION = 2000
 
 
 def means_under(
@@ -236,8 +118,3 @@ def linear_is_enough(inference: Inference, draws: Draws, errors: Floats | None =
     return linear_suffices(
         inference.problem.board, linearisation(inference, draws) if errors is None else errors, list(noise)
     )
-
-
-def finite(value: float) -> float | None:
-    """The number, or None where JSON has none: infinity and not-a-number."""
-    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,90 @@
+"""What a fit is judged by besides its draws: errors, leverages, both frequency laws, spectra and doubts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.identifiability import identifiability
+from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.spectrum import NamedMode, doubtful_labels, sign_conflicts, spectra
+from bayesplate.posterior.draws import Draws, posterior_mean_values
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.mode_errors import mode_errors, reading_scales
+from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What is computed once from the draws of a converged fit.
+
+    Attributes
+    ----------
+    left_out : (n_modes,) array
+        ln measured - ln predicted of every reading by a least-squares refit that has not seen it; not a number where
+        too few modes are left.
+    leverages : (n_modes,) array
+        Share of each reading in its own prediction, at the posterior's median noise.
+    linear_errors : (n_some, n_modes) array, cents
+        Linear less exact law over the posterior.
+    linear_is_enough : bool
+        Whether these stay below their share of the posterior's own noise.
+    exact_worst : float, cents
+        Largest error of the exact law against full solves.
+    means : dict of (dict of float, float)
+        By law: posterior means of E_x ... D_s, and how many draws of equal weight they rest on.
+    named : dict of tuple of NamedMode
+        Modes at the posterior mean of every setup with a peak or a sign to compare them with.
+    doubts : tuple of str
+        Labels that hardly fit, and signs that contradict them.
+    """
+
+    left_out: Floats
+    leverages: Floats
+    linear_errors: Floats
+    linear_is_enough: bool
+    exact_worst: float
+    means: Mapping[LawName, tuple[Mapping[str, float], float]]
+    named: Mapping[str, tuple[NamedMode, ...]]
+    doubts: tuple[str, ...]
+
+
+def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = None) -> Assessment:
+    """Judge a converged fit.
+
+    Parameters
+    ----------
+    inference : Inference
+    draws : Draws
+    linear_errors : (n_some, n_modes) array, cents, optional
+        Those of `bayesplate.posterior.reweighting.linearisation`, where they are known already.
+
+    Returns
+    -------
+    Assessment
+    """
+    problem = inference.problem
+    models = problem.posterior.models
+    values = posterior_mean_values(problem, draws)
+    found = spectra(models, values)
+    errors = linearisation(inference, draws) if linear_errors is None else linear_errors
+    scales = reading_scales(inference, draws)
+    signed = (model.setup for model in models if model.setup.hammer is not None)
+    conflicts = (sentence for setup in signed for sentence in sign_conflicts(setup, *found[setup.name], values))
+    return Assessment(
+        left_out=mode_errors(inference, draws).left_out,
+        leverages=identifiability(problem.estimate.sensitivities, scales).leverages,
+        linear_errors=errors,
+        linear_is_enough=linear_is_enough(inference, draws, errors),
+        exact_worst=worst_cents(models),
+        means={law: means_under(inference, draws, law, errors) for law in get_args(LawName)},
+        named={setup: named for setup, (_, named) in found.items()},
+        doubts=(*doubtful_labels(models), *conflicts),
+    )

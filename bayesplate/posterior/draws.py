@@ -1,0 +1,146 @@
+"""Draws by name: the thinned posterior as rigidities, moduli, noise, inputs, frequencies and likelihoods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.board import density
+from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
+from bayesplate.posterior.inference import Inference, Problem
+
+Floats = NDArray[np.float64]
+
+MOST_DRAWS_A_CHAIN = 4000
+_LINE_OF_PREDICTIVE_DRAWS = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Thinned draws of an inference; every array starts with (n_chains, n_draws), chain = ensemble.
+
+    Attributes
+    ----------
+    theta : (n_chains, n_draws, n_dim) array
+    log_posterior : (n_chains, n_draws) array
+    rigidities, moduli, inputs : dict of (n_chains, n_draws) array, SI
+    noise : (n_chains, n_draws, n_setups) array
+        Relative.
+    derived : dict of Derived
+    log_frequency : (n_chains, n_draws, n_modes) array
+        ln f (Hz) under the law of the fit.
+    log_likelihood : (n_chains, n_draws, n_modes) array
+    predictive : (n_chains, n_draws, n_modes) array, Hz
+        Frequencies that the next measurement would read, noise included, rounded where the readings are.
+    """
+
+    theta: Floats
+    log_posterior: Floats
+    rigidities: Mapping[str, Floats]
+    moduli: Mapping[str, Floats]
+    inputs: Mapping[str, Floats]
+    noise: Floats
+    derived: Mapping[str, Derived]
+    log_frequency: Floats
+    log_likelihood: Floats
+    predictive: Floats
+
+    @property
+    def flat(self) -> Floats:
+        """theta of all chains together: (n, n_dim) array."""
+        return self.theta.reshape(-1, self.theta.shape[-1])
+
+
+def named_draws(inference: Inference, seed: int) -> Draws:
+    """Thin the chains of an inference and name what they mean.
+
+    Parameters
+    ----------
+    inference : Inference
+    seed : int
+        Of the predictive draws.
+
+    Returns
+    -------
+    Draws
+    """
+    problem, chains = inference.problem, inference.chains
+    tau = inference.convergence.tau_max
+    theta = thin_walker_major(chains.draws, chains.burn_in, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
+    log_posterior = thin_walker_major(chains.log_prob, chains.burn_in, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
+    shape = theta.shape[:2]
+    flat = theta.reshape(-1, theta.shape[-1])
+    posterior = problem.posterior
+    values = problem.parameters.values(flat)
+    constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    log_noise = problem.parameters.log_noise(flat)
+    by_setup = posterior.log_frequencies(flat)
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
+    predictive, log_likelihood = [], []
+    for i, (setup, readings, predicted) in enumerate(
+        zip(problem.board.setups, posterior.readings, by_setup, strict=True)
+    ):
+        simulated = np.exp(readings.simulate(predicted, log_noise[:, i], rng))
+        rounded = readings.log_high > readings.log_low
+        if setup.resolution:
+            simulated[:, rounded] = np.round(simulated[:, rounded] / setup.resolution) * setup.resolution
+        predictive.append(simulated)
+        log_likelihood.append(readings.log_likelihood(predicted, log_noise[:, i]))
+
+    def shaped(array: Floats) -> Floats:
+        return np.broadcast_to(array, flat.shape[:1] + array.shape[1:]).reshape(*shape, *array.shape[1:])
+
+    derived = derived_quantities(constants, density(values))
+    return Draws(
+        theta=theta,
+        log_posterior=log_posterior,
+        rigidities={name: shaped(values[name]) for name in RIGIDITIES},
+        moduli={name: shaped(array) for name, array in zip(MODULI, constants, strict=True)},
+        inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
+        noise=shaped(np.exp(log_noise)),
+        derived={name: Derived(shaped(item.values), item.unit) for name, item in derived.items()},
+        log_frequency=shaped(np.concatenate(by_setup, axis=1)),
+        log_likelihood=shaped(np.concatenate(log_likelihood, axis=1)),
+        predictive=shaped(np.concatenate(predictive, axis=1)),
+    )
+
+
+def posterior_mean_values(problem: Problem, draws: Draws) -> dict[str, Floats]:
+    """Constants and inputs at their posterior means."""
+    means = {name: np.asarray(v.mean()) for name, v in {**draws.rigidities, **draws.inputs}.items()}
+    return {**problem.board.nominal(), **means}
+
+
+def thin_walker_major(
+    draws: NDArray[np.float64], burn_in: int, tau_max: float, *, n_draws_max: int | None = None
+) -> NDArray[np.float64]:
+    """Thin the draws to half an autocorrelation time and order them for ArviZ: chain = ensemble.
+
+    Within a chain come all steps of the first walker, then all of the second, and so on.  In this order neighbours are
+    steps of one walker, so that ArviZ's effective sizes see the true autocorrelation; step by step across walkers it
+    would take the walkers of a step for consecutive draws.
+
+    Parameters
+    ----------
+    draws : (n_ensembles, n_steps, n_walkers, ...) array
+        Draws, or anything else with these first axes, as the log posterior.
+    burn_in : int
+        Steps to drop first.
+    tau_max : float, steps
+        Largest autocorrelation time.
+    n_draws_max : int, optional
+        Thin further until a chain holds at most so many draws (but at least one a walker).
+
+    Returns
+    -------
+    (n_ensembles, n_draws, ...) array
+    """
+    n_ensembles, n_steps, n_walkers = draws.shape[:3]
+    every = max(1, int(tau_max / 2.0)) if np.isfinite(tau_max) else 1
+    if n_draws_max is not None:
+        every = max(every, -(-(n_steps - burn_in) // max(1, n_draws_max // n_walkers)))
+    walkers_first = np.swapaxes(draws[:, burn_in::every], 1, 2)
+    return walkers_first.reshape(n_ensembles, -1, *draws.shape[3:])

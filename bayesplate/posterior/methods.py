@@ -1,0 +1,145 @@
+"""Every method's constants of a board, and how far the exact frequencies at each of them miss the readings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.least_squares import log_measured
+from bayesplate.estimates.paper import PaperSystem
+from bayesplate.estimates.percentile import percentile_estimate
+from bayesplate.frequencies.full import full_log_frequencies
+from bayesplate.plate.board import Values
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
+from bayesplate.posterior.draws import Draws, posterior_mean_values
+from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.reweighting import weighted_mean
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """What one method says of a board.
+
+    Attributes
+    ----------
+    name : str
+    mean : dict of float, Pa
+        E_x, E_y, G_xy; not a number where the method finds no plate.
+    misses : (n_modes,) array
+        ln predicted - ln measured of every reading, by full solves at its constants; not a number where these are no
+        plate's.
+    sd : dict of float, Pa
+        Empty where the method gives none.
+    interval : dict of (float, float), Pa
+        The middle 90 % of a posterior, otherwise empty.
+    condition_number : float or None
+        Of a method of least squares.
+    n_subsets : int or None
+        Of the percentile method.
+    """
+
+    name: str
+    mean: Mapping[str, float]
+    misses: Floats
+    sd: Mapping[str, float] = field(default_factory=dict)
+    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    condition_number: float | None = None
+    n_subsets: int | None = None
+
+
+def point_methods(problem: Problem, system: PaperSystem, expected_sd: Mapping[str, float]) -> list[Method]:
+    """The methods without sampling: the paper's least squares, weighted least squares, percentile.
+
+    Parameters
+    ----------
+    problem : Problem
+    system : PaperSystem
+    expected_sd : dict of float
+        Relative standard deviation of the weighted estimate of each modulus.
+
+    Returns
+    -------
+    list of Method
+        Without the percentile method where there are too many modes, or none of its estimates is positive.
+    """
+    nominal = problem.board.nominal()
+    paper = system.solve()
+    estimate = problem.estimate
+    D_x, D_y, D_s = estimate.rigidities
+    weighted = _named(moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"]))
+    methods = [
+        Method(
+            "paper_least_squares",
+            _named(system.moduli(paper)),
+            misses(problem, {**nominal, **_rigidities(paper)}),
+            condition_number=system.condition_number,
+        ),
+        Method(
+            "weighted_least_squares",
+            weighted,
+            misses(problem, estimate.values),
+            sd={name: expected_sd[name] * value for name, value in weighted.items()},
+            condition_number=problem.identifiability.condition_number,
+        ),
+    ]
+    percentile = percentile_estimate(system)
+    if percentile is not None and all(np.isfinite(percentile.mean[name]) for name in MODULI):
+        E_x, E_y, G_xy = (percentile.mean[name] for name in MODULI)
+        constants = np.array(rigidities(E_x, E_y, G_xy, nominal["thickness"], nominal["poisson_xy"]))
+        methods.append(
+            Method(
+                "percentile",
+                percentile.mean,
+                misses(problem, {**nominal, **_rigidities(constants)}),
+                sd=percentile.sd,
+                n_subsets=percentile.n_subsets,
+            )
+        )
+    return methods
+
+
+def posterior_method(name: str, problem: Problem, draws: Draws, weights: Floats) -> Method:
+    """A posterior as a method, from weighted draws.
+
+    Parameters
+    ----------
+    name : str
+    problem : Problem
+    draws : Draws
+    weights : (n_chains * n_draws,) array
+        Sum to 1.
+    """
+    mean, sd, interval = {}, {}, {}
+    for modulus, by_chain in draws.moduli.items():
+        values = by_chain.ravel()
+        mean[modulus] = weighted_mean(values, weights)
+        sd[modulus] = float(np.sqrt(weighted_mean((values - mean[modulus]) ** 2, weights)))
+        order = np.argsort(values)
+        places = np.cumsum(weights[order]) - 0.5 * weights[order]
+        low, high = np.interp([0.05, 0.95], places, values[order])
+        interval[modulus] = (float(low), float(high))
+    sampled = {**draws.rigidities, **draws.inputs}
+    means = {key: np.asarray(weighted_mean(values.ravel(), weights)) for key, values in sampled.items()}
+    at_means = misses(problem, {**posterior_mean_values(problem, draws), **means})
+    return Method(name, mean, at_means, sd=sd, interval=interval)
+
+
+def misses(problem: Problem, values: Values) -> Floats:
+    """ln predicted - ln measured of all readings, by full solves; not a number where the constants are no plate's."""
+    if not all(float(values[name]) > 0 for name in RIGIDITIES):
+        return np.full(log_measured(problem.board).size, np.nan)
+    predicted = [full_log_frequencies(model, values) for model in problem.posterior.models]
+    return np.asarray(np.concatenate(predicted) - log_measured(problem.board))
+
+
+def _named(constants: tuple[Floats, ...]) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(MODULI, constants, strict=True)}
+
+
+def _rigidities(constants: Floats) -> dict[str, Floats]:
+    return {name: np.asarray(value) for name, value in zip(RIGIDITIES, constants, strict=True)}

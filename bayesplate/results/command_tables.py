@@ -1,0 +1,149 @@
+"""The tables of `check`, `compare` and `modes`: text cells only, no layout."""
+
+from __future__ import annotations
+
+from bayesplate.results.checking import CheckReport
+from bayesplate.results.comparison import Estimated, MethodRow, TheoryRow
+from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
+from bayesplate.results.tables import Table
+from bayesplate.results.words import CONSTANTS, GPA, MISSING, decimals, mode_name, narrow_name, number
+
+_METHODS = {
+    "paper_least_squares": "paper",
+    "weighted_least_squares": "weighted",
+    "percentile": "percentile",
+    "linear_posterior": "linear",
+    "exact_posterior": "exact",
+}
+METHODS_REMARK = (
+    "paper: its unweighted least squares; weighted: least squares of relative errors, ± what noise, misfit and "
+    "uncertain inputs let expect; percentile: ± how far trimmed estimates from subsets of the modes lie apart, which "
+    "is no error; linear, exact: posterior under that law, ± its standard deviation"
+)
+_DEFAULT_DIGITS = 3
+
+
+def check_tables(report: CheckReport) -> tuple[Table, ...]:
+    """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
+    constants = tuple(
+        (narrow_name(name), f"{report.estimate[name] * GPA:.4g}", f"± {report.expected_sd_percent[name]:.1f} %")
+        for name in CONSTANTS
+    )
+    modes = tuple(
+        (
+            mode_name(mode.label, mode.setup, several=len(report.setups) > 1),
+            f"{mode.measured_hz:.6g}",
+            number(mode.residual_cents, 1, signed=True),
+            " / ".join(f"{share:.0f}" for share in mode.share_percent),
+            f"{mode.leverage:.2f}",
+        )
+        for mode in report.modes
+    )
+    return (
+        Table(f"What {report.name} can tell, GPa", ("constant", "least squares", "uncertainty to expect"), constants),
+        Table("Modes", ("mode", "measured Hz", "error, cents", "energy in D_x/D_y/D_s, %", "leverage"), modes),
+        *([_effects_table(report)] if report.signatures else []),
+    )
+
+
+def _effects_table(report: CheckReport) -> Table:
+    """What effects that are not declared would do: in all, to be seen, and to the constants if ignored.
+
+    No name of an effect may be cut off on a terminal of 80 columns, so look-alikes stand below each other.
+    """
+    rows = tuple(
+        (
+            one.effect,
+            f"{one.raw_rms_cents:.1f}",
+            f"{one.visible_rms_cents:.1f}" + (" *" if one.below_sight else "  "),
+            "/".join(f"{bias:+.1f}" for _, bias in one.bias_percent.items()),
+            "\n".join(one.look_alikes) or MISSING,
+        )
+        for one in report.signatures
+    )
+    return Table(
+        "Effects not declared, at a usual size: cents rms (*: lost in noise)",
+        ("effect", "shift", "visible", "E_x/E_y/G_xy\noff by, %", "looks like"),
+        rows,
+    )
+
+
+def methods_table(name: str, theory: TheoryRow) -> Table:
+    """The constants of every method under one theory of the plate, and how far each misses the readings."""
+    return Table(
+        f"{name}, {theory.theory} plate: GPa, and how far the readings are missed, cents rms",
+        ("method", *CONSTANTS, "misses"),
+        tuple(_method_cells(method) for method in theory.methods),
+    )
+
+
+def _method_cells(method: MethodRow) -> tuple[str, ...]:
+    subsets = "" if method.n_subsets is None else f" ({method.n_subsets})"
+    cells = (_constant(entry) for _, entry in method.elastic.items())
+    return (_METHODS[method.name] + subsets, *cells, number(method.forward_rms_cents, 1))
+
+
+def forward_table(theory: TheoryRow) -> Table:
+    """The forward check: what the exact law predicts at each method's constants, less the reading, cents."""
+    several = len({mode.setup for mode in theory.modes}) > 1
+    rows = [
+        (
+            mode_name(mode.label, mode.setup, several=several),
+            f"{mode.measured_hz:.6g}",
+            *(number(method.forward[i].cents, 1, signed=True) for method in theory.methods),
+            number(mode.left_out_cents, 1, signed=True, factor=-1.0),
+        )
+        for i, mode in enumerate(theory.modes)
+    ]
+    return Table(
+        f"Forward check, {theory.theory} plate: predicted less measured, cents",
+        ("mode", "Hz", *(_METHODS[method.name] for method in theory.methods), "left out"),
+        tuple(rows),
+    )
+
+
+def _constant(entry: Estimated) -> str:
+    if entry.mean is None:
+        return MISSING
+    if not entry.sd:
+        return number(entry.mean, _DEFAULT_DIGITS, factor=GPA)
+    digits = decimals(entry.sd * GPA)
+    return f"{number(entry.mean, digits, factor=GPA)} ± {number(entry.sd, digits, factor=GPA)}"
+
+
+def sheet_tables(report: ModesReport) -> tuple[Table, ...]:
+    """One table per setup."""
+    return tuple(_sheet_table(report.name, setup) for setup in report.setups)
+
+
+def _sheet_table(name: str, setup: SheetReport) -> Table:
+    """The lowest modes of a setup: frequency, energies, the paper's coefficients."""
+    has_effects = any(mode.share_percent.effects for mode in setup.modes)
+    rows = tuple(
+        (
+            mode.label,
+            f"{mode.hz:.1f}",
+            _reading(mode),
+            " / ".join(str(share) for share in _shares(mode.share_percent, has_effects)),
+            *(f"{coefficient:.4g}" for coefficient in (mode.a, mode.b, mode.c)),
+        )
+        for mode in setup.modes
+    )
+    energy = "% in D_x/D_y/D_s" + ("/rest" if has_effects else "")
+    is_expected = any(mode.likely_hz for mode in setup.modes)
+    return Table(
+        f"Lowest modes of {name}, setup {setup.setup}, {setup.theory} plate",
+        ("mode", "Hz", "likely Hz" if is_expected else "measured Hz", energy, "a", "b", "c"),
+        rows,
+    )
+
+
+def _shares(shares: EnergyShares, has_effects: bool) -> list[int]:
+    wanted = (shares.D_x, shares.D_y, shares.D_s, *((shares.effects,) if has_effects else ()))
+    return [round(share) for share in wanted]
+
+
+def _reading(mode: SheetRow) -> str:
+    if mode.likely_hz is not None:
+        return f"{mode.likely_hz[0]:.0f} to {mode.likely_hz[1]:.0f}"
+    return MISSING if mode.measured_hz is None else f"{mode.measured_hz:.6g}"

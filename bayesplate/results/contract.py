@@ -1,0 +1,113 @@
+"""What results are made of: one value per elastic constant, the spread of draws, and the one way to JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.material import MODULI, RIGIDITIES
+
+Value = TypeVar("Value")
+
+NOT_IN_JSON = {"in_json": False}
+"""Metadata of a field that `as_json` leaves out."""
+
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+@dataclass(frozen=True)
+class ByConstant(Generic[Value]):
+    """One value per constant, by attribute or by name: `elastic.E_x` is `elastic["E_x"]`."""
+
+    NAMES: ClassVar[tuple[str, ...]] = ()
+
+    def __getitem__(self, name: str) -> Value:
+        if name not in self.NAMES:
+            raise KeyError(name)
+        value: Value = getattr(self, name)
+        return value
+
+    def items(self) -> tuple[tuple[str, Value], ...]:
+        """Name and value of each."""
+        return tuple((name, self[name]) for name in self.NAMES)
+
+
+@dataclass(frozen=True)
+class Elastic(ByConstant[Value]):
+    """One value per elastic modulus."""
+
+    E_x: Value
+    E_y: Value
+    G_xy: Value
+    NAMES: ClassVar[tuple[str, ...]] = MODULI
+
+
+@dataclass(frozen=True)
+class Rigidity(ByConstant[Value]):
+    """One value per rigidity."""
+
+    D_x: Value
+    D_y: Value
+    D_s: Value
+    NAMES: ClassVar[tuple[str, ...]] = RIGIDITIES
+
+
+@dataclass(frozen=True)
+class Constants(ByConstant[Value]):
+    """One value per modulus (Pa) and per rigidity (N m)."""
+
+    E_x: Value
+    E_y: Value
+    G_xy: Value
+    D_x: Value
+    D_y: Value
+    D_s: Value
+    NAMES: ClassVar[tuple[str, ...]] = MODULI + RIGIDITIES
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean, standard deviation and quantiles of draws, in a unit."""
+
+    mean: float
+    sd: float
+    q05: float
+    q25: float
+    q50: float
+    q75: float
+    q95: float
+    unit: str
+
+    @classmethod
+    def of(cls, values: NDArray[np.float64], unit: str) -> Spread:
+        """Those of draws, in an array of any shape."""
+        q05, q25, q50, q75, q95 = (float(value) for value in np.quantile(values, _QUANTILES))
+        return cls(float(np.mean(values)), float(np.std(values, ddof=1)), q05, q25, q50, q75, q95, unit)
+
+
+def as_json(value: Any) -> Any:
+    """A result as JSON has it: the fields of a dataclass by name and in their order, tuples as lists."""
+    if is_dataclass(value):
+        written = (one.name for one in fields(value) if one.metadata != NOT_IN_JSON)
+        return {name: as_json(getattr(value, name)) for name in written}
+    if isinstance(value, Mapping):
+        return {key: as_json(one) for key, one in value.items()}
+    if isinstance(value, tuple | list):
+        return [as_json(one) for one in value]
+    return value
+
+
+def finite(value: float) -> float | None:
+    """The number, or None where JSON has none: infinity and not-a-number."""
+    return float(value) if np.isfinite(value) else None
+
+
+def rms(values: Sequence[float | None] | NDArray[np.float64]) -> float | None:
+    """Root of the mean square of those that are numbers; None if none is."""
+    numbers = np.array(values, dtype=float)
+    numbers = numbers[np.isfinite(numbers)]
+    return float(np.sqrt(np.mean(numbers**2))) if numbers.size else None

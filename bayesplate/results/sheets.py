@@ -1,0 +1,108 @@
+"""The report of `modes` as types: the lowest modes of each setup, and their mixtures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bayesplate.estimates.sheet import Sheet, SheetMode
+
+
+@dataclass(frozen=True)
+class EnergyShares:
+    """Share of each rigidity and of effects in a mode's energy, per cent."""
+
+    D_x: float
+    D_y: float
+    D_s: float
+    effects: float
+
+
+@dataclass(frozen=True)
+class SheetRow:
+    """One mode.
+
+    Attributes
+    ----------
+    label : str
+        Or "cannot tell".
+    hz : float
+    measured_hz : float or None
+    miss_cents : float or None
+        Computed over measured.
+    likely_hz : tuple of float or None
+        Where it is expected two times in three, if it was not measured.
+    share_percent : EnergyShares
+    a, b, c : float
+        The paper's coefficients.
+    """
+
+    label: str
+    hz: float
+    measured_hz: float | None
+    miss_cents: float | None
+    likely_hz: tuple[float, float] | None
+    share_percent: EnergyShares
+    a: float
+    b: float
+    c: float
+
+
+@dataclass(frozen=True)
+class MixtureRow:
+    """A mixture of modes that answers to one modulus alone: weight of each mode by label."""
+
+    name: str
+    modulus: str
+    weights: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class SheetReport:
+    """The lowest modes of one setup, in the order of frequency, and their mixtures."""
+
+    setup: str
+    edges: Mapping[str, str]
+    theory: str
+    modes: tuple[SheetRow, ...]
+    combined: tuple[MixtureRow, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class ModesReport:
+    """The lowest modes of a board.
+
+    Attributes
+    ----------
+    name, title : str
+    basis : str
+        At which constants they are computed.
+    setups : tuple of SheetReport
+    notes : tuple of str
+    files : tuple of str
+        Sheets that were written.
+    """
+
+    name: str
+    title: str
+    basis: str
+    setups: tuple[SheetReport, ...]
+    notes: tuple[str, ...]
+    files: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        told = "; ".join(f"{one.setup}: {len(one.modes)} from {one.modes[0].hz:.4g} Hz" for one in self.setups)
+        return f"<ModesReport of {self.name}: {told}>"
+
+
+def sheet_report(sheet: Sheet) -> SheetReport:
+    """A sheet without its shapes."""
+    mixtures = tuple(MixtureRow(one.name, one.modulus, dict(one.weights)) for one in sheet.combined)
+    rows = tuple(_row(mode) for mode in sheet.modes)
+    return SheetReport(sheet.setup, dict(sheet.edges), sheet.theory, rows, mixtures)
+
+
+def _row(mode: SheetMode) -> SheetRow:
+    shares = EnergyShares(*(round(100.0 * float(share), 1) for share in mode.shares))
+    a, b, c = (float(value) for value in mode.coefficients)
+    return SheetRow(mode.name, mode.hertz, mode.measured_hz, mode.miss_cents, mode.band_hz, shares, a, b, c)

@@ -1,0 +1,213 @@
+"""From draws and their assessment to the summary of a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.identifiability import remarks
+from bayesplate.estimates.paper import PaperSystem, paper_system
+from bayesplate.estimates.percentile import percentile_estimate
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.posterior.assessment import Assessment
+from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference, Problem
+from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
+from bayesplate.posterior.sampling import Chains
+from bayesplate.results.budget import input_remarks
+from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
+from bayesplate.results.modes import mode_rows, unlabelled_peaks
+from bayesplate.results.summary import (
+    FORMAT,
+    ErrorFigures,
+    LawMeans,
+    ModelHeader,
+    Percentile,
+    PercentileValue,
+    PointEstimate,
+    SamplerHealth,
+    Summary,
+    Unconverged,
+)
+
+Floats = NDArray[np.float64]
+
+HIGH_EXACT_ERROR = 0.5
+"""Cents by which the exact law may miss full solves before a summary warns."""
+
+
+
+def unconverged_summary(
+    problem: Problem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
+) -> Unconverged:
+    """The summary of a run that failed the gate."""
+    return Unconverged(
+        format=FORMAT,
+        name=problem.board.name,
+        seed=seed,
+        versions=dict(versions),
+        card_sha256=sha256,
+        model=model_header(problem),
+        converged=False,
+        sampler=sampler_health(chains, convergence),
+        warnings=(*convergence.reasons, f"suggested steps: {convergence.suggested_steps}"),
+    )
+
+
+def summarise(
+    inference: Inference,
+    draws: Draws,
+    assessment: Assessment,
+    seed: int,
+    versions: Mapping[str, str],
+    card_sha256: str,
+) -> Summary:
+    """The summary of a converged fit.
+
+    Parameters
+    ----------
+    inference : Inference
+    draws : Draws
+    assessment : Assessment
+        Of these draws.
+    seed : int
+    versions : dict of str
+    card_sha256 : str
+
+    Returns
+    -------
+    Summary
+    """
+    problem = inference.problem
+    board = problem.board
+    system = paper_system(board, problem.estimate, compared=False)
+    rows = mode_rows(problem, draws, assessment)
+    return Summary(
+        format=FORMAT,
+        name=board.name,
+        seed=seed,
+        versions=dict(versions),
+        card_sha256=card_sha256,
+        model=model_header(problem),
+        converged=True,
+        elastic=Elastic(**{name: Spread.of(values, "Pa") for name, values in draws.moduli.items()}),
+        rigidity=Rigidity(**{name: Spread.of(values, "N m") for name, values in draws.rigidities.items()}),
+        effects=_effects(problem, draws),
+        noise={setup.name: Spread.of(draws.noise[..., i], "1") for i, setup in enumerate(board.setups)},
+        inputs={
+            one.name: Spread.of(draws.inputs[one.name], one.unit) for one in board.uncertain if not one.is_of_effect
+        },
+        derived={name: Spread.of(item.values, item.unit) for name, item in draws.derived.items()},
+        least_squares=_paper_least_squares(system),
+        weighted_least_squares=_weighted(problem),
+        percentile=_percentile(system),
+        linear_means=law_means(*assessment.means["linear"]),
+        exact_means=law_means(*assessment.means["exact"]),
+        modes=rows,
+        unlabelled=unlabelled_peaks(board, assessment.named),
+        error=ErrorFigures(
+            in_sample_rms_cents=float(np.sqrt(np.mean([row.residual_cents**2 for row in rows]))),
+            leave_one_out_rms_cents=rms([row.left_out_cents for row in rows]),
+            linearisation_rms_cents=rms(assessment.linear_errors),
+            exact_law_worst_cents=assessment.exact_worst,
+        ),
+        sampler=sampler_health(inference.chains, inference.convergence),
+        identifiability=(*remarks(board, problem.identifiability), *input_remarks(draws, board)),
+        warnings=tuple(warnings_of(problem, assessment)),
+    )
+
+
+def model_header(problem: Problem) -> ModelHeader:
+    """What is fitted."""
+    posterior = problem.posterior
+    theory, effects = posterior.models[0].system.theory, tuple(problem.board.effects)
+    return ModelHeader(theory, posterior.law, effects, posterior.robust, problem.prior.name)
+
+
+def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:
+    """How the sampler fared."""
+    n_ensembles, n_steps, n_walkers, _ = chains.draws.shape
+    return SamplerHealth(
+        ensembles=n_ensembles,
+        walkers=n_walkers,
+        steps=n_steps,
+        tau_max=finite(convergence.tau_max),
+        rhat_max=finite(convergence.rhat_max),
+        ess_min=finite(convergence.ess_min),
+        acceptance=finite(convergence.acceptance),
+    )
+
+
+def _effects(problem: Problem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
+    """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
+    result: dict[str, dict[str, dict[str, Spread]]] = {}
+    for model in problem.posterior.models:
+        for effect in model.system.effects:
+            owner = result.setdefault(effect.owner.title, {})
+            owner[effect.name] = {
+                parameter.key: Spread.of(_values_of(parameter.name, problem, draws), parameter.unit)
+                for parameter in effect.parameters()
+            }
+    return result
+
+
+def _values_of(key: str, problem: Problem, draws: Draws) -> Floats:
+    if key in draws.inputs:
+        return draws.inputs[key]
+    return np.broadcast_to(problem.board.inputs[key].mean, draws.log_posterior.shape)
+
+
+def law_means(means: Mapping[str, float], effective: float) -> LawMeans:
+    """Posterior means under a law; none where the two laws are too far apart for one to stand for the other."""
+    known = effective >= FEWEST_WEIGHTED_DRAWS
+    return LawMeans(**{name: value if known else None for name, value in means.items()}, effective_draws=effective)
+
+
+def _paper_least_squares(system: PaperSystem) -> PointEstimate:
+    constants = system.solve()
+    return _point(np.stack(system.moduli(constants)), constants, system.condition_number)
+
+
+def _weighted(problem: Problem) -> PointEstimate:
+    estimate = problem.estimate
+    values = estimate.values
+    D_x, D_y, D_s = estimate.rigidities
+    elastic = moduli(D_x, D_y, D_s, values["thickness"], values["poisson_xy"])
+    return _point(np.stack(elastic), estimate.rigidities, problem.identifiability.condition_number)
+
+
+def _point(elastic: Floats, constants: Floats, condition_number: float) -> PointEstimate:
+    named = zip((*MODULI, *RIGIDITIES), (*elastic, *constants), strict=True)
+    return PointEstimate(**{name: finite(float(v)) for name, v in named}, condition_number=condition_number)
+
+
+def _percentile(system: PaperSystem) -> Percentile | None:
+    found = percentile_estimate(system)
+    if found is None:
+        return None
+    values = {
+        name: PercentileValue(finite(found.mean[name]), finite(100.0 * found.sd[name] / found.mean[name]))
+        for name in MODULI
+    }
+    return Percentile(**values, n_subsets=found.n_subsets)
+
+
+def warnings_of(problem: Problem, assessment: Assessment) -> list[str]:
+    """What a reader of the summary must know, one sentence each."""
+    sentences = list(problem.board.notes)
+    if not problem.estimate.converged:
+        sentences.append("the least-squares steps did not settle: two modes near one frequency may swap their labels")
+    sentences += assessment.doubts
+    if problem.posterior.law == "linear" and not assessment.linear_is_enough:
+        sentences.append(
+            "the linear law is off by more than a quarter of the noise over the posterior: its constants may be "
+            "shifted, use the exact law"
+        )
+    if assessment.exact_worst > HIGH_EXACT_ERROR:
+        sentences.append(
+            f"the exact law misses full solves by up to {assessment.exact_worst:.2f} cents at the rim of the posterior"
+        )
+    return sentences

@@ -1,0 +1,77 @@
+"""Rows of the labelled modes from draws made by hand: every number of a row belongs to the same prediction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import ritz
+from made_boards import setup_of
+
+from bayesplate.frequencies.spectrum import NamedMode
+from bayesplate.labels import Label
+from bayesplate.posterior.likelihood import Readings
+from bayesplate.quantities import Quantity
+from bayesplate.results.modes import mode_rows, unlabelled_peaks
+
+HERTZ = {(0, 0): 57.0, (0, 1): Quantity.from_mean(100.0, 0.5)}
+SETUP = setup_of(ritz.ALL_CLAMPED, HERTZ, name="bench", resolution=1.0)
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """Two modes, the second with its own uncertainty and so not rounded, and skewed draws of both predictions."""
+    places = [SimpleNamespace(correlation=value) for value in (0.99, 0.9)]
+    posterior = SimpleNamespace(models=[SimpleNamespace(places=places)], readings=(Readings.of(SETUP),))
+    problem = SimpleNamespace(board=SimpleNamespace(setups=(SETUP,)), posterior=posterior)
+    rng = np.random.default_rng(1)
+    log_frequency = np.log([56.0, 101.0]) + 0.02 * rng.standard_exponential((4, 500, 2))
+    draws = SimpleNamespace(log_frequency=log_frequency)
+    assessment = SimpleNamespace(left_out=np.log([1.01, np.nan]), leverages=np.array([0.25, 0.75]))
+    return mode_rows(problem, draws, assessment), np.exp(log_frequency)
+
+
+def test_residuals_are_those_of_the_prediction_beside_them(rows):
+    made, hertz = rows
+    for i, row in enumerate(made):
+        predicted = row.predicted_hz
+        assert predicted.mean == pytest.approx(hertz[..., i].mean())
+        assert row.residual_cents == pytest.approx(1200 * np.log2(row.measured_hz / predicted.mean))
+        assert row.residual_interval_cents == pytest.approx(
+            (1200 * np.log2(row.measured_hz / predicted.q95), 1200 * np.log2(row.measured_hz / predicted.q05))
+        )
+        residuals = 1200 * np.log2(row.measured_hz / hertz[..., i])
+        low, high = row.residual_interval_cents
+        # nine draws in ten lie within; an end between two of 2000 draws may gain or lose one
+        assert np.mean((residuals >= low) & (residuals <= high)) == pytest.approx(0.9, abs=2 / 2000)
+
+
+def test_rounding_by_hand(rows):
+    """57 Hz read to 1 Hz: between 56.5 and 57.5 Hz, 15.26 cents below, 15.12 above; 100 ± 0.5 Hz is not rounded."""
+    rounded, uncertain = rows[0]
+
+    assert rounded.rounding_cents == pytest.approx((1200 * np.log2(56.5 / 57), 1200 * np.log2(57.5 / 57)))
+    assert rounded.rounding_cents == pytest.approx((-15.26, 15.12), abs=0.01)
+    assert uncertain.rounding_cents is None
+
+
+def test_the_rest_of_a_row(rows):
+    first, second = rows[0]
+
+    assert (first.setup, first.label, first.measured_hz) == ("bench", "(0,0)", 57.0)
+    assert first.left_out_cents == pytest.approx(1200 * np.log2(1.01))
+    assert second.left_out_cents is None
+    assert [(row.leverage, row.label_correlation) for row in (first, second)] == [(0.25, 0.99), (0.75, 0.9)]
+
+
+def test_a_peak_stands_beside_the_mode_nearest_to_it():
+    """Nearest as a ratio: 71 Hz is nearer to 100 than to 50, though less far from 50 in hertz."""
+    board = SimpleNamespace(setups=(replace(SETUP, unlabelled=(71.0, 49.0)),))
+    named = (NamedMode(Label(0, 0), 50.0, 0.99), NamedMode(None, 100.0, 0.5))
+    high, low = unlabelled_peaks(board, {"bench": named})
+
+    assert (high.setup, high.nearest, high.predicted_hz) == ("bench", "cannot tell", 100.0)
+    assert high.cents == pytest.approx(1200 * np.log2(0.71))
+    assert (low.nearest, low.measured_hz) == ("(0,0)", 49.0)

@@ -1,0 +1,121 @@
+"""summary.json, key by key, and how a summary shows itself; from a summary made by hand."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from made_summaries import SUMMARY
+
+from bayesplate.results.contract import Elastic, Spread, finite, rms
+from bayesplate.results.folder import json_text
+from bayesplate.results.summary import ModelHeader, SamplerHealth, Unconverged
+
+SPREAD = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
+ELASTIC = ["E_x", "E_y", "G_xy"]
+RIGIDITY = ["D_x", "D_y", "D_s"]
+POINT = [*ELASTIC, *RIGIDITY, "condition_number"]
+MEANS = [*ELASTIC, *RIGIDITY, "effective_draws"]
+
+CONTRACT = {
+    "": ["format", "name", "seed", "versions", "card_sha256", "model", "converged", "elastic", "rigidity", "effects",
+         "noise", "inputs", "derived", "least_squares", "weighted_least_squares", "percentile", "linear_means",
+         "exact_means", "modes", "unlabelled", "error", "sampler", "identifiability", "warnings"],
+    "model": ["theory", "law", "effects", "robust", "prior"],
+    "elastic": ELASTIC, "elastic/E_x": SPREAD,
+    "rigidity": RIGIDITY, "rigidity/D_x": SPREAD,
+    "effects/bench/attached_mass/mass": SPREAD, "noise/bench": SPREAD, "inputs/thickness": SPREAD,
+    "derived/anisotropy": SPREAD,
+    "least_squares": POINT, "weighted_least_squares": POINT,
+    "percentile": [*ELASTIC, "n_subsets"], "percentile/E_x": ["mean", "sd_percent"],
+    "linear_means": MEANS, "exact_means": MEANS,
+    "modes/0": ["setup", "label", "measured_hz", "predicted_hz", "residual_cents", "residual_interval_cents",
+                "rounding_cents", "left_out_cents", "leverage", "label_correlation"],
+    "modes/0/predicted_hz": ["mean", "q05", "q95"],
+    "unlabelled/0": ["setup", "measured_hz", "nearest", "predicted_hz", "cents"],
+    "error": ["in_sample_rms_cents", "leave_one_out_rms_cents", "linearisation_rms_cents", "exact_law_worst_cents"],
+    "sampler": ["ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance"],
+}  # fmt: skip
+"""Keys of summary.json in their order, by the place where they stand."""
+
+
+def read(result):
+    return json.loads(json_text(result))
+
+
+@pytest.mark.parametrize("place", CONTRACT, ids=lambda place: place or "top")
+def test_the_json_has_the_keys_of_the_contract_in_their_order(place):
+    entry = read(SUMMARY)
+    for step in place.split("/") if place else ():
+        entry = entry[int(step) if isinstance(entry, list) else step]
+
+    assert list(entry) == CONTRACT[place]
+
+
+def test_values_stand_where_they_belong_and_what_does_not_exist_is_null():
+    found = read(SUMMARY)
+
+    assert found["elastic"]["E_y"]["mean"] == 1.0e9
+    assert found["percentile"]["E_x"] == {"mean": 10e9, "sd_percent": 2.0}
+    assert found["least_squares"]["E_y"] is found["percentile"]["E_y"]["mean"] is found["linear_means"]["D_s"] is None
+    assert found["modes"][2]["rounding_cents"] is found["modes"][2]["left_out_cents"] is None
+    assert found["modes"][0]["residual_interval_cents"] == list(SUMMARY.modes[0].residual_interval_cents)
+    assert found["model"]["effects"] == ["attached_mass"]
+    assert read(replace(SUMMARY, percentile=None))["percentile"] is None
+
+
+def test_no_number_that_json_does_not_have_is_written():
+    wrong = replace(SUMMARY, error=replace(SUMMARY.error, in_sample_rms_cents=float("nan")))
+
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        json_text(wrong)
+    assert [finite(value) for value in (1.5, float("nan"), float("inf"))] == [1.5, None, None]
+
+
+def test_a_run_that_failed_the_gate_has_no_constants():
+    model, sampler = ModelHeader("thin", "linear", (), False, "x"), SamplerHealth(4, 32, 10, None, None, None, 0.5)
+    failed = Unconverged(1, "made", 1, {}, "0", model, False, sampler, ("too short",))
+    header = CONTRACT[""][:6]
+
+    assert list(read(failed)) == [*header, "converged", "sampler", "warnings"]
+    assert (read(failed)["converged"], read(SUMMARY)["converged"]) == (False, True)
+    assert read(failed)["sampler"]["rhat_max"] is None
+
+
+def test_constants_are_reached_by_attribute_and_by_name():
+    elastic = SUMMARY.elastic
+
+    assert elastic.E_x is elastic["E_x"]
+    assert [name for name, _ in elastic.items()] == ELASTIC
+    assert dict(SUMMARY.least_squares.items())["D_s"] == SUMMARY.least_squares.D_s == 2.0
+    with pytest.raises(KeyError, match="items"):
+        _ = elastic["items"]
+    with pytest.raises(FrozenInstanceError):
+        elastic.E_x = None
+
+
+def test_a_spread_by_hand():
+    """Of 0, 1, ..., 100: quantiles are their own percentages, the sample variance of n numbers is n (n + 1) / 12."""
+    found = Spread.of(np.arange(101.0).reshape(1, 101), "m")
+
+    assert (found.mean, found.q05, found.q25, found.q50, found.q75, found.q95) == (50, 5, 25, 50, 75, 95)
+    assert found.sd == pytest.approx(np.sqrt(101 * 102 / 12))
+    assert found.unit == "m"
+
+
+def test_an_rms_is_of_the_numbers_that_there_are():
+    assert rms([3.0, None, 4.0]) == pytest.approx(np.sqrt(12.5))
+    assert rms(np.array([np.nan, 2.0])) == 2.0
+    assert rms([None]) is rms([]) is None
+
+
+def test_it_shows_itself_in_a_line_and_in_a_notebook():
+    assert repr(SUMMARY) == (
+        "<Summary of made: E_x = 10.50 ± 0.25 GPa, E_y = 1.00 ± 0.12 GPa, G_xy = 0.500 ± 0.062 GPa; 3 modes, exact law>"
+    )
+    html = replace(SUMMARY, name="<b>")._repr_html_()
+    assert "<caption>&lt;b&gt;</caption>" in html
+    assert "<th>E_y, across the grain</th><td>1.00 ± 0.12</td><td>0.75 to 1.25</td>" in html
+    assert html.count("<tr>") == 1 + len(Elastic.NAMES)

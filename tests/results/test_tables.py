@@ -1,0 +1,117 @@
+"""Tables of a fit from a summary made by hand: columns that agree with each other, and rounding where it decides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_summaries import SUMMARY, mode, spread
+
+from bayesplate.report import content
+from bayesplate.results.tables import constants_table, modes_table, rounding_that_decides, unlabelled_table
+from bayesplate.results.words import decimals, interval, number, percent, plus_minus
+from bayesplate.workflow.shown import show_fit
+
+
+def column(table, name):
+    return [row[table.columns.index(name)] for row in table.rows]
+
+
+def test_constants_beside_their_least_squares():
+    table = constants_table(SUMMARY)
+
+    assert table.rows[0] == ("E_x, along grain", "10.50 ± 0.25", "10.00 to 11.00", "2.4", "10.25")
+    assert column(table, "least squares") == ["10.25", "1.12", "0.500"]
+    assert table.title == "Elastic constants of made, GPa"
+
+
+def test_the_columns_of_the_modes_agree_with_each_other():
+    """By hand from the printed cells: the error is the one column over the other, and so are its ends."""
+    table = modes_table(SUMMARY)
+    assert table.columns == ("mode", "measured", "predicted", "error", "90 % interval", "rounding", "left out")
+
+    for i, row in enumerate(table.rows):
+        measured, predicted, error = (float(cell) for cell in row[1:4])
+        tenth = 1200 / np.log(2) * 0.05 / predicted  # what the printed decimal of the prediction leaves open, cents
+        assert error == pytest.approx(1200 * np.log2(measured / predicted), abs=tenth + 0.05), row
+        low, high = (float(cell) for cell in row[4].split(" to "))
+        ends = SUMMARY.modes[i].predicted_hz
+        assert (low, high) == pytest.approx(
+            (1200 * np.log2(measured / ends.q95), 1200 * np.log2(measured / ends.q05)), abs=0.0501
+        )
+    assert column(table, "left out") == ["+12.2", "+12.2", "–"]
+
+
+def test_rounding_is_shown_where_it_is_wider_than_the_noise():
+    """A hertz at 52 Hz is 33.3 cents wide; noise of 0.5 % is 8.66 cents, and a hertz at 400 Hz only 4.3."""
+    assert column(modes_table(SUMMARY), "rounding") == ["± 16.6", "–", "–"]
+    wide, narrow, unrounded = SUMMARY.modes
+    assert rounding_that_decides(SUMMARY, wide) == pytest.approx(600 * np.log2(52.5 / 51.5))
+    assert rounding_that_decides(SUMMARY, narrow) is rounding_that_decides(SUMMARY, unrounded) is None
+
+    width = np.log(52.5 / 51.5)
+    for noise, shown in ((0.99 * width, True), (1.01 * width, False)):
+        noisy = replace(SUMMARY, noise={"bench": spread(noise, noise / 10, "1")})
+        assert ("rounding" in modes_table(noisy).columns) == shown
+
+
+def test_modes_of_several_setups_say_in_which():
+    both = replace(SUMMARY, modes=(mode("(1,0)", 52.0, 51.75, 0.5), mode("(1,1)", 60.0, 60.0, 1.0, setup="free")),
+                   noise={**SUMMARY.noise, "free": SUMMARY.noise["bench"]})  # fmt: skip
+
+    assert column(modes_table(both), "mode") == ["(1,0) bench", "(1,1) free"]
+    assert column(modes_table(SUMMARY), "mode") == ["(1,0)", "(1,1)", "(2,0)"]
+
+
+def test_peaks_without_a_label():
+    assert unlabelled_table(SUMMARY).rows == (("860", "(3,1)", "850.0", "+20"),)
+    assert unlabelled_table(replace(SUMMARY, unlabelled=())) is None
+
+
+def test_what_fit_prints():
+    shown = show_fit(SUMMARY)
+
+    assert [table.title for table in shown.tables][1:] == [
+        "Modes, Hz; errors, cents (17 cents are about 1 %)", "Peaks without a label: kept, not fitted",
+    ]  # fmt: skip
+    assert (shown.remarks, shown.warnings) == (SUMMARY.identifiability, SUMMARY.warnings)
+    assert shown.closing == (
+        "thin plate, exact law. Error rms 7.5 cents in sample, 12.2 left out; noise 0.50 %; the linear law is off by "
+        "0.5 cents."
+    )
+    few = replace(SUMMARY, error=replace(SUMMARY.error, leave_one_out_rms_cents=None))
+    assert "too few modes to leave one out" in show_fit(few).closing
+
+
+def test_what_a_page_says():
+    first, missed, weakest = content.summary_sentences(SUMMARY)
+
+    assert first.startswith("From 3 modes: 10.50 ± 0.25 GPa along the grain, 1.00 ± 0.12 GPa across it, and a shear")
+    assert missed == (
+        "The fit misses the frequencies by 8 cents (0.4 %); a mode that it has not seen, by 12 cents (0.7 %)."
+    )
+    assert weakest == "Least well known is G_xy, shear: ± 12.5 %."
+    assert content.constants_table(SUMMARY).rows == (
+        ("E_x, along the grain", "10.50 ± 0.25", "10.00 to 11.00", "10.25", "10.25", "10.00 ± 0.20"),
+        ("E_y, across the grain", "1.00 ± 0.12", "0.75 to 1.25", "–", "1.12", "–"),
+        ("G_xy, shear", "0.500 ± 0.062", "0.375 to 0.625", "0.500", "0.500", "0.500"),
+    )
+    assert content.effects_table(SUMMARY).rows == (("attached mass, bench", "mass", "2 ± 0.5", "g"),)
+    assert content.laws_table(SUMMARY).rows[0] == ("E_x", "–", "10.500")
+    assert dict(content.sampler_rows(SUMMARY)) == {
+        "ensembles, walkers, steps": "4, 32, 2000",
+        "largest R-hat (at most 1.01)": "1.0025",
+        "smallest effective size (at least 400)": "6000",
+        "largest autocorrelation time, steps": "30.5",
+        "accepted proposals": "50 %",
+    }
+
+
+def test_numbers_as_people_read_them():
+    assert [decimals(sd) for sd in (0.0, 9.96, 9.94, 0.0996, 0.0994, 1e-9)] == [0, 0, 1, 2, 3, 6]
+    assert plus_minus(spread(12345.6, 12.0, "1")) == "12\N{NARROW NO-BREAK SPACE}346 ± 12"
+    assert plus_minus(spread(2.5, 0.0, "1")) == "2.5"
+    assert interval(spread(10.0e9, 0.5e9, "Pa"), 1e-9) == "9.00 to 11.00"
+    assert [number(None, 1), number(1.25, 1, signed=True), number(-2.0, 0, factor=-1.0)] == ["–", "+1.2", "2"]
+    assert [percent(None), percent(0.125), percent(0.125, 1)] == ["–", "12 %", "12.5 %"]
