@@ -110,9 +110,9 @@ def test_the_prior_predictive_is_that_of_the_prior():
         # a median of 4000 draws is off by 1.25 sd / sqrt(4000), a Rayleigh quotient too high by a few per cent
         assert -0.02 < found.median[i] - np.log(by_label[label]) < 0.08
     spread = dict(zip(labels, found.spread, strict=True))
-    assert spread[2, 0] == pytest.approx(0.5 * np.log(prior.densities["E_x"].factor), rel=0.05)
-    assert spread[0, 2] == pytest.approx(0.5 * np.log(prior.densities["E_y"].factor), rel=0.05)
-    assert spread[1, 1] == pytest.approx(0.5 * np.log(prior.densities["G_xy"].factor), rel=0.05)
+    assert spread[2, 0] == pytest.approx(0.5 * np.log(prior.constants["E_x"].factor), rel=0.05)
+    assert spread[0, 2] == pytest.approx(0.5 * np.log(prior.constants["E_y"].factor), rel=0.05)
+    assert spread[1, 1] == pytest.approx(0.5 * np.log(prior.constants["G_xy"].factor), rel=0.05)
 
 
 def test_the_distance_is_chi_squared_where_the_prior_holds():
