@@ -6,6 +6,7 @@ import os
 import re
 import socket
 import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
@@ -144,6 +145,22 @@ def test_an_impossible_path(name: str) -> None:
 def test_a_large_file(write: Write, make: Callable[[int], bytes]) -> None:
     with refused("wanted a file of at most 1,000,000 bytes, got a larger one"):
         load_board(write(make(1_000_001)))
+
+
+@pytest.mark.parametrize("load", [load_board, load_prior, load_coefficients])
+def test_no_more_of_a_large_file_is_read_than_a_card_may_hold(write: Write, load: Callable[[Path], object]) -> None:
+    """Half a gigabyte of nothing costs as much memory as the largest card, a few times over at most."""
+    path = write(b"")
+    os.truncate(path, 500_000_000)
+    tracemalloc.start()
+    try:
+        with refused("got a larger one"):
+            load(path)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    assert peak < 5_000_000
 
 
 @pytest.mark.parametrize(

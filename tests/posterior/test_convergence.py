@@ -5,6 +5,7 @@ from __future__ import annotations
 import emcee
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from bayesplate.posterior.convergence import (
     Gate,
@@ -131,3 +132,64 @@ def test_the_burn_in_leaves_fifty_times_and_takes_at_least_five(n_steps):
     kept = n_steps - burn_in
     assert kept >= n_steps / 2
     assert burn_in >= min(5 * kept / 50, n_steps // 2)
+
+
+def moving(fractions):
+    """Draws of walkers that move in exactly these fractions of 1000 steps: (n_ensembles, n_walkers) array."""
+    rng = np.random.default_rng(4)
+    draws = rng.standard_normal((fractions.shape[0], 1001, fractions.shape[1], 1))
+    for ensemble, walker in np.ndindex(fractions.shape):
+        still = 1 + rng.permutation(1000)[round(1000 * fractions[ensemble, walker]) :]
+        for step in np.sort(still):
+            draws[ensemble, step, walker] = draws[ensemble, step - 1, walker]
+    return draws
+
+
+def apart(rhat):
+    """Draws whose ensembles disagree so much that the split R-hat has this value."""
+    draws = renewal_draws(n_dim=1)
+    shift = np.array([0.0, 0.0, 1.0, 0.0])[:, None, None, None]
+    return draws + shift * brentq(lambda s: split_rhat(draws + s * shift)[0] - rhat, 0.0, 1.0, xtol=1e-12)
+
+
+def cut_where(value, limit, draws):
+    """The draws cut short: just below a limit of a figure of theirs that grows with the steps, and just above it."""
+    lengths = range(300, draws.shape[1], 5)
+    below = [n for n in lengths if 0.96 * limit < value(assess(draws[:, :n])) < limit]
+    above = [n for n in lengths if limit < value(assess(draws[:, :n])) < 1.04 * limit]
+    return draws[:, : below[-1]], draws[:, : above[0]]
+
+
+RULES = {
+    "R-hat above 1.01": ("disagree about", lambda: (apart(1.0102), apart(1.0098))),
+    "fewer than 400 independent draws": (
+        "The effective sample size",
+        lambda: cut_where(lambda one: one.ess_min, 400.0, renewal_draws(n_steps=700, n_walkers=2, n_dim=1)),
+    ),
+    "fewer than 50 autocorrelation times": (
+        "autocorrelation times of",
+        lambda: cut_where(lambda one: one.n_kept_steps / one.tau_max, 50.0, renewal_draws(n_steps=700, n_dim=1)),
+    ),
+    "an ensemble that accepts less than 0.15": (
+        "accepts 15 % of its proposals",
+        lambda: (moving(np.full((4, 8), 0.149)), moving(np.full((4, 8), 0.151))),
+    ),
+    "an ensemble that accepts more than 0.7": (
+        "accepts 70 % of its proposals",
+        lambda: (moving(np.full((4, 8), 0.701)), moving(np.full((4, 8), 0.699))),
+    ),
+    "a walker that accepts less than 0.01": (
+        "hardly ever move",
+        lambda: tuple(moving(np.where(np.arange(8) == 3, f, 0.3) * np.ones((4, 1))) for f in (0.009, 0.011)),
+    ),
+}
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_each_limit_of_the_default_gate(rule):
+    """Draws on either side of it, four per cent apart at most."""
+    sentence, make = RULES[rule]
+    failing, passing = make()
+
+    assert any(sentence in reason for reason in assess(failing).reasons)
+    assert not any(sentence in reason for reason in assess(passing).reasons)

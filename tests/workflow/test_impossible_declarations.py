@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from test_cli import CARD, assert_refused, invoke, spoiled
 
+from bayesplate.errors import InputError
 from bayesplate.workflow.prepare import prepare
 
 Change = tuple[str, str]
@@ -202,13 +203,26 @@ def test_the_possible_is_not_refused(effect, changes):
     assert "can act" not in result.stderr
 
 
-@pytest.mark.parametrize(("mass", "is_rough"), [(0.05, False), (0.3, True)])
+@pytest.mark.parametrize(("mass", "is_rough"), [(0.05, False), (0.081, False), (0.083, True), (0.3, True)])
 def test_what_roved_is_said_to_be_rough(mass, is_rough):
-    """0.05 g are 0.1 % of the board, 0.3 g are 0.7 %."""
+    """From 0.2 % of the board of 41 g on, 0.082 g."""
     Path("my-board.toml").write_text(
         spoiled((PLACE, f"at_mm = [[200, 20], [20, 20]]\nmass_g = {mass}")), encoding="utf-8"
     )
     said = [note for note in prepare("my-board.toml").board.notes if "roved" in note]
 
     assert len(said) == is_rough
-    assert not is_rough or "weighs 0.7 % of the board" in said[0]
+    assert not is_rough or f"weighs {100.0 * mass / 41.0:.1f} % of the board" in said[0]
+
+
+@pytest.mark.parametrize(("mass", "is_refused"), [(0.81, False), (0.83, True)])
+def test_what_roved_may_weigh_two_percent_of_the_board(mass, is_refused):
+    """Of 41 g: 0.82 g."""
+    Path("my-board.toml").write_text(
+        spoiled((PLACE, f"at_mm = [[200, 20], [20, 20]]\nmass_g = {mass}")), encoding="utf-8"
+    )
+    if not is_refused:
+        assert prepare("my-board.toml").board.effects == ("attached_mass",)
+        return
+    with pytest.raises(InputError, match="above 2% of the board roved"):
+        prepare("my-board.toml")

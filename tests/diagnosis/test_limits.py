@@ -1,0 +1,166 @@
+"""The numbers that decide what a diagnosis says, each from just below and just above, on searches made by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_searches import HALF_NORMAL, bare, baseline, candidate, ground_of, one_level
+from scipy.optimize import brentq
+from scipy.special import ndtr
+
+from bayesplate.diagnosis.entries import candidate_entry
+from bayesplate.diagnosis.evidence import Terms
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.null_control import simulate_null
+from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.signatures import Signature, look_alikes, signatures
+from bayesplate.diagnosis.verdict import answers, at_limit, decide
+from bayesplate.quantities import Quantity
+from bayesplate.workflow.fitting import Request, posed
+from bayesplate.workflow.prepare import prepare
+
+NOISE = 0.005
+A, B = "density_gradient", "poisson_ratio"
+"""Names of effects of the whole board; what they do is made by hand."""
+
+
+@pytest.fixture(scope="module")
+def base():
+    return baseline(np.random.default_rng(1))
+
+
+def found_of(base, directions, probability, residual, prior=HALF_NORMAL, n_cells=33, level=None):
+    """A search among single effects of given directions, with given probabilities of none and of each."""
+    levels = noise_grid(base.board) if level is None else one_level(base, level)
+    made = {name: candidate(base, name, d, prior, n_cells) for name, d in directions.items()}
+    every = [bare(base, levels), *(Hypothesis((name,), 0.1, one.fine, levels) for name, one in made.items())]
+    shares = np.array(probability)
+    return Found(ground_of(base, *every, candidates=made), residual, np.log(shares + 1e-300), shares)
+
+
+def entry_of(found):
+    """What diagnosis.json says of a candidate."""
+    return candidate_entry(found, decide(found), answers(found), found.ground.candidates[A], 0.0)
+
+
+@pytest.mark.parametrize("index", [0, 1], ids=["the bare model", "the winner"])
+def test_the_gate_lets_through_what_chance_gives_in_one_of_twenty_cases(base, index):
+    """The same misfit, a little larger and a little smaller: probabilities of 0.049 and 0.051."""
+    rng = np.random.default_rng(2)
+    direction, misfit = 0.02 * rng.standard_normal((2, 6))
+    probability = [0.9, 0.1] if index == 0 else [0.0, 1.0]
+
+    def with_misfit(scale):
+        return found_of(base, {A: direction}, probability, scale * misfit)
+
+    for wanted, word in ((0.049, "unexplained"), (0.051, "none needed" if index == 0 else "named")):
+        scale = brentq(lambda s, w=wanted: with_misfit(s).passes(index) - w, 1e-3, 10.0, xtol=1e-10)
+        assert decide(with_misfit(scale)).word == word
+
+
+@pytest.mark.parametrize(("beyond", "is_limited"), [(0.0040, True), (0.0062, False)])
+@pytest.mark.parametrize("side", ["top", "bottom"])
+def test_a_size_is_at_its_limit_where_half_a_percent_of_its_prior_lies_beyond(base, side, beyond, is_limited):
+    """Readings that tell the size to a hundredth of the prior's width."""
+    prior = Quantity.from_mean(0.4, 0.15, "normal", lower=0.1, upper=0.7)
+    low, high = -2.0, 2.0
+    whole = ndtr(high) - ndtr(low)
+    z = brentq(lambda x: (ndtr(high) - ndtr(x)) / whole - beyond, -2.0, 2.0)
+    z = z if side == "top" else -z
+    direction = np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0]
+    found = found_of(base, {A: direction}, [0.0, 1.0], np.zeros(6), prior, n_cells=801, level=1e-4)
+    of_a = found.ground.candidates[A].fine
+    found = replace(found, residual=of_a.shift[int(np.argmin(np.abs(of_a.z[:, 0] - z)))])
+
+    assert bool(at_limit(found, 1)) is is_limited
+
+
+@pytest.mark.parametrize(("likeness", "alike"), [(0.949, False), (0.951, True), (-0.949, False), (-0.951, True)])
+def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike):
+    """Of what each leaves visible, with either sign; in `check` and in `diagnose`."""
+    some = 0.02 * np.random.default_rng(3).standard_normal((2, 6))
+    one, other = (shift - base.slopes @ (base.absorbing @ shift) for shift in some)
+    one = one / np.linalg.norm(one / base.scales)
+    other = other - one * np.sum(one * other / base.scales**2)
+    other = likeness * one + np.sqrt(1.0 - likeness**2) * other / np.linalg.norm(other / base.scales)
+    seen = [Signature(name, {}, d / base.scales, d / base.scales, {}, 1.0) for name, d in ((A, one), (B, other))]
+
+    assert look_alikes(seen) == {A: (B,) if alike else (), B: (A,) if alike else ()}
+    assert entry_of(found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6)))["look_alikes"] == [B] * alike
+
+
+def test_the_bias_of_an_ignored_effect_has_the_sign_of_what_it_hides(base):
+    """Frequencies as if D_x were 4 % lower: who ignores that finds E_x too low, E_x = 12 (D_x - nu^2 D_y) / h^3."""
+    found = found_of(base, {A: base.slopes @ [-0.04, 0.0, 0.0]}, [0.1, 0.9], np.zeros(6))
+    D_x, D_y, nu = 30.0, 2.0, 0.4
+    expected = 100.0 * ((D_x - nu**2 * D_y) / (D_x * np.exp(0.04) - nu**2 * D_y) - 1.0)
+
+    bias = entry_of(found)["bias_percent"]
+
+    assert bias["E_x"] == pytest.approx(expected, rel=1e-6)
+    assert expected < -3.9
+    assert bias["G_xy"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_bias_in_a_check_is_that_of_the_papers_cantilever():
+    """A clamp of k_R L / D = 25: near the -11.6 % of E_x and -4.9 % of G_xy that an independent solver finds for 30."""
+    (clamp,) = signatures(posed(prepare("finnish-spruce-cantilever"), Request()), ["clamp_rotation"])
+
+    assert clamp.bias_percent["E_x"] == pytest.approx(-11.6 * 30 / 25, rel=0.1)
+    assert clamp.bias_percent["G_xy"] == pytest.approx(-4.9 * 30 / 25, rel=0.2)
+
+
+def test_an_amplitude_has_the_interval_of_ninety_percent(base):
+    """One size of a normal prior and normal readings: mean and standard deviation by hand, quantiles 1.645 away."""
+    direction = 0.02 * np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0]
+    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    found = found_of(base, {A: direction}, [0.0, 1.0], 1.2 * direction, prior, n_cells=401, level=NOISE)
+    # The size seen through what the constants leave of it.
+    weight = float(np.sum(base.whitened(direction) ** 2))
+    sd = 1.0 / np.sqrt(1.0 + weight)
+    mean = 1.2 * weight * sd**2
+
+    told = entry_of(found)["amplitude"]
+
+    cell = 6.0 / 401
+    assert sd > 10 * cell
+    expected = [mean - 1.645 * sd, mean, mean + 1.645 * sd]
+    assert [told[name] for name in ("q05", "q50", "q95")] == pytest.approx(expected, abs=cell)
+    assert (told["parameter"], told["unit"]) == ("size", "1")
+
+
+def test_an_amplitude_keeps_the_unit_of_its_parameter(base):
+    found = found_of(base, {A: 0.02 * np.eye(6)[0]}, [0.1, 0.9], np.zeros(6))
+    one = found.ground.candidates[A]
+    (law,) = one.laws
+    free = tuple(replace(free, unit="N/m") for free in law.form.free)
+    law = replace(law, form=replace(law.form, free=free))
+
+    assert entry_of(replace(found, ground=replace(found.ground, candidates={A: replace(one, laws=(law,))})))[
+        "amplitude"
+    ]["unit"] == "N/m"
+
+
+@pytest.mark.parametrize(("resolution", "n_inputs"), [(1.0, 0), (0.0, 2), (1.0, 2)])
+def test_simulated_nulls_are_rounded_and_have_the_spread_of_the_inputs(resolution, n_inputs):
+    """Covariance of the sets: noise, a rounding of one Hz (variance 1/12 over f^2), and what the inputs do together."""
+    rounded = baseline(np.random.default_rng(1), resolution=resolution, n_inputs=n_inputs)
+    levels = noise_grid(rounded.board)
+    found = search(ground_of(rounded, bare(rounded, levels)), 0.01 * np.random.default_rng(4).standard_normal(6))
+    terms = Terms(found.ground.hypotheses[0].table, found.ground.whole, levels)
+    shares = np.exp(terms.log_densities(found.residual[None, :])[:, 0])
+    noise = float(shares @ levels.sd[:, 0] ** 2 / shares.sum())
+    hertz = np.exp(rounded.log_frequency)
+    expected = np.diag(noise + resolution**2 / 12.0 / hertz**2) + rounded.input_slopes @ rounded.input_slopes.T
+
+    n_sets = 40_000
+    simulated = simulate_null(found, np.random.default_rng(5), n_sets)
+
+    products = np.einsum("ni,nj->nij", simulated, simulated)
+    error = products.std(axis=0) / np.sqrt(n_sets)
+    assert np.abs((products.mean(axis=0) - expected) / error).max() < 4.5
+    without = np.diag(np.full(6, noise))
+    assert np.abs((products.mean(axis=0) - without) / error).max() > 15.0  # control: it shows

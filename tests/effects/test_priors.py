@@ -1,0 +1,153 @@
+"""What is taken for granted where a card says nothing: priors and units of every effect, noise, Poisson ratio.
+
+A change of these changes what people are told, so it is made here as well, with a reason. The numbers are those of the
+literature on effects in wooden plates (shear moduli of spruce 0.5-0.75 GPa and 20-40 MPa; a clamp of k_R L / D = 30 and
+one with a lining of k_T L^3 / D = 1e4; tensions of 100-400 N/m in clamped boards; air of 1.2 kg/m^3; tapers and density
+gradients of 5 per cent end to end; grain within 6 degrees; nu_xy of 0.3-0.6) and those of data sheets of sensors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, log, pi
+
+import pytest
+from effect_plates import SETUP, setup_of
+from generator.known_boards import FIEMME, FREE
+from made_boards import board_of
+
+from bayesplate.cards import read_board_text
+from bayesplate.diagnosis.forms import forms
+from bayesplate.effects import EFFECTS
+from bayesplate.plate.board import board_from_card
+from bayesplate.plate.setup import AttachedItem
+from bayesplate.quantities import Quantity
+
+HALF = (0.0, inf)
+ANY = (-inf, inf)
+DEGREE = pi / 180.0
+
+PRIORS = {
+    ("transverse_shear", "G_xz"): ("Pa", "log-normal", 0.62e9, log(1.5), ANY),
+    ("transverse_shear", "G_yz"): ("Pa", "log-normal", 0.030e9, log(1.8), ANY),
+    ("clamp_rotation", "compliance"): ("1", "normal", 0.0, 0.04, HALF),
+    ("clamp_translation", "compliance"): ("1", "normal", 0.0, 1e-4, HALF),
+    ("membrane_tension", "N"): ("N/m", "normal", 0.0, 500.0, HALF),
+    ("support_mass", "mass"): ("kg", "log-normal", 8.0, log(3.0), ANY),
+    ("support_stiffness", "stiffness"): ("N/m^3", "normal", 0.0, 2e4, HALF),
+    ("air_loading", "density"): ("kg/m^3", "exact", 1.2, 0.0, ANY),
+    ("air_loading", "baffle"): ("1", "normal", 0.5, 1.0, (0.0, 1.0)),
+    ("thickness_profile", "taper_x"): ("1", "normal", 0.0, 0.05, ANY),
+    ("thickness_profile", "taper_y"): ("1", "normal", 0.0, 0.05, ANY),
+    ("density_gradient", "gradient"): ("1", "normal", 0.0, 0.05, ANY),
+    ("grain_angle", "angle"): ("rad", "normal", 0.0, 3.0 * DEGREE, (0.0, 6.0 * DEGREE)),
+    ("poisson_ratio", "nu_xy"): ("1", "normal", 0.4, 0.15, (0.0, 0.9)),
+}
+"""Unit, kind, median, standard deviation (of the logarithm if log-normal) and bounds."""
+
+MASSES = {
+    "accelerometer": (1.2e-3, 2.5),
+    "exciter": (50e-3, 1.6),
+    "shaker": (10e-3, 2.0),
+    "weight": (5e-3, 3.0),
+}
+"""kg and factor, where the card does not state what a thing weighs."""
+
+FORGOTTEN_SHARE = 0.02
+"""Of the board's mass: standard deviation of the half-normal prior of a thing that nobody mentioned."""
+
+BOARDS = [board_of(plate, [setup_of(plate)]) for plate in (FIEMME, FREE)]
+
+
+def told(quantity: Quantity) -> tuple[str, float, float, tuple[float, float]]:
+    kind = "exact" if quantity.is_exact else quantity.kind
+    sd = quantity.log_sd if kind == "log-normal" else quantity.sd
+    return kind, quantity.median, sd, (quantity.lower, quantity.upper)
+
+
+def same(quantity: Quantity, kind: str, median: float, sd: float, bounds: tuple[float, float]) -> bool:
+    found_kind, *numbers, limits = told(quantity)
+    return (found_kind, numbers, list(limits)) == (kind, pytest.approx([median, sd]), pytest.approx(list(bounds)))
+
+
+def acting(name: str):
+    """The effect on the first of the boards on which it can act."""
+    cls = EFFECTS[name]
+    return next(cls.of(board, board.setups[0]) for board in BOARDS if not cls.refusal(board, board.setups[0]))
+
+
+def test_every_parameter_of_every_effect_stands_in_the_table():
+    named = {
+        (name, parameter.name)
+        for name in EFFECTS
+        if name not in ("attached_mass", "outline_profile")
+        for parameter in acting(name).parameters()
+    }
+
+    assert named == set(PRIORS)
+
+
+@pytest.mark.parametrize(("name", "parameter"), PRIORS)
+def test_prior_and_unit_of_a_parameter(name, parameter):
+    (found,) = (one for one in acting(name).parameters() if one.name == parameter)
+    unit, kind, median, sd, bounds = PRIORS[name, parameter]
+
+    assert found.unit == unit
+    assert same(found.prior, kind, median, sd, bounds), told(found.prior)
+
+
+@pytest.mark.parametrize("kind", MASSES)
+def test_mass_of_a_thing_that_the_card_does_not_weigh(kind):
+    board = BOARDS[1]
+    setup = replace(board.setups[0], attached=(AttachedItem(kind, ((0.1, 0.1),)),))
+    (found,) = EFFECTS["attached_mass"].of(replace(board, effects=("attached_mass",)), setup).parameters()
+    median, factor = MASSES[kind]
+
+    assert found.unit == "kg"
+    assert same(found.prior, "log-normal", median, log(factor), ANY), told(found.prior)
+
+
+def test_mass_of_a_thing_that_nobody_mentioned():
+    board = BOARDS[1]
+    sd = FORGOTTEN_SHARE * FREE.rho * FREE.h * FREE.L_x * FREE.L_y
+    for effect in EFFECTS["attached_mass"].candidates(board, board.setups[0]):
+        (found,) = effect.parameters()
+        assert same(found.prior, "normal", 0.0, sd, HALF), told(found.prior)
+
+
+@pytest.mark.parametrize("board", BOARDS, ids=["clamped", "free"])
+def test_a_search_keeps_prior_and_unit(board):
+    """What it tries is the effect's own parameter, not one of another width or without a unit."""
+    seen = set()
+    for name, each in forms(board).items():
+        for free in (free for form in each for free in form.free if (name, free.name) in PRIORS):
+            unit, *prior = PRIORS[name, free.name]
+            assert free.unit == unit
+            assert same(free.prior, *prior), (name, told(free.prior))
+            seen.add(name)
+
+    assert len(seen) >= 7
+    assert SETUP in {setup.name for setup in board.setups}
+
+
+CARD = """\
+format = 1
+name = "b"
+[plate]
+length_x_mm = 253
+length_y_mm = 114
+thickness_mm = 3
+mass_g = 41
+[setup]
+edges = {{ x0 = "{}", x1 = "free", y0 = "free", y1 = "free" }}
+[setup.frequencies_hz]
+"(1,1)" = 98
+"""
+
+
+@pytest.mark.parametrize(("edge", "median"), [("free", 0.003), ("supported", 0.003), ("clamped", 0.008)])
+def test_noise_and_poisson_ratio_of_a_card_that_states_neither(edge, median):
+    board = board_from_card(read_board_text(CARD.format(edge), "b"))
+
+    assert same(board.setups[0].noise, "log-normal", median, 0.5, ANY)
+    assert same(board.inputs["poisson_xy"], "normal", 0.4, 0.08, ANY)
