@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.folds import nested
+from bayesplate.diagnosis.evidence.folds import NEEDED, nested
 from bayesplate.diagnosis.evidence.hypotheses import log_evidences, probabilities
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.terms import Terms, normalised
@@ -78,7 +78,7 @@ def null_control(found: Found, rng: np.random.Generator, n_sets: int = N_SETS) -
     return NullControl(
         gain=gain(evidences, np.array([one.prior for one in ground.hypotheses])),
         ratio=None if folded is None else folded.ratio,
-        flagged=float(np.mean(shares[0] < 0.1)),
+        flagged=float(np.mean(shares[0] < NEEDED)),
     )
 
 

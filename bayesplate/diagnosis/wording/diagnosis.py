@@ -140,7 +140,8 @@ class EffectEntry:
     name, setup : str
         `setup` is "board" for an effect of the whole board.
     raw_rms_cents, visible_rms_cents : float or None
-        Shift of the modes at the nominal size, and what is left of it after the constants are fitted again.
+        Shift of the modes at the nominal size, and what is left of it after the constants are fitted again; None where
+        there is no frequency, or nothing is left because there are as many constants as modes.
     visible_cents : tuple of (float or None)
         The same mode by mode.
     below_sight : bool

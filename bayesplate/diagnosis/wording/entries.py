@@ -42,12 +42,13 @@ def effect_entry(
     gained = float(found.log_evidence[index] - found.log_evidence[0])
     best_fit = _best_fit(found, index) - _best_fit(found, 0)
     fate, because = _fate(found, verdict, ranked, one.name)
+    visible = cents(one.visible) if ground.n_directions else np.full(one.visible.size, np.nan)
     return EffectEntry(
         name=one.name,
         setup=_where(one),
         raw_rms_cents=finite(rms(cents(one.raw))),
-        visible_rms_cents=finite(rms(cents(one.visible))),
-        visible_cents=tuple(finite(float(value)) for value in cents(one.visible)),
+        visible_rms_cents=finite(rms(visible)),
+        visible_cents=tuple(finite(float(value)) for value in visible),
         below_sight=ground.is_below_sight(one.name),
         bias_percent=_bias(found, one),
         inclusion_probability=found.inclusion(one.name),

@@ -12,13 +12,13 @@ from bayesplate.results.tables import Table
 from bayesplate.results.words import decimals
 
 _GPA = 1e9
-_NARROW = ("effect", "shift", "visible", "probability", "size (90 %)", "fate")
+_NARROW = ("effect", "shift", "visible", "probable", "range (90 %)", "fate")
 _WIDE = (
     "effect",
     "shift",
     "visible",
     "E_x / E_y / G_xy off by, %",
-    "probability",
+    "probable",
     "size (90 %)",
     "looks like",
     "rejected because",
@@ -83,8 +83,9 @@ def _cells(name: str, one: CandidateEntry) -> Mapping[str, str]:
         "shift": _number(one.raw_rms_cents),
         "visible": _number(one.visible_rms_cents),
         "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
-        "probability": f"{one.inclusion_probability:.3f}",
+        "probable": f"{one.inclusion_probability:.3f}",
         "size (90 %)": _size(one.amplitude),
+        "range (90 %)": _range(one.amplitude),
         "looks like": ", ".join(effect_name(other) for other in one.look_alikes) or MISSING,
         "rejected because": one.rejected_because or MISSING,
         "fate": one.fate,
@@ -113,5 +114,16 @@ def _bias(bias: Mapping[str, float] | None) -> str:
 def _size(amplitude: Amplitude | None) -> str:
     if amplitude is None:
         return MISSING
-    unit = "" if amplitude.unit == "1" else f" {amplitude.unit}"
-    return f"{amplitude.parameter} {amplitude.q50:.3g} ({amplitude.q05:.3g} to {amplitude.q95:.3g}){unit}"
+    low, high = f"{amplitude.q05:.3g}", f"{amplitude.q95:.3g}"
+    return f"{amplitude.parameter} {amplitude.q50:.3g} ({low} to {high}){_unit(amplitude)}"
+
+
+def _range(amplitude: Amplitude | None) -> str:
+    """The same without the median, for which a terminal has no room."""
+    if amplitude is None:
+        return MISSING
+    return f"{amplitude.parameter} {amplitude.q05:.3g} to {amplitude.q95:.3g}{_unit(amplitude)}"
+
+
+def _unit(amplitude: Amplitude) -> str:
+    return "" if amplitude.unit == "1" else f" {amplitude.unit}"

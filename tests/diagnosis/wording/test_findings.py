@@ -101,6 +101,8 @@ def test_a_group_holds_its_members():
     told = entries(made({(SHEAR,): 0.5, (AIR,): 0.4, (GRAIN,): 0.04}))
     assert [told[name].fate for name in NAMES] == ["in the verdict", "in the verdict", "less probable"]
     assert [told[name].rejected_because is None for name in NAMES] == [True, True, False]
+    with_exchange = entries(made({(SHEAR,): 0.5, (RELABELLING,): 0.4}))
+    assert with_exchange[RELABELLING].fate == "in the verdict"
 
 
 def test_exchanged_labels_that_are_named_are_not_rejected():
@@ -156,6 +158,27 @@ def test_an_entry_by_hand():
     assert shear.q05 < 1.0 < shear.q95  # the readings are those of a size of one
     assert shear.q95 - shear.q05 < 1.0  # its prior alone has 1.9
     assert (shear.parameter, shear.form, shear.unit) == ("size", "", "1")
+
+
+def test_look_alikes_are_effects_of_one_direction():
+    found = made(NAMED)
+    ground = found.ground
+    alike = {**ground.candidates, AIR: replace(ground.candidates[SHEAR], name=AIR)}
+    twins = replace(found, ground=replace(ground, candidates=alike))
+    assert [entries(found)[name].look_alikes for name in NAMES] == [()] * 3
+    assert [entries(twins)[name].look_alikes for name in NAMES] == [(AIR,), (SHEAR,), ()]
+    assert all(0.01 < abs(ground.cosine(SHEAR, name)) < 0.95 for name in (AIR, GRAIN))  # they are not orthogonal
+
+
+def test_what_the_width_of_a_prior_costs():
+    """The evidence is a mean of the density over the prior; its logarithm less that of the best size is the cost."""
+    made_up = made({})
+    found = search(made_up.ground, made_up.residual)
+    table, noise = found.ground.candidates[SHEAR].fine, found.ground.hypotheses[1].noise
+    log_terms = found.ground.hypotheses[1].terms(found.ground.whole).log_densities(found.residual[None, :])[:, 0]
+    by_size = np.exp(log_terms.reshape(noise.weights.size, table.n_cells)).sum(axis=0) / table.weights
+    assert entries(found)[SHEAR].ockham_log_factor == pytest.approx(np.log(table.weights @ by_size / by_size.max()))
+    assert entries(found)[SHEAR].ockham_log_factor < -0.5
 
 
 @pytest.mark.parametrize(
@@ -215,7 +238,8 @@ def test_readings_outside_their_band_are_counted():
     found = made(NAMED)
     case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
     readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
-    off = np.array([1.0, 1.0, 1.0, 1.0, 1.02, 0.98]) * readings * np.linspace(0.99, 1.01, 21)[None, :, None]
+    # the last two lie at the 2.5 and 97.5 % quantiles of the draws, outside the 90 % but inside the range
+    off = np.array([1.0, 1.0, 1.0, 1.0, 1.0095, 0.9905]) * readings * np.linspace(0.99, 1.01, 201)[None, :, None]
     before = replace(case.before, draws=SimpleNamespace(predictive=off))
     assert diagnosis_of(replace(case, before=before)).before.hits_90 == pytest.approx(4 / 6)
 
@@ -245,6 +269,11 @@ def test_three_modes_leave_nothing_to_judge_by():
     assert content["gain_null_percentile"] is None
     assert [one["look_alikes"] for one in content["candidates"]] == [[]] * 4
     assert all(one["below_sight"] and one["gate"] is None for one in content["candidates"][:3])
+    assert [one["visible_rms_cents"] for one in content["candidates"]] == [None] * 4
+    assert content["candidates"][0]["visible_cents"] == [None] * 3
+    assert content["candidates"][0]["raw_rms_cents"] > 0.0
+    amplitude = told.candidates[0].amplitude  # its half-normal prior, to half a cell of 33 over three deviations
+    assert [amplitude.q05, amplitude.q50, amplitude.q95] == pytest.approx([0.0627, 0.6745, 1.96], abs=1.5 / 33)
 
 
 def test_three_modes_leave_nothing_to_judge_by_even_without_candidates():

@@ -141,12 +141,13 @@ def test_candidates_stand_in_the_order_of_their_probability():
 
     assert list(by_name) == ["membrane tension", "relabelling (1,0) and (0,1)", "air loading", "grain angle"]
     assert by_name["membrane tension"] == {
-        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "probability": "0.970",
+        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "probable": "0.970",
         "E_x / E_y / G_xy off by, %": "+1.5 / -2.5 / +0.5", "size (90 %)": "tension 120 (10 to 230) N/m",
         "looks like": "–", "rejected because": "–",
     }  # fmt: skip
     assert by_name["air loading"]["looks like"] == "attached mass"
     assert by_name["air loading"]["size (90 %)"] == by_name["relabelling (1,0) and (0,1)"]["shift"] == "–"
+    assert narrow.rows[0][-2:] == ("tension 10 to 230 N/m", "in the verdict")
     assert [row[-1] for row in narrow.rows] == ["in the verdict", "less probable", "below sight", "less probable"]
     assert candidates_table(DIAGNOSES["undetectable"]) is None
 
