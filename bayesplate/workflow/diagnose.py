@@ -21,7 +21,15 @@ from bayesplate.diagnosis.verdict import Answer, Verdict, alternatives, answers,
 from bayesplate.errors import CheckpointError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
+from bayesplate.results.folder import (
+    BEFORE,
+    DIAGNOSIS,
+    OutputFolder,
+    json_text,
+    make_folder,
+    run_of_its_own,
+    write_text,
+)
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.workflow.fitting import Fitted, Request, checkpoint_in, fitted, posed, with_board
@@ -52,6 +60,7 @@ class DiagnoseResult:
     after: Fitted
 
 
+@run_of_its_own()
 def diagnose(
     card: str | os.PathLike[str],
     *,

@@ -13,7 +13,16 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.draws import Draws
-from bayesplate.results.folder import ARCHIVE, SUMMARY, OutputFolder, json_text, write_text
+from bayesplate.results.folder import (
+    ARCHIVE,
+    PAGE,
+    SUMMARY,
+    OutputFolder,
+    json_text,
+    run_of_its_own,
+    write_text,
+    writing,
+)
 from bayesplate.results.store import write_posterior
 from bayesplate.results.summary import Summary, unconverged_summary
 from bayesplate.results.versions import versions
@@ -42,6 +51,7 @@ class FitResult:
     draws: Draws
 
 
+@run_of_its_own()
 def fit(
     card: str | os.PathLike[str],
     *,
@@ -132,7 +142,8 @@ def fit(
 
 def write_fit(folder: Path, result: Fitted) -> None:
     """Write summary and archive of a fit into a folder that is there."""
-    write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, result.prepared.card_text)
+    with writing(folder / ARCHIVE):
+        write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, result.prepared.card_text)
     write_text(folder / SUMMARY, json_text(result.summary))
 
 
@@ -141,7 +152,8 @@ def write_page(folder: Path, result: Fitted, diagnosis: Mapping[str, Any] | None
     from bayesplate.report.page import write_report
 
     card = result.prepared.card
-    return write_report(folder, card, result.inference, result.draws, result.summary, diagnosis)
+    with writing(folder / PAGE):
+        return write_report(folder, card, result.inference, result.draws, result.summary, diagnosis)
 
 
 def refuse_unconverged(inference: Inference, seed: int, prepared: Prepared, folder: Path | None) -> None:
