@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bayesplate.terminal import print_json, print_shown, progress_line, reporting
+from bayesplate.terminal import print_json, print_shown, progress_line, reporting, say
 
 
 class Commands(click.Group):
@@ -128,7 +128,7 @@ def fit(
     """Posterior of the elastic constants of CARD: report.html, summary.json, posterior.nc."""
     _refuse_both(force, resume, "--force starts anew and --resume continues")
     _refuse_both(linear, exact, "--linear and --exact force different laws")
-    with reporting(as_json=as_json, debug=debug, resumable=True):
+    with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.fit import fit as run
 
@@ -150,7 +150,7 @@ def fit(
             from bayesplate.workflow.shown import show_fit
 
             print_shown(show_fit(result.summary))
-            click.echo(f"written to {result.folder}")
+            say(f"written to {result.folder}")
 
 
 @main.command()
@@ -230,7 +230,7 @@ def diagnose(
 ) -> None:
     """Trace the residual of CARD to an effect, add it, and report the error before and after."""
     _refuse_both(force, resume, "--force starts anew and --resume continues")
-    with reporting(as_json=as_json, debug=debug, resumable=True):
+    with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.diagnose import diagnose as run
 
@@ -241,7 +241,7 @@ def diagnose(
             from bayesplate.workflow.shown import show_diagnosis
 
             print_shown(show_diagnosis(result.diagnosis))
-            click.echo(f"written to {result.folder}")
+            say(f"written to {result.folder}")
 
 
 @main.command()
@@ -257,7 +257,7 @@ def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug
         if as_json:
             print_json({section.title.lower(): list(section.entries) for section in sections})
         elif not quiet:
-            click.echo(cite_text(sections), nl=False)
+            say(cite_text(sections), nl=False)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,13 @@
 
 BayesplateError            anything a user can meet; carries the exit code
 ├── InputError             3   a card, a file or an option value that cannot be used (also a ValueError)
+│   └── UnwritableError    3   a file that cannot be written: a full disk, a folder of somebody else's
 ├── NotIdentifiableError   4   the data cannot tell a constant, or contradict a prior
 ├── NotConvergedError      5   the sampler did not pass its gate
 ├── CheckpointError        6   a checkpoint that cannot be resumed
 └── BatchError             7   some boards of a batch failed
+
+RunInterrupted           130   a KeyboardInterrupt that says whether the run can be continued
 """
 
 from __future__ import annotations
@@ -61,6 +64,10 @@ class InputError(BayesplateError, ValueError):
     exit_code = 3
 
 
+class UnwritableError(InputError):
+    """A file that cannot be written; names it and the reason."""
+
+
 class NotIdentifiableError(BayesplateError):
     """The data cannot tell a constant, or contradict a prior; names which and what would help."""
 
@@ -83,3 +90,7 @@ class BatchError(BayesplateError):
     """Some boards of a batch failed; the others are written."""
 
     exit_code = 7
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """A run that was stopped after its first checkpoint and can be continued."""

@@ -8,12 +8,13 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from bayesplate.errors import BayesplateError
+from bayesplate.errors import BayesplateError, Fault, UnwritableError
 
 if TYPE_CHECKING:
     from bayesplate.workflow.shown import Progress, Shown
@@ -28,26 +29,52 @@ def print_shown(shown: Shown) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    console = Console(soft_wrap=False, highlight=False)
-    with console.capture() as printed:
-        for table in shown.tables:
-            laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
-            for i, column in enumerate(table.columns):
-                laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
-            for row in table.rows:
-                laid_out.add_row(*(Text(cell) for cell in row))
-            console.print(laid_out)
-        for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
-            console.print(Text(sentence))
-        console.print(Text(shown.closing))
-    click.echo(printed.get(), nl=False)  # rich itself would exit with 1 where a reader like `head` has closed the pipe
+    # Laid out apart from the output: rich itself would end the program where a reader like `head` has closed the pipe.
+    output, printed = Console(), StringIO()
+    console = Console(
+        file=printed, width=output.width, force_terminal=output.is_terminal, soft_wrap=False, highlight=False
+    )
+    for table in shown.tables:
+        laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
+        for i, column in enumerate(table.columns):
+            laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
+        for row in table.rows:
+            laid_out.add_row(*(Text(cell) for cell in row))
+        console.print(laid_out)
+    for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
+        console.print(Text(sentence))
+    console.print(Text(shown.closing))
+    say(printed.getvalue(), nl=False)
 
 
 def print_json(content: Any) -> None:
     """What a command found, for other programs."""
     from bayesplate.workflow.shown import json_text
 
-    click.echo(json_text(content), nl=False)
+    say(json_text(content), nl=False)
+
+
+def say(text: str, *, nl: bool = True) -> None:
+    """Print on the standard output.
+
+    Raises
+    ------
+    UnwritableError
+        If it cannot be written, as on a full disk.
+    """
+    try:
+        click.echo(text, nl=nl)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _close_output()
+        fault = Fault("standard output", "a place that can be written", error.strerror or str(error))
+        raise UnwritableError(fault) from None
+
+
+def _close_output() -> None:
+    """Let the rest of the standard output go nowhere: Python would complain of it once more at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
@@ -75,7 +102,7 @@ def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]
 
 
 @contextmanager
-def reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterator[None]:
+def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
     """Turn errors into one message and an exit code, and signals to stop into an interruption."""
 
     def interrupt(signum: int, frame: object) -> None:
@@ -91,11 +118,10 @@ def reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterato
         if debug:
             traceback.print_exc()
         _fail(str(error), error.exit_code, as_json, [vars(fault) for fault in error.faults])
-    except KeyboardInterrupt:
-        remedy = "; --resume continues from the last checkpoint" if resumable else ""
-        _fail(f"interrupted{remedy}", INTERRUPTED, as_json)
+    except KeyboardInterrupt as stopped:
+        _fail(str(stopped) or "interrupted", INTERRUPTED, as_json)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_output()
         sys.exit(0)
     except Exception as error:
         if debug:
@@ -109,5 +135,6 @@ def reporting(*, as_json: bool, debug: bool, resumable: bool = False) -> Iterato
 def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:
     click.echo(message, err=True)
     if as_json:
-        click.echo(json.dumps({"error": {"exit_code": code, "message": message, "faults": list(faults)}}, indent=2))
+        with suppress(UnwritableError):  # the message has been given
+            say(json.dumps({"error": {"exit_code": code, "message": message, "faults": list(faults)}}, indent=2))
     sys.exit(code)

@@ -93,7 +93,7 @@ class Checkpoint:
         CheckpointError
             If the folder belongs to another run, is in use, or cannot be read or written.
         """
-        with self._locked():
+        with take(self.folder):
             self._check_manifest(identity)
             chunks = self._load_prefix(identity)
             self._n_chunks = len(chunks)
@@ -120,7 +120,7 @@ class Checkpoint:
         """Remove the checkpoint, all but what was set aside: after success or to start anew, outside a session."""
         if not self.folder.is_dir():
             return
-        with self._locked():
+        with take(self.folder):
             for path in reversed(self._chunk_files()):  # a kill leaves the beginning of a known run behind
                 path.unlink()
                 _side(path).unlink(missing_ok=True)
@@ -186,26 +186,41 @@ class Checkpoint:
             )
         return tuple(chunks)
 
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Hold the folder's lock; the system frees the lock of a process that died, so none is ever stale."""
+
+def take(folder: Path) -> IO[bytes]:
+    """Lock a folder for sole use until the stream that is returned is closed; made if it is not there.
+
+    The system frees the lock of a process that died, so none is ever stale.
+
+    Raises
+    ------
+    CheckpointError
+        If another run holds it, or it cannot be written to; nothing in it is changed then.
+    """
+    path = folder / "lock"
+    while True:
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            stream = (self.folder / "lock").open("a+b")
+            folder.mkdir(parents=True, exist_ok=True)
+            stream = path.open("a+b")
         except OSError as error:
-            raise CheckpointError(f"{self.folder}: wanted a folder to write to, got: {error.strerror}") from None
-        with stream:
-            if not _try_lock(stream):
-                stream.seek(0)
-                owner = stream.read().decode(errors="replace").strip()
-                raise CheckpointError(
-                    f"{self.folder}: wanted sole use, got another run (process {owner}) that writes to it; "
-                    "wait for it, or give another --out"
-                )
-            stream.truncate(0)
-            stream.write(str(os.getpid()).encode())
-            stream.flush()
-            yield
+            raise CheckpointError(f"{folder}: wanted a folder to write to, got: {error.strerror}") from None
+        if not _try_lock(stream):
+            stream.seek(0)
+            owner = stream.read().decode(errors="replace").strip()
+            stream.close()
+            raise CheckpointError(
+                f"{folder}: wanted sole use, got another run (process {owner}) that writes to it; "
+                "wait for it, or give another --out"
+            )
+        # The run that held it may have removed the file in between: then this is the lock of nothing.
+        if path.exists() and os.path.samestat(os.fstat(stream.fileno()), path.stat()):
+            break
+        stream.close()
+    with suppress(OSError):  # a full disk: the lock holds without a name in it
+        stream.truncate(0)
+        stream.write(str(os.getpid()).encode())
+        stream.flush()
+    return stream
 
 
 def _try_lock(stream: IO[bytes]) -> bool:

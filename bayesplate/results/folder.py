@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
-from bayesplate.errors import CheckpointError, Fault, InputError
+from bayesplate.errors import CheckpointError, Fault, InputError, RunInterrupted, UnwritableError
+from bayesplate.posterior.checkpoint import take
 from bayesplate.results.contract import as_json
 
 SUMMARY = "summary.json"
@@ -39,6 +42,7 @@ class OutputFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
+        self._lock: IO[bytes] | None = None
 
     @property
     def checkpoint(self) -> Path:
@@ -75,7 +79,7 @@ class OutputFolder:
             )
 
     def open(self, *, resume: bool) -> None:
-        """Make the folder; unless resuming, remove the results and the checkpoint of an earlier run.
+        """Make the folder and take it; unless resuming, remove the results and the checkpoint of an earlier run.
 
         A run that is resumed may yet turn out to be another one: what it left stays until there is something better.
 
@@ -83,17 +87,23 @@ class OutputFolder:
         ------
         InputError
             If the folder cannot be written.
+        CheckpointError
+            If another run is at work in it; then nothing is removed.
         """
+        make_folder(self.path)
+        self._lock = take(self.checkpoint)
+        if (held := _HELD.get()) is not None:
+            held.append(self)
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
             if not resume:
                 for path in self._earlier_results():
                     path.unlink(missing_ok=True)
                 before = self.path / BEFORE
                 if before.is_dir() and not any(before.iterdir()):
                     before.rmdir()
-                if self.checkpoint.is_dir():
-                    shutil.rmtree(self.checkpoint)
+                for path in self.checkpoint.iterdir():
+                    if path.is_dir():
+                        shutil.rmtree(path)
         except OSError as error:
             fault = Fault(f"--out {self.path}", "a folder that can be written", error.strerror or str(error))
             raise InputError(fault) from error
@@ -105,10 +115,56 @@ class OutputFolder:
         before = (self.path / BEFORE / name for name in (SUMMARY, ARCHIVE))
         return [*(self.path / name for name in RESULTS), *before, *drawn]
 
+    @property
+    def has_checkpoint(self) -> bool:
+        """Whether there are chunks of a run, sound or set aside as damaged."""
+        return any(self.checkpoint.rglob("chunk-*.npz*"))
+
     def close(self) -> None:
         """Remove the checkpoint of a run that is done; chunks found damaged stay for whoever wants to look."""
         if not any(self.checkpoint.rglob("*.damaged")):
             shutil.rmtree(self.checkpoint, ignore_errors=True)
+
+    def release(self) -> None:
+        """Let others use the folder, and leave none behind that holds nothing."""
+        if not self.has_checkpoint:
+            shutil.rmtree(self.checkpoint, ignore_errors=True)
+            with suppress(OSError):  # not empty
+                self.path.rmdir()
+        if self._lock is not None:
+            self._lock.close()
+
+
+_HELD: ContextVar[list[OutputFolder] | None] = ContextVar("folders that the run in progress holds", default=None)
+
+
+@contextmanager
+def run_of_its_own() -> Iterator[None]:
+    """A run that keeps the folder it opens until it ends, however it ends; to be put above a function.
+
+    Raises
+    ------
+    RunInterrupted
+        In place of a KeyboardInterrupt after the first checkpoint.
+    CheckpointError
+        In place of an UnwritableError after the first checkpoint.
+    """
+    held: list[OutputFolder] = []
+    token = _HELD.set(held)
+    try:
+        yield
+    except KeyboardInterrupt:
+        if any(folder.has_checkpoint for folder in held):
+            raise RunInterrupted("interrupted; --resume continues from the last checkpoint") from None
+        raise
+    except UnwritableError as error:
+        if any(folder.has_checkpoint for folder in held):
+            raise CheckpointError(f"{error}\nwhat was sampled is saved: make room, and --resume continues") from error
+        raise
+    finally:
+        _HELD.reset(token)
+        for folder in held:
+            folder.release()
 
 
 def _is_of_a_run(name: str) -> bool:
@@ -133,6 +189,25 @@ def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Pat
     return paths
 
 
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Writing a file or a folder's files: what the system refuses is told with the place.
+
+    Raises
+    ------
+    UnwritableError
+        In place of an OSError, and of the RuntimeError that HDF5 raises at a full disk.
+    """
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "errno" not in str(error):
+            raise
+        reason = getattr(error, "strerror", None) or str(error)
+        wanted, remedy = "a file that can be written", "make room, or take another place with --out"
+        raise UnwritableError(Fault(str(path), wanted, reason, remedy)) from error
+
+
 def make_folder(folder: Path) -> None:
     """Make the folder of an output.
 
@@ -145,7 +220,7 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         fault = Fault(f"--out {folder}", "a folder that can be written", error.strerror or str(error))
-        raise InputError(fault) from error
+        raise UnwritableError(fault) from error
 
 
 def json_text(content: Any) -> str:
@@ -154,13 +229,20 @@ def json_text(content: Any) -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file completely or not at all."""
+    """Write a text file completely or not at all.
+
+    Raises
+    ------
+    UnwritableError
+        If the disk is full or the place is not ours.
+    """
     partial = path.with_name(path.name + ".partial")
-    try:
-        with partial.open("w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with writing(path):
+        try:
+            with partial.open("w", encoding="utf-8", newline="\n") as stream:
+                stream.write(text)
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)

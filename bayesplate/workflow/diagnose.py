@@ -23,7 +23,7 @@ from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.errors import NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder, write_text
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder, run_of_its_own, write_text
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.workflow.fitting import Fitted, Request, fitted, opened, posed, with_board
@@ -63,6 +63,7 @@ class DiagnoseResult:
         return self.diagnosis._repr_html_()
 
 
+@run_of_its_own()
 def diagnose(
     card: str | os.PathLike[str],
     *,

@@ -13,7 +13,7 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.folder import ARCHIVE, SUMMARY, json_text, write_text
+from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, json_text, run_of_its_own, write_text, writing
 from bayesplate.results.store import write_posterior
 from bayesplate.results.summarise import unconverged_summary
 from bayesplate.results.summary import Summary
@@ -42,6 +42,7 @@ class FitResult:
     draws: Draws
 
 
+@run_of_its_own()
 def fit(
     card: str | os.PathLike[str],
     *,
@@ -121,7 +122,8 @@ def fit(
 
 def write_fit(folder: Path, result: Fitted) -> None:
     """Write summary and archive of a fit into a folder that is there."""
-    write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, result.prepared.card_text)
+    with writing(folder / ARCHIVE):
+        write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, result.prepared.card_text)
     write_text(folder / SUMMARY, json_text(result.summary))
 
 
@@ -130,7 +132,8 @@ def write_page(folder: Path, result: Fitted, diagnosis: Diagnosis | None = None)
     from bayesplate.report.page import write_report
 
     card = result.prepared.card
-    return write_report(folder, card, result.inference, result.draws, result.summary, diagnosis)
+    with writing(folder / PAGE):
+        return write_report(folder, card, result.inference, result.draws, result.summary, diagnosis)
 
 
 def refuse_unconverged(inference: Inference, seed: int, prepared: Prepared, folder: Path | None) -> None:

@@ -18,7 +18,7 @@ from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.region import noise_widenings
-from bayesplate.results.folder import make_folder, require_new
+from bayesplate.results.folder import make_folder, require_new, writing
 from bayesplate.results.sheets import ModesReport, sheet_report
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import Prepared, prepare
@@ -137,4 +137,5 @@ def _draw(sheets: Sequence[Sheet], folder: Path, files: Sequence[Path]) -> None:
     for i, one in enumerate(sheets):
         figure = chladni_sheet(one)
         for path in files[2 * i : 2 * i + 2]:
-            save_figure(figure, path)
+            with writing(path):
+                save_figure(figure, path)

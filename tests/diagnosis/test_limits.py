@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import HALF_NORMAL, bare, baseline, candidate, ground_of, one_level
-from scipy.optimize import brentq
-from scipy.special import ndtr
-
 from bayesplate.diagnosis.entries import candidate_entry
-from bayesplate.diagnosis.evidence import Terms
 from bayesplate.diagnosis.hypotheses import Hypothesis
 from bayesplate.diagnosis.noise_grid import noise_grid
 from bayesplate.diagnosis.null_control import simulate_null
 from bayesplate.diagnosis.search import Found, search
 from bayesplate.diagnosis.signatures import Signature, look_alikes, signatures
 from bayesplate.diagnosis.verdict import answers, at_limit, decide
+from made_searches import HALF_NORMAL, bare, baseline, candidate, ground_of, one_level
+from scipy.optimize import brentq
+from scipy.special import ndtr
+
+from bayesplate.diagnosis.evidence import Terms
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.fitting import Request, posed
 from bayesplate.workflow.prepare import prepare

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bayesplate.results.draws import linearisation, named_draws
 
 import bayesplate.frequencies.spectrum
 import bayesplate.results.summary
@@ -19,7 +20,6 @@ from bayesplate.posterior.convergence import assess
 from bayesplate.posterior.inference import Inference, linear_suffices, pose
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks
-from bayesplate.results.draws import linearisation, named_draws
 from bayesplate.results.summary import summarise
 from bayesplate.workflow.prepare import prepare
 

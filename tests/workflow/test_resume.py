@@ -30,17 +30,31 @@ def start(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen
     return subprocess.Popen(program, **pipes, text=True, env=variables, preexec_fn=heed_interrupts)
 
 
-def stop_while_sampling(folder: Path, stop: signal.Signals, n_chunks: int) -> tuple[int, str]:
-    """Send a signal once so many chunks are saved; the exit code and what was said."""
+def stop_while_sampling(folder: Path, *stops: signal.Signals, n_chunks: int) -> tuple[int, str]:
+    """Send a signal once so many chunks are saved; the exit code and what was said. The first of two only holds it."""
     with start(folder, BOARD) as process:
         last = folder / "checkpoint" / "linear" / f"chunk-{n_chunks - 1:04d}.npz"
         deadline = time.monotonic() + 60
         while not last.exists() and process.poll() is None:
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        process.send_signal(stop)
+        for stop in stops:
+            process.send_signal(stop)
+            if stop == signal.SIGSTOP:
+                for beside in ("--force", "--resume"):
+                    assert_taken(folder, beside, process.pid)
         _, stderr = process.communicate(timeout=60)
     return process.returncode, stderr
+
+
+def assert_taken(folder: Path, option: str, owner: int) -> None:
+    """Another run in the folder of one in progress is refused and touches nothing."""
+    before = files_in(folder)
+    run = runs.fit(folder, BOARD, option)
+
+    assert run.exit_code == 6
+    assert f"wanted sole use, got another run (process {owner}) that writes to it" in run.stderr
+    assert files_in(folder) == before
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
@@ -56,7 +70,8 @@ def test_an_interrupted_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files, st
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a signal that cannot be caught")
 def test_a_killed_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files):
-    exit_code, _ = stop_while_sampling(tmp_path / "out", signal.SIGKILL, n_chunks=2)
+    """And while it was alive, though it did nothing, no other run could take its folder."""
+    exit_code, _ = stop_while_sampling(tmp_path / "out", signal.SIGSTOP, signal.SIGKILL, n_chunks=2)
 
     assert exit_code == -signal.SIGKILL
     left = files_in(tmp_path / "out")
@@ -77,6 +92,17 @@ def test_an_interrupt_before_sampling_leaves_nothing(tmp_path, monkeypatch):
     assert run.exit_code == 130
     assert not run.folder.exists()
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_an_interrupt_before_the_first_checkpoint_promises_nothing(tmp_path, monkeypatch):
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bayesplate.workflow.fitting.infer", interrupted)
+    run = runs.fit(tmp_path / "out", BOARD)
+
+    assert (run.exit_code, run.stderr) == (130, "interrupted\n")
+    assert not run.folder.exists()
 
 
 def test_a_run_that_does_not_converge_says_so_and_gives_no_constants(stopped):
