@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.board import Board
-from bayesplate.posterior.likelihood import Readings
+from bayesplate.plate.readings import ReadingErrors
 from bayesplate.report.style import (
     BLUE,
     DARK,
@@ -112,7 +112,7 @@ def predictive_picture(board: Board, summary: Mapping[str, Any], predictive: NDA
 
 def rounding_cents(board: Board) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """How far below and above each reading its rounding interval reaches: two (n_modes,) arrays, cents."""
-    readings = [Readings.of(setup) for setup in board.setups]
+    readings = [ReadingErrors.of(setup) for setup in board.setups]
     below = np.concatenate([cents(one.log_low - one.log_frequency) for one in readings])
     above = np.concatenate([cents(one.log_high - one.log_frequency) for one in readings])
     return below, above

@@ -119,10 +119,10 @@ def posterior_method(name: str, problem: Problem, draws: Draws, weights: NDArray
 def theory_entry(
     problem: Problem, system: PaperSystem, methods: list[Method], inference: Inference, draws: Draws
 ) -> Entries:
-    """What one theory of the plate makes of a board: all methods, and the error of the weighted fit.
+    """What one theory of the plate makes of a board: all methods, and the error of the most likely constants.
 
-    The error is that of `summary.json`: weighted least squares under the exact law, in sample and refitted with each
-    mode left out.
+    The error is that of `summary.json`: the most likely constants under the exact law, in sample and fitted again with
+    each mode left out.
     """
     errors = mode_errors(inference, draws)
     board = problem.board

@@ -82,19 +82,13 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     posterior = problem.posterior
     values = problem.parameters.values(flat)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    log_noise = problem.parameters.log_noise(flat)
+    noise = np.exp(problem.parameters.log_noise(flat))
     by_setup = posterior.log_frequencies(flat)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
     predictive, log_likelihood = [], []
-    for i, (setup, readings, predicted) in enumerate(
-        zip(problem.board.setups, posterior.readings, by_setup, strict=True)
-    ):
-        simulated = np.exp(readings.simulate(predicted, log_noise[:, i], rng))
-        rounded = readings.log_high > readings.log_low
-        if setup.resolution:
-            simulated[:, rounded] = np.round(simulated[:, rounded] / setup.resolution) * setup.resolution
-        predictive.append(simulated)
-        log_likelihood.append(readings.log_likelihood(predicted, log_noise[:, i]))
+    for i, (readings, predicted) in enumerate(zip(posterior.readings, by_setup, strict=True)):
+        predictive.append(readings.simulate(predicted, noise[:, i], rng))
+        log_likelihood.append(readings.log_likelihood(predicted, noise[:, i]))
 
     def shaped(array: Floats) -> Floats:
         return np.broadcast_to(array, flat.shape[:1] + array.shape[1:]).reshape(*shape, *array.shape[1:])
@@ -106,7 +100,7 @@ def named_draws(inference: Inference, seed: int) -> Draws:
         rigidities={name: shaped(values[name]) for name in RIGIDITIES},
         moduli={name: shaped(array) for name, array in zip(MODULI, constants, strict=True)},
         inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
-        noise=shaped(np.exp(log_noise)),
+        noise=shaped(noise),
         derived={name: Derived(shaped(item.values), item.unit) for name, item in derived.items()},
         log_frequency=shaped(np.concatenate(by_setup, axis=1)),
         log_likelihood=shaped(np.concatenate(log_likelihood, axis=1)),
@@ -193,12 +187,12 @@ def _weights(log_likelihood: Floats, draws: Draws, every: int = 1) -> Floats:
 def _log_likelihood(inference: Inference, theta: Floats, log_frequency: Floats) -> Floats:
     """Log probability of every reading where the frequencies are known: (n_some, n_modes) arrays."""
     posterior = inference.problem.posterior
-    log_noise = inference.problem.parameters.log_noise(theta)
+    noise = np.exp(inference.problem.parameters.log_noise(theta))
     ends = np.cumsum([len(setup.readings) for setup in inference.problem.board.setups])
     parts = np.split(log_frequency, ends[:-1], axis=1)
     return np.concatenate(
         [
-            readings.log_likelihood(part, log_noise[:, i])
+            readings.log_likelihood(part, noise[:, i])
             for i, (readings, part) in enumerate(zip(posterior.readings, parts, strict=True))
         ],
         axis=1,

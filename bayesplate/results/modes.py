@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import Errors, prediction_errors
+from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
 from bayesplate.modes.solve import Modes
+from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.inference import Inference, Problem
 from bayesplate.posterior.region import predictor
 from bayesplate.results.draws import Draws, finite
@@ -21,29 +23,35 @@ from bayesplate.results.draws import Draws, finite
 Spectrum = tuple[Modes, tuple[NamedMode, ...]]
 
 _FEWEST_MODES, _MOST_MODES = 12, 96
+_N_STARTS = 500
 _SPARE = 1.5
 """Modes solved for each measured peak: some peaks are missed on the bench."""
 
 
 def mode_errors(inference: Inference, draws: Draws) -> Errors:
-    """Errors of the weighted least-squares fit under the exact law, in sample and left out.
+    """Errors of the most likely constants under the exact law, in sample and left out.
 
-    One estimator for both, at the posterior's median noise; uncertain inputs move within their priors. The posterior
-    itself may lie closer to a reading that is coarsely rounded, because it knows the interval.
+    One estimator for both, with the likelihood of the fit at the posterior's median noise: rounded readings are
+    intervals, a robust fit has Student's errors. Uncertain inputs move within their priors.
     """
     problem = inference.problem
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
-    start = problem.centre[problem.parameters.fitted_columns]
-    scales = reading_scales(inference, draws)
-    bounds = problem.parameters.fitted_bounds
-    return prediction_errors(predict, log_measured(problem.board), scales, start, bounds)
+    misfit = deviance_misfit(problem.posterior.readings, median_noise(draws))
+    starts, bounds = _starts(problem, draws), problem.parameters.fitted_bounds
+    return prediction_errors(predict, log_measured(problem.board), misfit, starts, bounds)
 
 
-def reading_scales(inference: Inference, draws: Draws) -> NDArray[np.float64]:
-    """Relative uncertainty of each reading at the posterior's median noise: (n_modes,) array."""
-    medians = np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0)
-    setups = inference.problem.board.setups
-    return np.concatenate([np.hypot(m, setup.relative_sd) for m, setup in zip(medians, setups, strict=True)])
+def _starts(problem: Problem, draws: Draws) -> NDArray[np.float64]:
+    """Where fits may begin: the centre and, as Student's likelihood has several peaks, draws: (n_starts, n_free)."""
+    theta = problem.centre[None, :]
+    if problem.posterior.robust:
+        theta = np.concatenate([theta, draws.flat[:: max(1, len(draws.flat) // _N_STARTS)]])
+    return np.asarray(theta[:, problem.parameters.fitted_columns])
+
+
+def median_noise(draws: Draws) -> NDArray[np.float64]:
+    """The posterior's median noise of each setup: (n_setups,) array, relative."""
+    return np.asarray(np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0))
 
 
 def mode_entries(inference: Inference, draws: Draws, errors: Errors) -> list[dict[str, Any]]:
@@ -51,7 +59,8 @@ def mode_entries(inference: Inference, draws: Draws, errors: Errors) -> list[dic
     problem = inference.problem
     predicted = np.exp(draws.log_frequency).reshape(-1, draws.log_frequency.shape[-1])
     low, high = np.quantile(predicted, [0.05, 0.95], axis=0)
-    leverages = identifiability(problem.estimate.sensitivities, reading_scales(inference, draws)).leverages
+    scales = reading_sd(problem.board.setups, median_noise(draws))
+    leverages = identifiability(problem.estimate.sensitivities, scales).leverages
     rows = [
         (setup.name, reading, place)
         for setup, model in zip(problem.board.setups, problem.posterior.models, strict=True)
