@@ -113,9 +113,7 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         before=BEFORE,
         after=after or BEFORE,
         gain_null_percentile=99.0 if after else 40.0,
-        null_control=NullControlSummary(
-            n_sets=500, flagged_percent=2.0, nested_ratio=0.25, nested_ratio_to_beat=0.75
-        ),
+        null_control=NullControlSummary(n_sets=500, flagged_percent=2.0, nested_ratio=0.25, nested_ratio_to_beat=0.75),
         elastic_shift=SHIFT if after else still,
         finalists=(finalist,) if after else (),
         elastic_averaged={name: spread(one.before) for name, one in SHIFT.items()},

@@ -116,7 +116,6 @@ def _syntax_fault(message: str, text: str, file: str) -> Fault:
     return Fault(f"{file} line {number}", wanted, f"{quoted(line)}: {plain(reason)}", remedy)
 
 
-
 def _depth_exceeds(table: dict[str, Any], limit: int) -> bool:
     """Whether tables and lists are nested deeper than the limit; a loop, because recursion could exhaust the stack."""
     level: list[Any] = [table]

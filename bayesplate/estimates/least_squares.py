@@ -19,6 +19,7 @@ from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.readings import reading_sd
 from bayesplate.plate.setup import Setup
 
 _MOST_STEPS = 40
@@ -41,13 +42,13 @@ class Estimate:
     values : dict of float
         The rigidities and the nominal inputs by name.
     models : tuple of SetupModel
-        One a setup, solved at the estimate.
+        One a setup, solved at the estimate, whether the steps settled there or not.
     sensitivities : (n_modes, 3) array
         d ln f / d ln D of all readings, setup after setup.
     residuals : (n_modes,) array
         ln measured - ln predicted.
     scales : (n_modes,) array
-        Relative uncertainty of each reading that weighs it: the setup's noise joined with the reading's own.
+        Relative uncertainty of each reading that weighs it, see `reading_scales`.
     converged : bool
     """
 
@@ -61,8 +62,8 @@ class Estimate:
 
 
 def reading_scales(board: Board) -> NDArray[np.float64]:
-    """Relative uncertainty of each reading: its own joined with the median noise of its setup, (n_modes,) array."""
-    return np.concatenate([np.hypot(setup.noise.median, setup.relative_sd) for setup in board.setups])
+    """Relative uncertainty of each reading at the median noise of its setup, rounding included: (n_modes,) array."""
+    return reading_sd(board.setups, [setup.noise.median for setup in board.setups])
 
 
 def log_measured(board: Board) -> NDArray[np.float64]:
@@ -86,11 +87,12 @@ def weighted_least_squares(board: Board) -> Estimate:
     """
     inputs = board.nominal()
     systems = [system_of(board, setup) for setup in board.setups]
-    log_rigidities = np.log(starting_rigidities(board))
+    log_next = np.log(starting_rigidities(board))
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
     for _ in range(_MOST_STEPS):
-        values = inputs | dict(zip(RIGIDITIES, np.exp(log_rigidities), strict=True))
+        rigidities = np.exp(log_next)
+        values = inputs | dict(zip(RIGIDITIES, rigidities, strict=True))
         models = tuple(setup_model(system, values) for system in systems)
         predicted = np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         sensitivities = np.concatenate([m.sensitivities(values) for m in models])
@@ -99,10 +101,10 @@ def weighted_least_squares(board: Board) -> Estimate:
             break
         step = np.linalg.lstsq(sensitivities / scales[:, None], residuals / scales, rcond=1e-8)[0]
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
-        log_rigidities = log_rigidities + step
+        log_next = log_next + step
         size = float(np.abs(step).max())
         settled, previous = has_settled(size, previous), size
-    return Estimate(np.exp(log_rigidities), values, models, sensitivities, residuals, scales, settled)
+    return Estimate(rigidities, values, models, sensitivities, residuals, scales, settled)
 
 
 def has_settled(step: float, previous: float) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import Bounds, Predict, refit
+from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict, most_likely
 
 _FEWEST = 4
 
@@ -32,29 +32,37 @@ class Errors:
 def prediction_errors(
     predict: Predict,
     target: NDArray[np.float64],
-    scales: NDArray[np.float64],
-    start: NDArray[np.float64],
+    misfit: Misfit,
+    starts: NDArray[np.float64],
     bounds: Bounds | None = None,
 ) -> Errors:
-    """Errors of the weighted least-squares fit, in sample and with each mode left out in turn.
+    """Errors of the most likely constants, in sample and with each mode left out in turn.
 
     Parameters
     ----------
-    predict, target, scales, start, bounds
-        As for `bayesplate.estimates.refit.refit`.
+    predict, misfit, bounds
+        As for `bayesplate.estimates.refit.most_likely`.
+    target : (n_modes,) array
+        ln of the measured frequencies.
+    starts : (n_starts, n_free) array
+        Within the bounds. Each fit begins at the one where its own sum of squares is lowest: Student's likelihood may
+        have another peak without the mode.
 
     Returns
     -------
     Errors
     """
 
-    def error(used: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(target - predict(refit(predict, used, scales, start, bounds)[None, :])[0])
+    squares = misfit(predict(starts))[0] ** 2
+    inputs = np.sum(starts[:, N_CONSTANTS:] ** 2, axis=1)
+
+    def error(left_out: int | None = None) -> NDArray[np.float64]:
+        used = squares if left_out is None else np.delete(squares, left_out, axis=1)
+        start = starts[np.nanargmin(used.sum(axis=1) + inputs)]
+        fitted = most_likely(predict, misfit, start, bounds, left_out)
+        return np.asarray(target - predict(fitted[None, :])[0])
 
     left_out = np.full(target.size, np.nan)
     if target.size >= _FEWEST:
-        for mode in range(target.size):
-            without = target.copy()
-            without[mode] = np.nan
-            left_out[mode] = error(without)[mode]
-    return Errors(error(target), left_out)
+        left_out[:] = [error(mode)[mode] for mode in range(target.size)]
+    return Errors(error(), left_out)

@@ -1,12 +1,14 @@
-"""Weighted least squares under any law, with the uncertain inputs moving within their priors."""
+"""The most likely constants under any law: by weighted squares or by deviances, inputs within their priors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayesplate.plate.readings import ReadingErrors
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
@@ -14,6 +16,11 @@ Predict = Callable[[Floats], Floats]
 
 The parameters are ln D_x, ln D_y, ln D_s, and the standard coordinates of the uncertain inputs, each of which counts
 as one more observation: zero with standard deviation one.
+"""
+Misfit = Callable[[Floats], tuple[Floats, Floats]]
+"""From (..., n_modes) logarithms of frequencies to what is squared and summed over the readings, and its derivatives.
+
+Half the sum is the negative log likelihood of the readings but for a constant.
 """
 
 N_CONSTANTS = 3
@@ -34,14 +41,14 @@ class Bounds:
 
 
 def refit(predict: Predict, target: Floats, scales: Floats, start: Floats, bounds: Bounds | None = None) -> Floats:
-    """Parameters that minimise the weighted squares.
+    """Parameters that minimise the weighted squares of ln measured - ln predicted.
 
     Parameters
     ----------
     predict : callable
         See `Predict`.
     target : (n_modes,) array
-        ln of the measured frequencies; not a number leaves a mode out.
+        ln of the measured frequencies.
     scales : (n_modes,) array
         Relative uncertainties.
     start : (n_free,) array
@@ -52,16 +59,58 @@ def refit(predict: Predict, target: Floats, scales: Floats, start: Floats, bound
     -------
     (n_free,) array
     """
+    return most_likely(predict, normal_misfit(target, scales), start, bounds)
+
+
+def normal_misfit(target: Floats, scales: Floats) -> Misfit:
+    """Residuals of ln f over their standard deviations: normal errors of readings that are not rounded."""
+    return lambda predicted: ((target - predicted) / scales, -1.0 / scales)
+
+
+def deviance_misfit(errors: Sequence[ReadingErrors], noise: Sequence[float] | Floats) -> Misfit:
+    """Signed deviance residuals of all readings, setup after setup, at one relative noise per setup."""
+    ends = np.cumsum([one.frequency.size for one in errors])[:-1]
+
+    def misfit(predicted: Floats) -> tuple[Floats, Floats]:
+        parts = zip(errors, np.split(predicted, ends, axis=-1), noise, strict=True)
+        residuals, slopes = zip(*(one.deviance_residuals(part, level) for one, part, level in parts), strict=True)
+        return np.concatenate(residuals, axis=-1), np.concatenate(slopes, axis=-1)
+
+    return misfit
+
+
+def most_likely(
+    predict: Predict, misfit: Misfit, start: Floats, bounds: Bounds | None = None, left_out: int | None = None
+) -> Floats:
+    """Parameters that minimise the squares of a misfit.
+
+    Parameters
+    ----------
+    predict : callable
+        See `Predict`.
+    misfit : callable
+        See `Misfit`.
+    start : (n_free,) array
+        Within the bounds.
+    bounds : Bounds, optional
+    left_out : int, optional
+        Reading that is not used.
+
+    Returns
+    -------
+    (n_free,) array
+    """
     from scipy.optimize import least_squares
 
-    used = np.isfinite(target)
+    def without(rows: Floats) -> Floats:
+        return rows if left_out is None else np.delete(rows, left_out, axis=0)
 
     def residuals(x: Floats) -> Floats:
-        misfits = (predict(x[None, :])[0] - target)[used] / scales[used]
-        return np.concatenate([misfits, x[N_CONSTANTS:]])
+        return np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[N_CONSTANTS:]])
 
     def jacobian(x: Floats) -> Floats:
-        return design(predict, scales, x)[np.r_[used, np.ones(x.size - N_CONSTANTS, dtype=bool)]]
+        chained = misfit(predict(x[None, :])[0])[1][:, None] * sensitivities(predict, x)
+        return np.concatenate([without(chained), np.eye(x.size)[N_CONSTANTS:]])
 
     if bounds is None or bounds.are_open:
         return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x)
@@ -71,7 +120,11 @@ def refit(predict: Predict, target: Floats, scales: Floats, start: Floats, bound
 
 def design(predict: Predict, scales: Floats, at: Floats) -> Floats:
     """Weighted sensitivities of all observations at a point: (n_modes + n_inputs, n_free) array."""
+    return np.concatenate([sensitivities(predict, at) / scales[:, None], np.eye(at.size)[N_CONSTANTS:]])
+
+
+def sensitivities(predict: Predict, at: Floats) -> Floats:
+    """Sensitivities of ln f to all parameters at a point, by differences: (n_modes, n_free) array."""
     steps = _STEP * np.eye(at.size)
     both = predict(np.concatenate([at + steps, at - steps]))
-    slopes = ((both[: at.size] - both[at.size :]) / (2 * _STEP)).T / scales[:, None]
-    return np.concatenate([slopes, np.eye(at.size)[N_CONSTANTS:]])
+    return np.asarray(((both[: at.size] - both[at.size :]) / (2 * _STEP)).T)

@@ -212,6 +212,13 @@ def _noise(section: SetupSection, prior: PriorCard | None) -> Quantity:
     return CLAMPED_NOISE if "clamped" in section.edges.words.values() else DEFAULT_NOISE
 
 
+def _joined_with_rounding(frequency: Quantity, resolution: float | None) -> Quantity:
+    """A list of readings with their standard error joined with the rounding error; a single number stays as it is."""
+    if len(frequency.readings) < 2 or frequency.resolution or not resolution:
+        return frequency
+    return Quantity.from_readings(frequency.readings, resolution)
+
+
 def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCard | None) -> Setup:
     edges, first = section.edges, section.first_label
     return Setup(
@@ -220,7 +227,12 @@ def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCar
         ends_y=(edges.y0, edges.y1),
         clamped={edge: length.scaled(_MILLI) for edge, length in section.clamped_mm.items()},
         readings=tuple(
-            Reading(label, (label.m - first.m, label.n - first.n), frequency, section.signs.get(label, ""))
+            Reading(
+                label,
+                (label.m - first.m, label.n - first.n),
+                _joined_with_rounding(frequency, section.resolution_hz),
+                section.signs.get(label, ""),
+            )
             for label, frequency in section.frequencies_hz.items()
         ),
         resolution=section.resolution_hz or 0.0,

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.spectrum import NamedMode, doubtful_labels, sign_conflicts, spectra
+from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.mode_errors import mode_errors, reading_scales
+from bayesplate.posterior.mode_errors import median_noise, mode_errors
 from bayesplate.posterior.region import worst_cents
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
 
@@ -28,7 +29,7 @@ class Assessment:
     Attributes
     ----------
     left_out : (n_modes,) array
-        ln measured - ln predicted of every reading by a least-squares refit that has not seen it; not a number where
+        ln measured - ln predicted of every reading by the most likely constants of the others; not a number where
         too few modes are left.
     leverages : (n_modes,) array
         Share of each reading in its own prediction, at the posterior's median noise.
@@ -75,7 +76,7 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     values = posterior_mean_values(problem, draws)
     found = spectra(models, values)
     errors = linearisation(inference, draws) if linear_errors is None else linear_errors
-    scales = reading_scales(inference, draws)
+    scales = reading_sd(problem.board.setups, median_noise(draws))
     signed = (model.setup for model in models if model.setup.hammer is not None)
     conflicts = (sentence for setup in signed for sentence in sign_conflicts(setup, *found[setup.name], values))
     return Assessment(

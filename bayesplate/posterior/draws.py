@@ -76,19 +76,13 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     posterior = problem.posterior
     values = problem.parameters.values(flat)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    log_noise = problem.parameters.log_noise(flat)
+    noise = np.exp(problem.parameters.log_noise(flat))
     by_setup = posterior.log_frequencies(flat)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
     predictive, log_likelihood = [], []
-    for i, (setup, readings, predicted) in enumerate(
-        zip(problem.board.setups, posterior.readings, by_setup, strict=True)
-    ):
-        simulated = np.exp(readings.simulate(predicted, log_noise[:, i], rng))
-        rounded = readings.log_high > readings.log_low
-        if setup.resolution:
-            simulated[:, rounded] = np.round(simulated[:, rounded] / setup.resolution) * setup.resolution
-        predictive.append(simulated)
-        log_likelihood.append(readings.log_likelihood(predicted, log_noise[:, i]))
+    for i, (readings, predicted) in enumerate(zip(posterior.readings, by_setup, strict=True)):
+        predictive.append(readings.simulate(predicted, noise[:, i], rng))
+        log_likelihood.append(readings.log_likelihood(predicted, noise[:, i]))
 
     def shaped(array: Floats) -> Floats:
         return np.broadcast_to(array, flat.shape[:1] + array.shape[1:]).reshape(*shape, *array.shape[1:])
@@ -100,7 +94,7 @@ def named_draws(inference: Inference, seed: int) -> Draws:
         rigidities={name: shaped(values[name]) for name in RIGIDITIES},
         moduli={name: shaped(array) for name, array in zip(MODULI, constants, strict=True)},
         inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
-        noise=shaped(np.exp(log_noise)),
+        noise=shaped(noise),
         derived={name: Derived(shaped(item.values), item.unit) for name, item in derived.items()},
         log_frequency=shaped(np.concatenate(by_setup, axis=1)),
         log_likelihood=shaped(np.concatenate(log_likelihood, axis=1)),

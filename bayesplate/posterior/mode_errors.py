@@ -1,4 +1,4 @@
-"""Errors of the weighted least-squares fit at the posterior's noise: in sample, and each mode left out in turn."""
+"""Errors of the most likely constants: in sample, and each mode left out in turn."""
 
 from __future__ import annotations
 
@@ -7,27 +7,35 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import Errors, prediction_errors
+from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.inference import Inference, Problem
 from bayesplate.posterior.region import predictor
+
+_N_STARTS = 500
 
 
 def mode_errors(inference: Inference, draws: Draws) -> Errors:
-    """Errors of the weighted least-squares fit under the exact law, in sample and left out.
+    """Errors of the most likely constants under the exact law, in sample and left out.
 
-    One estimator for both, at the posterior's median noise; uncertain inputs move within their priors. The posterior
-    itself may lie closer to a reading that is coarsely rounded, because it knows the interval.
+    One estimator for both, with the likelihood of the fit at the posterior's median noise: rounded readings are
+    intervals, a robust fit has Student's errors. Uncertain inputs move within their priors.
     """
     problem = inference.problem
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
-    start = problem.centre[problem.parameters.fitted_columns]
-    scales = reading_scales(inference, draws)
-    bounds = problem.parameters.fitted_bounds
-    return prediction_errors(predict, log_measured(problem.board), scales, start, bounds)
+    misfit = deviance_misfit(problem.posterior.readings, median_noise(draws))
+    starts, bounds = _starts(problem, draws), problem.parameters.fitted_bounds
+    return prediction_errors(predict, log_measured(problem.board), misfit, starts, bounds)
 
 
-def reading_scales(inference: Inference, draws: Draws) -> NDArray[np.float64]:
-    """Relative uncertainty of each reading at the posterior's median noise: (n_modes,) array."""
-    medians = np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0)
-    setups = inference.problem.board.setups
-    return np.concatenate([np.hypot(m, setup.relative_sd) for m, setup in zip(medians, setups, strict=True)])
+def median_noise(draws: Draws) -> NDArray[np.float64]:
+    """The posterior's median noise of each setup: (n_setups,) array, relative."""
+    return np.asarray(np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0))
+
+
+def _starts(problem: Problem, draws: Draws) -> NDArray[np.float64]:
+    """Where fits may begin: the centre and, as Student's likelihood has several peaks, draws: (n_starts, n_free)."""
+    theta = problem.centre[None, :]
+    if problem.posterior.robust:
+        theta = np.concatenate([theta, draws.flat[:: max(1, len(draws.flat) // _N_STARTS)]])
+    return np.asarray(theta[:, problem.parameters.fitted_columns])

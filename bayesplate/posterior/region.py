@@ -14,6 +14,7 @@ from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, setup_model, with_exact
 from bayesplate.plate.board import Board, Values
+from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 
 Floats = NDArray[np.float64]
@@ -64,7 +65,7 @@ def find_region(board: Board, estimate: Estimate) -> Region:
     noise = np.array([setup.noise.median for setup in board.setups]) * widenings
     centre = parameters.theta(estimate.values, noise)
     models = estimate.models
-    scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
+    scales = reading_sd(board.setups, noise)
     covariance = _covariance(board, models, "linear", scales, centre)
     models = exact_models(board, models, centre, covariance)
     if parameters.inputs:
@@ -84,22 +85,28 @@ def find_region(board: Board, estimate: Estimate) -> Region:
 def noise_widenings(board: Board, estimate: Estimate) -> Floats:
     """Likely noise of each setup over its prior median, at least 1: (n_setups,) array.
 
-    With n readings to spare and a mean squared misfit q of all of them, the density of the logarithm of w = noise /
-    median is highest where n (q / w^2 - 1) = ln(w) / log_sd^2. A narrow prior keeps the noise at its median whatever
-    the residuals; a wide one lets it follow them.
+    Where all noises are w times their medians a residual r has the variance v = (w median)^2 + own, so that it tells of
+    w by the share s = (w median)^2 / v. With a part p of each reading to spare, the density of ln w is highest where
+    the sum of s (r^2 / v - p) is ln(w) / log_sd^2. A narrow prior keeps the noise at its median whatever the residuals;
+    a wide one lets it follow them as far as rounding and own uncertainties leave them unexplained.
     """
     from scipy.optimize import brentq
 
-    spare = max(estimate.residuals.size - N_RIGIDITIES, 1)
-    misfit = float(np.sum((estimate.residuals / estimate.scales) ** 2)) / spare
-    if misfit <= 1.0:
+    squares = estimate.residuals**2
+    spare = max(squares.size - N_RIGIDITIES, 1) / squares.size
+    medians = np.array([setup.noise.median for setup in board.setups])
+    noise = np.repeat(medians, [len(setup.readings) for setup in board.setups])
+
+    def excess(log_w: float) -> float:
+        variances = reading_sd(board.setups, medians * np.exp(log_w)) ** 2
+        return float(np.sum((noise * np.exp(log_w)) ** 2 / variances * (squares / variances - spare)))
+
+    if excess(0.0) <= 0.0:
         return np.ones(len(board.setups))
+    highest = 0.5 * np.log(np.max(squares / noise**2) / spare)
 
     def likely(log_sd: float) -> float:
-        def slope(log_w: float) -> float:
-            return float(spare * (misfit * np.exp(-2.0 * log_w) - 1.0) - log_w / log_sd**2)
-
-        return float(np.exp(brentq(slope, 0.0, 0.5 * np.log(misfit))))
+        return float(np.exp(brentq(lambda log_w: excess(log_w) - log_w / log_sd**2, 0.0, highest)))
 
     return np.array([likely(setup.noise.log_sd) for setup in board.setups])
 

@@ -75,12 +75,12 @@ def _weights(log_likelihood: Floats, draws: Draws, every: int = 1) -> Floats:
 def _log_likelihood(inference: Inference, theta: Floats, log_frequency: Floats) -> Floats:
     """Log probability of every reading where the frequencies are known: (n_some, n_modes) arrays."""
     posterior = inference.problem.posterior
-    log_noise = inference.problem.parameters.log_noise(theta)
+    noise = np.exp(inference.problem.parameters.log_noise(theta))
     ends = np.cumsum([len(setup.readings) for setup in inference.problem.board.setups])
     parts = np.split(log_frequency, ends[:-1], axis=1)
     return np.concatenate(
         [
-            readings.log_likelihood(part, log_noise[:, i])
+            readings.log_likelihood(part, noise[:, i])
             for i, (readings, part) in enumerate(zip(posterior.readings, parts, strict=True))
         ],
         axis=1,

@@ -13,7 +13,7 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
-from bayesplate.posterior.likelihood import Readings
+from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.quantities import Quantity
 
@@ -39,13 +39,13 @@ class Posterior:
     law: LawName
     robust: bool = False
     parameters: Parameters = field(init=False)
-    readings: tuple[Readings, ...] = field(init=False)
+    readings: tuple[ReadingErrors, ...] = field(init=False)
     priors: Mapping[str, Quantity] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", Parameters(self.board))
         object.__setattr__(self, "priors", self.prior.constants)
-        object.__setattr__(self, "readings", tuple(Readings.of(s, self.robust) for s in self.board.setups))
+        object.__setattr__(self, "readings", tuple(ReadingErrors.of(s, self.robust) for s in self.board.setups))
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log density: (n_draws,) array from (n_draws, n_dim); -inf outside the support."""
@@ -80,9 +80,9 @@ class Posterior:
 
     def log_likelihood(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log probability of every reading, setup after setup: (n_draws, n_modes) array."""
-        log_noise = self.parameters.log_noise(theta)
+        noise = np.exp(self.parameters.log_noise(theta))
         parts = [
-            readings.log_likelihood(predicted, log_noise[:, i])
+            readings.log_likelihood(predicted, noise[:, i])
             for i, (readings, predicted) in enumerate(zip(self.readings, self.log_frequencies(theta), strict=True))
         ]
         return np.concatenate(parts, axis=1)

@@ -57,8 +57,7 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
         _draw(panel, name, summary, moduli[name])
     legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
     told = "; ".join(
-        f"{name} {entry.mean * GPA:.3g} GPa, nine times in ten between {entry.q05 * GPA:.3g} and "
-        f"{entry.q95 * GPA:.3g}"
+        f"{name} {entry.mean * GPA:.3g} GPa, nine times in ten between {entry.q05 * GPA:.3g} and {entry.q95 * GPA:.3g}"
         for name, entry in summary.elastic.items()
     )
     caption = (

@@ -9,6 +9,7 @@ from bayesplate.posterior.draws import Draws
 
 LARGE_SHARE = 0.5
 
+
 def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
     """Share of the variance of the logarithm of each modulus that goes with each uncertain input, 0 to 1.
 
@@ -19,8 +20,7 @@ def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
     for modulus, values in draws.moduli.items():
         log_modulus = np.log(values).ravel()
         shares[modulus] = {
-            name: float(np.corrcoef(log_modulus, column.ravel())[0, 1] ** 2)
-            for name, column in draws.inputs.items()
+            name: float(np.corrcoef(log_modulus, column.ravel())[0, 1] ** 2) for name, column in draws.inputs.items()
         }
     return shares
 

@@ -56,7 +56,7 @@ class MethodRow:
 
 @dataclass(frozen=True)
 class ComparedMode:
-    """A reading over weighted least squares under the exact law: fitted with it, and without it."""
+    """A reading over the most likely constants under the exact law: fitted with it, and without it."""
 
     setup: str
     label: str
@@ -144,7 +144,7 @@ def theory_row(problem: Problem, system: PaperSystem, methods: Sequence[Method],
     system : PaperSystem
     methods : sequence of Method
     errors : Errors
-        Of weighted least squares under the exact law, in sample and refitted with each mode left out.
+        Of the most likely constants under the exact law, in sample and refitted with each mode left out.
 
     Returns
     -------

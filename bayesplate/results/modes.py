@@ -41,7 +41,7 @@ class ModeRow:
     rounding_cents : tuple of float or None
         Ends of the rounding interval over the reading; None where it is not rounded.
     left_out_cents : float or None
-        Measured over predicted by a least-squares refit that has not seen the reading; None where too few are left.
+        Measured over predicted by the most likely constants of the other readings; None where too few are left.
     leverage : float
         Share of the reading in its own prediction.
     label_correlation : float

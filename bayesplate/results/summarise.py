@@ -39,7 +39,6 @@ HIGH_EXACT_ERROR = 0.5
 """Cents by which the exact law may miss full solves before a summary warns."""
 
 
-
 def unconverged_summary(
     problem: Problem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
 ) -> Unconverged:

@@ -177,11 +177,7 @@ def _case(
         after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
         is_clear_of_zero=clear,
         recommendation=recommendation(found, asked_about(found, verdict)),
-        finalists=[
-            (one, refits[one.index].summary)
-            for one in finalists(found, verdict)
-            if one.index in refits
-        ],
+        finalists=[(one, refits[one.index].summary) for one in finalists(found, verdict) if one.index in refits],
         notes=notes,
     )
 

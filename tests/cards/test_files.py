@@ -239,7 +239,7 @@ def test_nothing_in_a_card_is_executed(write: Write, tmp_path: Path, board_text:
 
 
 def test_notes_are_free_text(write: Write, board_text: str) -> None:
-    text = board_text.replace('title =', 'notes = "Küche, 21 °C, Tür zu"\ntitle =')
+    text = board_text.replace("title =", 'notes = "Küche, 21 °C, Tür zu"\ntitle =')
     text = text.replace('name = "cantilever"', 'name = "cantilever"\nnotes = "früh"')
     card = load_board(write(text))
 

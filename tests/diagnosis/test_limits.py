@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bayesplate.diagnosis.entries import candidate_entry
-from bayesplate.diagnosis.hypotheses import Hypothesis
-from bayesplate.diagnosis.noise_grid import noise_grid
-from bayesplate.diagnosis.null_control import simulate_null
-from bayesplate.diagnosis.search import Found, search
-from bayesplate.diagnosis.signatures import Signature, look_alikes, signatures
-from bayesplate.diagnosis.verdict import answers, at_limit, decide
 from made_searches import HALF_NORMAL, bare, baseline, candidate, ground_of, one_level
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
-from bayesplate.diagnosis.evidence import Terms
+from bayesplate.diagnosis.decision.verdict import answers, at_limit, decide
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.null_control import simulate_null
+from bayesplate.diagnosis.evidence.search import Found, search
+from bayesplate.diagnosis.evidence.terms import Terms
+from bayesplate.diagnosis.shifts.signatures import Signature, look_alikes, signatures
+from bayesplate.diagnosis.wording.entries import effect_entry
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.fitting import Request, posed
 from bayesplate.workflow.prepare import prepare
@@ -43,7 +43,7 @@ def found_of(base, directions, probability, residual, prior=HALF_NORMAL, n_cells
 
 def entry_of(found):
     """What diagnosis.json says of a candidate."""
-    return candidate_entry(found, decide(found), answers(found), found.ground.candidates[A], 0.0)
+    return effect_entry(found, decide(found), answers(found), found.ground.candidates[A], 0.0)
 
 
 @pytest.mark.parametrize("index", [0, 1], ids=["the bare model", "the winner"])
@@ -89,7 +89,7 @@ def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike):
     seen = [Signature(name, {}, d / base.scales, d / base.scales, {}, 1.0) for name, d in ((A, one), (B, other))]
 
     assert look_alikes(seen) == {A: (B,) if alike else (), B: (A,) if alike else ()}
-    assert entry_of(found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6)))["look_alikes"] == [B] * alike
+    assert entry_of(found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6))).look_alikes == (B,) * alike
 
 
 def test_the_bias_of_an_ignored_effect_has_the_sign_of_what_it_hides(base):
@@ -98,7 +98,7 @@ def test_the_bias_of_an_ignored_effect_has_the_sign_of_what_it_hides(base):
     D_x, D_y, nu = 30.0, 2.0, 0.4
     expected = 100.0 * ((D_x - nu**2 * D_y) / (D_x * np.exp(0.04) - nu**2 * D_y) - 1.0)
 
-    bias = entry_of(found)["bias_percent"]
+    bias = entry_of(found).bias_percent
 
     assert bias["E_x"] == pytest.approx(expected, rel=1e-6)
     assert expected < -3.9
@@ -123,13 +123,13 @@ def test_an_amplitude_has_the_interval_of_ninety_percent(base):
     sd = 1.0 / np.sqrt(1.0 + weight)
     mean = 1.2 * weight * sd**2
 
-    told = entry_of(found)["amplitude"]
+    told = entry_of(found).amplitude
 
     cell = 6.0 / 401
     assert sd > 10 * cell
     expected = [mean - 1.645 * sd, mean, mean + 1.645 * sd]
-    assert [told[name] for name in ("q05", "q50", "q95")] == pytest.approx(expected, abs=cell)
-    assert (told["parameter"], told["unit"]) == ("size", "1")
+    assert [told.q05, told.q50, told.q95] == pytest.approx(expected, abs=cell)
+    assert (told.parameter, told.unit) == ("size", "1")
 
 
 def test_an_amplitude_keeps_the_unit_of_its_parameter(base):
@@ -139,9 +139,8 @@ def test_an_amplitude_keeps_the_unit_of_its_parameter(base):
     free = tuple(replace(free, unit="N/m") for free in law.form.free)
     law = replace(law, form=replace(law.form, free=free))
 
-    assert entry_of(replace(found, ground=replace(found.ground, candidates={A: replace(one, laws=(law,))})))[
-        "amplitude"
-    ]["unit"] == "N/m"
+    found = replace(found, ground=replace(found.ground, candidates={A: replace(one, laws=(law,))}))
+    assert entry_of(found).amplitude.unit == "N/m"
 
 
 @pytest.mark.parametrize(("resolution", "n_inputs"), [(1.0, 0), (0.0, 2), (1.0, 2)])

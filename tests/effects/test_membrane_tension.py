@@ -47,9 +47,7 @@ def test_against_the_generator(tension, is_sheared):
 )
 def test_sizes_on_the_papers_clamped_board(axis, sizes):
     """physics.md 6: 500 N/m, printed as whole cents."""
-    assert shifts(FIEMME, [MembraneTension(MADE, axis)], {N: 500.0}, BEAMS["clamped"]) == pytest.approx(
-        sizes, abs=0.6
-    )
+    assert shifts(FIEMME, [MembraneTension(MADE, axis)], {N: 500.0}, BEAMS["clamped"]) == pytest.approx(sizes, abs=0.6)
 
 
 def test_acts_between_held_edges_only():

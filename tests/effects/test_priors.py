@@ -12,12 +12,12 @@ from dataclasses import replace
 from math import inf, log, pi
 
 import pytest
-from bayesplate.diagnosis.forms import forms
 from effect_plates import SETUP, setup_of
 from generator.known_boards import FIEMME, FREE
 from made_boards import board_of
 
 from bayesplate.cards import read_board_text
+from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.board import board_from_card
 from bayesplate.plate.setup import AttachedItem

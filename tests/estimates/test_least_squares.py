@@ -10,6 +10,7 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
 from scipy.optimize import least_squares
 
+from bayesplate.estimates import least_squares as module
 from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
 from bayesplate.plate.material import moduli
 from bayesplate.quantities import Quantity
@@ -83,6 +84,20 @@ def test_a_reading_s_own_uncertainty_weighs_it():
 )
 def test_steps_end_where_they_do_not_count_or_are_rounding(step, previous, settled):
     assert has_settled(step, previous) is settled
+
+
+@pytest.mark.parametrize("steps", [1, 2, 40])
+def test_an_estimate_is_where_its_models_were_solved_settled_or_not(monkeypatch, steps):
+    monkeypatch.setattr(module, "_MOST_STEPS", steps)
+    board = prepare("finnish-spruce-cantilever").board
+    estimate = weighted_least_squares(board)
+    assert estimate.converged == (steps == 40)
+    assert [float(estimate.values[name]) for name in ("D_x", "D_y", "D_s")] == estimate.rigidities.tolist()
+    (model,) = models_at(board, estimate.rigidities)
+    assert estimate.sensitivities == pytest.approx(model.sensitivities(estimate.values), abs=1e-12)
+    predicted = model.log_frequencies(estimate.values, "linear")[0]
+    # solved again at the same point; one step further would be off by a thousandth and more
+    assert estimate.residuals == pytest.approx(log_measured(board) - predicted, abs=1e-12)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.cards import card_names, read_board_text
+from bayesplate.cards import card_names, load_named, read_board_text
 from bayesplate.labels import Label
 from bayesplate.plate.board import board_from_card, made_board
 from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup
@@ -35,7 +35,8 @@ def assert_same(one, other):
 
 
 def again(board):
-    return board_from_card(read_board_text(card_text(board), board.name))
+    card = read_board_text(card_text(board), board.name)
+    return board_from_card(card, tables=load_named(card).tables)
 
 
 def comparable(board):

@@ -8,18 +8,22 @@ import numpy as np
 import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, NARROW, board_of, setup_of, with_noise
-from scipy import stats
+from scipy import optimize, stats
 
 from bayesplate.cards import load_prior
-from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
+from bayesplate.estimates.leave_one_out import prediction_errors
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
+from bayesplate.estimates.refit import normal_misfit
 from bayesplate.frequencies.laws import cents
+from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.plate.material import MODULI, moduli
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer, pose
 from bayesplate.posterior.mode_errors import mode_errors
+from bayesplate.posterior.region import predictor
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -28,7 +32,7 @@ PAPER = {
     "finnish": ((13.05e9, 0.674e9, 0.606e9), (18.1, 38.2)),
     "fiemme": ((10.42e9, 0.994e9, 0.530e9), (15.6, 35.4)),
 }
-"""E_x, E_y, G_xy by relative weighted least squares; rms in sample and left out, cents (physics.md 5)."""
+"""E_x, E_y, G_xy by least squares of relative errors, all alike; rms in sample and left out, cents (physics.md 5)."""
 
 QUICK = {"n_ensembles": 2, "n_walkers": 24, "chunk_steps": 100}
 QUICK_ESS = 1000.0
@@ -42,24 +46,133 @@ def board(request):
     return request.getfixturevalue(request.param), *PAPER[request.param]
 
 
-def test_least_squares_and_errors_of_the_paper_boards(board):
+def moduli_of(estimate):
+    return np.stack(moduli(*estimate.rigidities, estimate.values["thickness"], estimate.values["poisson_xy"]))
+
+
+def rms(errors):
+    return np.sqrt(np.mean(cents(errors) ** 2))
+
+
+def test_least_squares_and_errors_of_the_paper_boards_read_without_rounding(board):
+    """All readings then weigh alike, and errors are normal: the estimator whose numbers were worked out before."""
     fit, constants, (in_sample, left_out) = board
+    (setup,) = fit.inference.problem.board.setups
+    exactly_read = replace(fit.inference.problem.board, setups=(replace(setup, resolution=0.0),))
+    problem = pose(exactly_read, load_prior("weakly-informative"))
+    assert moduli_of(problem.estimate) == pytest.approx(constants, rel=0.005)
+    predict = predictor(exactly_read, problem.posterior.models, "exact", problem.centre)
+    target = log_measured(exactly_read)
+    misfit = normal_misfit(target, problem.estimate.scales)
+    errors = prediction_errors(predict, target, misfit, problem.centre[None, problem.parameters.fitted_columns])
+    assert rms(errors.in_sample) == pytest.approx(in_sample, abs=ROUNDING)
+    assert rms(errors.left_out) == pytest.approx(left_out, abs=ROUNDING)
+
+
+N_POLYNOMIALS = 12
+"""Of the independent solver: within 0.03 cents of 20 of them for these modes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A board of one setup without the package's solver: readings, half a rounding step, and ln f from ln D.
+
+    A label stands for a rank among the modes of one symmetry, which is found at the start.
+    """
+
+    hertz: np.ndarray
+    half: float
+    bare: ritz.Ritz
+    stiffness: np.ndarray
+    start: np.ndarray
+    ranks: list
+
+    @classmethod
+    def of(cls, board, start):
+        (setup,) = board.setups
+        values = {name: float(value) for name, value in board.nominal().items()}
+        L_x, L_y = (float(length) for length in vibrating_lengths(board.nominal(), setup))
+        size = (values["poisson_xy"], float(density(board.nominal())), values["thickness"], L_x, L_y, setup.edges)
+        each = [ritz.Ritz(ritz.Plate(*unit, *size), N_POLYNOMIALS) for unit in np.eye(3)]
+        stiffness = np.stack([one.stiffness for one in each])
+        modes = ritz.solve(each[0], np.tensordot(np.exp(start), stiffness, axes=1))
+        classes, names = cls.symmetries(modes), [beams for beams, _ in modes.names()]
+        places = [names.index(reading.beams) for reading in setup.readings]
+        ranks = [(classes[place], classes[:place].count(classes[place])) for place in places]
+        return cls(setup.measured, setup.resolution / 2, each[0], stiffness, start, ranks)
+
+    @staticmethod
+    def symmetries(modes):
+        """Of the lowest modes: odd or even along each side with like ends, None along the others."""
+        shares = modes.shapes[: ritz.N_NAMED] ** 2
+        odd = [shares[:, 1::2].sum(axis=(1, 2)) > 0.5, shares[:, :, 1::2].sum(axis=(1, 2)) > 0.5]
+        alike = [side.ends[0] == side.ends[1] for side in modes.sides]
+        return [tuple(bool(o[k]) if a else None for o, a in zip(odd, alike, strict=True)) for k in range(len(shares))]
+
+    def log_frequencies(self, x):
+        modes = ritz.solve(self.bare, np.tensordot(np.exp(x), self.stiffness, axes=1))
+        classes = self.symmetries(modes)
+        places = [[k for k, one in enumerate(classes) if one == wanted][rank] for wanted, rank in self.ranks]
+        return np.log(modes.frequencies[places])
+
+    def lowest(self, loss):
+        """Where a loss of ln f is lowest, by a general minimiser."""
+
+        # in hundredths, some standard errors of ln D, so that no first step leaps far
+        def scaled(u):
+            return loss(self.log_frequencies(self.start + 0.01 * u))
+
+        def slope(u):
+            return np.array([scaled(u + step) - scaled(u - step) for step in 0.01 * np.eye(3)]) / 0.02
+
+        found = optimize.minimize(scaled, np.zeros(3), jac=slope, options={"gtol": 1e-5})
+        return self.start + 0.01 * found.x
+
+    def weighted_squares(self, noise):
+        variances = noise**2 + (2 * self.half / self.hertz) ** 2 / 12
+        return lambda log_f: 0.5 * np.sum((np.log(self.hertz) - log_f) ** 2 / variances)
+
+    def improbability(self, noise, left_out=None):
+        def loss(log_f):
+            low, high = ((np.log(self.hertz + end) - log_f) / noise for end in (-self.half, self.half))
+            each = np.log(stats.norm.cdf(high) - stats.norm.cdf(low))
+            return -each.sum() + (0.0 if left_out is None else each[left_out])
+
+        return loss
+
+
+def test_weights_and_errors_of_the_paper_boards_know_the_rounding(board):
+    """Against another solver and a general minimiser: squares over all variances, and probabilities of intervals."""
+    fit, constants, printed = board
+    card = fit.inference.problem.board
+    bench = Bench.of(card, np.log(fit.inference.problem.estimate.rigidities) + np.array([0.02, -0.02, 0.02]))
+    h, nu_xy = (float(card.nominal()[name]) for name in ("thickness", "poisson_xy"))
+
+    weighted = np.stack(moduli(*np.exp(bench.lowest(bench.weighted_squares(card.setups[0].noise.median))), h, nu_xy))
     found = [fit.summary.weighted_least_squares[name] for name in MODULI]
-    assert found == pytest.approx(constants, rel=0.005)
+    # the solvers differ by 1e-5, which the least known constant magnifies
+    assert found == pytest.approx(weighted, rel=1e-3)
+    assert found != pytest.approx(constants, rel=2e-3)  # control: all readings alike
+
+    (noise,) = (one.q50 for one in fit.summary.noise.values())
+
+    def missed(left_out=None):
+        return np.log(bench.hertz) - bench.log_frequencies(bench.lowest(bench.improbability(noise, left_out)))
+
     errors = mode_errors(fit.inference, fit.draws)
-    rms = [np.sqrt(np.mean(cents(one) ** 2)) for one in (errors.in_sample, errors.left_out)]
-    assert rms == pytest.approx([in_sample, left_out], abs=ROUNDING)
-    assert fit.summary.error.leave_one_out_rms_cents == pytest.approx(rms[1], rel=1e-12)
-    # one estimator: a reading that is left out is missed on the same side, and by more
-    assert np.all(np.sign(errors.left_out) == np.sign(errors.in_sample))
-    assert np.all(np.abs(errors.left_out) > np.abs(errors.in_sample))
+    assert rms(errors.in_sample) == pytest.approx(rms(missed()), abs=ROUNDING)
+    left_out = rms(np.array([missed(mode)[mode] for mode in range(bench.hertz.size)]))
+    error = fit.summary.error
+    assert error.leave_one_out_rms_cents == pytest.approx(left_out, abs=ROUNDING)
+    assert abs(error.leave_one_out_rms_cents - printed[1]) > 5 * ROUNDING  # control: without the rounding
 
 
 def test_posterior_medians_lie_within_a_standard_deviation_of_least_squares(board):
-    fit, *_ = board
-    for name in MODULI:
+    """All readings alike, as the numbers were worked out before."""
+    fit, constants, _ = board
+    for name, value in zip(MODULI, constants, strict=True):
         spread = fit.summary.elastic[name]
-        assert abs(spread.q50 - fit.summary.weighted_least_squares[name]) < spread.sd
+        assert abs(spread.q50 - value) < spread.sd
 
 
 def test_the_two_laws_differ_for_the_cantilever_and_agree_for_the_clamped_board(finnish, fiemme):

@@ -257,9 +257,7 @@ def test_the_same_readings_twice_halve_the_variance(problem):
     board = problem.board
     again = tuple(replace(setup, name=f"{setup.name} again") for setup in board.setups)
     twice = replace(board, setups=(*board.setups, *again))
-    estimate = weighted_least_squares(
-        twice.with_parameters(one for setup in again for one in setup.clamped_parameters)
-    )
+    estimate = weighted_least_squares(twice.with_parameters(one for setup in again for one in setup.clamped_parameters))
     found = identifiability(estimate.sensitivities, estimate.scales)
     assert estimate.rigidities == pytest.approx(problem.estimate.rigidities, rel=EXACT)
     assert 2 * found.covariance == pytest.approx(problem.identifiability.covariance, rel=1e-8)

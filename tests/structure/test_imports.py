@@ -245,8 +245,11 @@ BAD_FILES = [
     ("planning/bad.py", "from scipy import stats", "imports scipy.stats at the top"),
     ("planning/bad.py", "from scipy.stats import norm", "imports scipy.stats at the top"),
     ("results/bad.py", "def f():\n    import pickle", "imports pickle"),
-    ("results/bad.py", "from bayesplate.frequencies.spectrum import NamedMode, spectra", "results takes spectra from "
-     "frequencies"),
+    (
+        "results/bad.py",
+        "from bayesplate.frequencies.spectrum import NamedMode, spectra",
+        "results takes spectra from frequencies",
+    ),
     ("results/bad.py", "from bayesplate.modes.plate import Weights", "results takes Weights from modes"),
     ("results/bad.py", "import bayesplate.modes.solve", "results takes bayesplate.modes.solve from modes"),
     ("results/bad.py", "import numpy as np\nnp.load('x', allow_pickle=True)", "allows pickles"),

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.shifts.baseline import own_variance
 from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.effects.words import effect_names
+from bayesplate.estimates.least_squares import reading_scales
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
@@ -141,8 +141,7 @@ def _with_effects(board: Board, setup: Setup, values: Values) -> Values:
 
 def _judged(sentence: str, board: Board, values: Values, asked: Sequence[Form]) -> Option:
     bare, slopes = _solved(board, values)
-    noise = np.repeat([s.noise.median for s in board.setups], [len(s.readings) for s in board.setups])
-    scales = np.sqrt(noise**2 + own_variance(board))
+    scales = reading_scales(board)
     absorbing = np.linalg.pinv(slopes / scales[:, None]) / scales
     visible = []
     for form in asked:

@@ -18,12 +18,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.least_squares import Estimate, log_measured
+from bayesplate.estimates.least_squares import Estimate, log_measured, reading_scales
 from bayesplate.estimates.refit import design
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.inference import Problem
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.region import predictor
@@ -79,13 +80,12 @@ class Baseline:
     @cached_property
     def own_variance(self) -> Floats:
         """Variance of each reading apart from the noise: its own and that of its rounding, (n_modes,) array."""
-        return own_variance(self.board)
+        return np.concatenate([ReadingErrors.of(setup).own_variance for setup in self.board.setups])
 
     @cached_property
     def scales(self) -> Floats:
         """Relative uncertainty of each reading at the median noise: (n_modes,) array."""
-        noise = np.array([setup.noise.median for setup in self.board.setups])
-        return np.sqrt(noise[self.setup_index] ** 2 + self.own_variance)
+        return reading_scales(self.board)
 
     @cached_property
     def absorbing(self) -> Floats:
@@ -141,13 +141,6 @@ def baseline_at(board: Board, estimate: Estimate) -> Baseline:
         places=places_of(estimate.models),
         symmetry=symmetry_of(estimate.models),
     )
-
-
-def own_variance(board: Board) -> Floats:
-    """Relative variance of each reading apart from the noise: its own or that of its rounding, (n_modes,) array."""
-    own = np.concatenate([setup.relative_sd**2 for setup in board.setups])
-    rounding = np.concatenate([(s.resolution / s.measured) ** 2 / 12.0 for s in board.setups])
-    return np.where(own > 0, own, rounding)
 
 
 def places_of(models: Sequence[SetupModel]) -> tuple[Place, ...]:

@@ -141,9 +141,7 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
     cumulated = np.cumsum(share[order]) - 0.5 * share[order]
     quantiles = np.interp([0.05, 0.5, 0.95], cumulated / share.sum(), z[order])
     low, middle, high = (float(free.prior.value(q)) for q in quantiles)
-    return Amplitude(
-        parameter=free.key, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit
-    )
+    return Amplitude(parameter=free.key, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit)
 
 
 def _fate(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str) -> tuple[Fate, str | None]:
