@@ -91,8 +91,8 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     board : Board
     prior : PriorCard
     law : "linear" or "exact", optional
-        By default the linear law where its error over the normal approximation of the posterior stays, for every mode,
-        below a quarter of the expected noise.
+        By default the linear law where its error over the normal approximation of the posterior, widened because the
+        noise is not known, stays below a quarter of the expected noise for every mode.
     robust : bool
         Student's distribution for the noise.
 
@@ -118,6 +118,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     require_identifiable(board, _identifiable_at(board, region, estimate))
     if law is None:
         draws = np.random.default_rng(0).multivariate_normal(region.centre, region.covariance, _N_CHECKS)
+        draws[:, :N_RIGIDITIES] += (_widening(board) - 1.0) * (draws - region.centre)[:, :N_RIGIDITIES]
         parameters, columns = Parameters(board), Parameters(board).fitted_columns
         limits = parameters.fitted_bounds
         draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
@@ -127,6 +128,16 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     require_reachable(posterior, region.centre, region.covariance)
     require_possible_noise(posterior, region.centre)
     return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance)
+
+
+def _widening(board: Board) -> float:
+    """How much wider the constants spread because the noise is not known: root mean square of noise over its median.
+
+    The prior of ln noise and two for each reading to spare add up to its precision.
+    """
+    spare = max(sum(len(setup.readings) for setup in board.setups) - N_RIGIDITIES, 0)
+    log_sd = max(setup.noise.log_sd for setup in board.setups)
+    return float(np.exp(1.0 / (1.0 / log_sd**2 + 2.0 * spare)))
 
 
 def _identifiable_at(board: Board, region: Region, estimate: Estimate) -> Identifiability:

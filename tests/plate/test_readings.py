@@ -206,7 +206,7 @@ def test_squares_of_deviance_residuals_are_twice_the_loss_of_log_likelihood(reso
     errors = errors_of(52.0, Quantity.from_mean(52.0, 0.1), resolution=resolution, robust=robust)
     middle = np.array([0.5 * (errors.log_low + errors.log_high)[0], np.log(52.0)])
     scale = np.array([max(noise, resolution / 104.0), 0.01])
-    offsets = np.r_[-30.0, -3.0, -1.0, -0.3, -1e-3, -1e-5, -1e-9, 0.0, 1e-9, 1e-5, 1e-3, 0.3, 1.0, 3.0, 30.0]
+    offsets = np.array([-30.0, -3.0, -1.0, -0.3, -0.03, -1e-3, -1e-5, -1e-9, 0.0, 1e-9, 1e-5, 1e-3, 0.03, 1.0, 30.0])
     predicted = middle + scale * offsets[:, None]
     residuals, slopes = errors.deviance_residuals(predicted, noise)
     log_p = errors.log_likelihood(predicted, noise)

@@ -92,12 +92,6 @@ class Baseline:
         """The matrix that takes a shift of the frequencies to the constants that absorb it best: (3, n_modes) array."""
         return np.asarray(np.linalg.pinv(self.slopes / self.scales[:, None]) / self.scales)
 
-    @cached_property
-    def evenly_absorbing(self) -> Floats:
-        """The same if all readings of a setup count alike, rounded or not: (3, n_modes) array."""
-        noise = np.array([setup.noise.median for setup in self.board.setups])[self.setup_index]
-        return np.asarray(np.linalg.pinv(self.slopes / noise[:, None]) / noise)
-
     def whitened(self, shift: Floats) -> Floats:
         """What constants leave of a shift, in units of each reading's uncertainty: (n_modes,) arrays."""
         return np.asarray((shift - self.slopes @ (self.absorbing @ shift)) / self.scales)

@@ -139,7 +139,7 @@ def nothing(n_modes: int) -> Table:
     )
 
 
-def refitted(baseline: Baseline, law: FormLaw, z: Floats, absorbing: Floats | None = None) -> tuple[Floats, Floats]:
+def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
     """Shifts with the constants refitted to the baseline, and what the refit changed.
 
     Parameters
@@ -148,8 +148,6 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats, absorbing: Floats | No
     law : FormLaw
     z : (n, n_parameters) array
         Standard coordinates.
-    absorbing : (3, n_modes) array, optional
-        How the constants absorb a shift; by default with each reading's weight.
 
     Returns
     -------
@@ -158,7 +156,6 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats, absorbing: Floats | No
     moved : (n, 3) array
     """
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
-    absorbing = baseline.absorbing if absorbing is None else absorbing
     moved = np.zeros((len(z), N_RIGIDITIES))
     shift = np.empty((len(z), baseline.n_modes))
     moving = np.arange(len(z))
@@ -166,7 +163,7 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats, absorbing: Floats | No
         there = {name: value[moving] for name, value in values.items()}
         at = baseline.log_rigidities + moved[moving]
         shift[moving] = law.log_frequencies(baseline, at, there) - baseline.log_frequency
-        step = -np.nan_to_num(shift[moving]) @ absorbing.T
+        step = -np.nan_to_num(shift[moving]) @ baseline.absorbing.T
         longest = np.abs(step).max(axis=1)
         moving, step, longest = (each[longest > _SETTLED] for each in (moving, step, longest))
         if not moving.size or n_done == _REFITS - 1:
@@ -180,7 +177,7 @@ def nominal_shift(baseline: Baseline, law: FormLaw) -> tuple[Floats, Floats, Flo
     z = np.array([[float(free.prior.standard(free.nominal)) for free in law.form.free]])
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
     raw = law.log_frequencies(baseline, baseline.log_rigidities[None, :], values)[0] - baseline.log_frequency
-    visible, moved = refitted(baseline, law, z, baseline.evenly_absorbing)
+    visible, moved = refitted(baseline, law, z)
     return raw, visible[0], moved[0]
 
 
