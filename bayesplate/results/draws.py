@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.plate.board import density
 from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
-from bayesplate.posterior.inference import Inference, linear_suffices
+from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.region import linearisation_errors
+from bayesplate.posterior.target import linear_suffices
 from bayesplate.results.archive import thin_walker_major
 
 Floats = NDArray[np.float64]
