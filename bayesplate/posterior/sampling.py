@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -189,8 +189,6 @@ def sample(
             chunk_steps=settings.chunk_steps,
         )
     )
-    # Ends of walks may all be accepted; only single steps that always are say that they are too short.
-    gate = settings.gate if cheap is None else replace(settings.gate, acceptance_max=1.0)
     with session as saved:
         chunks = list(saved)
         if not chunks:
@@ -209,7 +207,7 @@ def sample(
             at_end = n_steps >= settings.max_steps
             if at_end or _gate_is_due(n_steps, settings.chunk_steps):
                 chains = _joined(chunks, is_corrected=cheap is not None)
-                convergence = assess(chains.kept, gate, names=names)
+                convergence = assess(chains.kept, settings.gate, names=names)
             if progress is not None and chunks:
                 progress(Progress(n_steps, settings.max_steps, convergence))
             if convergence is not None and (at_end or convergence.passed):

@@ -30,8 +30,8 @@ _REACH = 5.0
 """Standard deviations of the points beyond which the polynomial goes on level: it knows nothing there."""
 _POINTS_PER_TERM = 3
 _MOST_TERMS = 400
-_FEWEST_POINTS = 256
-_MOST_ROUNDS = 8
+_FEWEST_POINTS = 512
+_FEWEST_ROUNDS, _MOST_ROUNDS = 3, 8
 _TEMPERATURE, _LOWEST = 4.0, -40.0
 _FAR = 15.0
 """Points whose log density is lower than the highest by this and the number of parameters are no part of the posterior:
@@ -173,7 +173,7 @@ def find_surrogate(
     theta = rng.multivariate_normal(centre, _WIDER**2 * covariance, n_points)
     theta[:, columns] = np.clip(theta[:, columns], bounds.lower, bounds.upper)
     points, found = _solved(posterior, coordinates, theta), None
-    for _ in range(_MOST_ROUNDS):
+    for n_rounds in range(1, _MOST_ROUNDS + 1):
         degree = highest_degree if n_of[highest_degree] <= len(points.theta) else 2
         surrogate = Surrogate.fitted(points, columns, degree)
         last = points.theta[-n_points:]
@@ -183,7 +183,7 @@ def find_surrogate(
         errors = cents(surrogate.log_frequencies(held_out.theta) - held_out.log_frequency)
         if 2 * len(errors) > len(walked.theta) and serves(posterior, errors):
             found = replace(surrogate, errors=errors)
-            if degree == highest_degree:
+            if degree == highest_degree and n_rounds >= _FEWEST_ROUNDS:
                 return found
         points = Solved(*(np.concatenate(parts) for parts in zip(points, walked, strict=True)))
     return found

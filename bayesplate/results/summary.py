@@ -135,6 +135,7 @@ def summarise(
             "leave_one_out_rms_cents": _rms(cents(errors.left_out)),
             "linearisation_rms_cents": _rms(linear_errors),
             "exact_law_worst_cents": worst_cents(problem.posterior.models),
+            **_surrogate_errors(inference, draws),
         },
         "sampler": sampler_health(inference.chains, inference.convergence),
         "identifiability": [*remarks(board, problem.identifiability), *input_remarks(draws)],
@@ -254,3 +255,12 @@ def _warnings(
 def _rms(values: NDArray[np.float64] | Sequence[float]) -> float | None:
     finite = np.asarray(values)[np.isfinite(values)]
     return float(np.sqrt(np.mean(finite**2))) if finite.size else None
+
+
+def _surrogate_errors(inference: Inference, draws: Draws) -> Summary:
+    """Surrogate less exact law over the posterior, where the walkers walked on one."""
+    if inference.surrogate is None:
+        return {"surrogate_rms_cents": None, "surrogate_worst_cents": None}
+    exact = draws.log_frequency.reshape(len(draws.flat), -1)
+    errors = cents(inference.surrogate.log_frequencies(draws.flat) - exact)
+    return {"surrogate_rms_cents": _rms(errors), "surrogate_worst_cents": float(np.nanmax(np.abs(errors)))}
