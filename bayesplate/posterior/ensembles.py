@@ -14,7 +14,8 @@ from itertools import cycle, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.posterior.moves import ORDER, CorrectedSteps, Generators, Steps, walk_order
+from bayesplate.posterior.checkpoint import Chunk
+from bayesplate.posterior.moves import ORDERS, CorrectedSteps, Generators, Steps, order_for, walk_order
 from bayesplate.posterior.proposals import Proposal
 from bayesplate.posterior.starting import LogPosterior
 
@@ -33,16 +34,19 @@ class Learnt:
         Common to all ensembles.
     archives : (n_ensembles, n_archived, n_dim) array
         Each ensemble's own.
+    order : str
+        Of independent and differential steps.
     """
 
     proposal: Proposal
     archives: FloatArray
+    order: str = ORDERS[0][1]
 
     @classmethod
     def of(
-        cls, warm_up: Sequence[FloatArray], centre: FloatArray, covariance: FloatArray, rngs: Generators, n_chunks: int
+        cls, warm_up: Sequence[Chunk], centre: FloatArray, covariance: FloatArray, rngs: Generators, n_chunks: int
     ) -> Learnt:
-        """From the (n_ensembles, n_steps, n_walkers, n_dim) draws of each chunk of the warm-up so far.
+        """From the chunks of the warm-up so far.
 
         Before the first chunk there is the estimate alone; on the way each chunk teaches the next; the whole second
         half of the warm-up, of `n_chunks` chunks, teaches all that is kept.
@@ -50,20 +54,20 @@ class Learnt:
         if not warm_up:
             proposal = Proposal.with_covariance(centre, covariance)
             return cls(proposal, np.stack([proposal.points(_N_ARCHIVED, rng) for rng in rngs]))
-        if len(warm_up) < n_chunks:
-            proposal, late = Proposal.one_fitted(warm_up[-1]), warm_up[-1]
-        else:
-            late = np.concatenate(warm_up[n_chunks // 2 :], axis=1)
-            proposal = Proposal.fitted(late)
-        flat = late.reshape(len(late), -1, late.shape[-1])
-        return cls(proposal, flat[:, :: max(1, flat.shape[1] // _N_ARCHIVED)])
+        late = warm_up[-1:] if len(warm_up) < n_chunks else warm_up[n_chunks // 2 :]
+        draws = np.concatenate([chunk.draws for chunk in late], axis=1)
+        log_prob = np.concatenate([chunk.log_prob for chunk in late], axis=1)
+        proposal = Proposal.one_fitted(draws) if len(warm_up) < n_chunks else Proposal.fitted(draws)
+        flat = draws.reshape(len(draws), -1, draws.shape[-1])
+        archives = flat[:, :: max(1, flat.shape[1] // _N_ARCHIVED)]
+        return cls(proposal, archives, order_for((log_prob - proposal.log_density(draws)).ravel()))
 
 
 def stepping(
     density: LogPosterior, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators
 ) -> Steps:
     """The steps of a chunk under one density."""
-    order = "".join(islice(cycle(ORDER), n_steps))
+    order = "".join(islice(cycle(learnt.order), n_steps))
     return Steps(density, learnt.proposal, learnt.archives, order, n_walkers, rngs)
 
 
@@ -71,7 +75,7 @@ def correcting(
     surrogate: LogPosterior, density: LogPosterior, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators
 ) -> CorrectedSteps:
     """The steps of a chunk under a density whose surrogate the walkers walk on."""
-    walk = walk_order(learnt.archives.shape[-1])
+    walk = walk_order(learnt.order, learnt.archives.shape[-1])
     walks = Steps(surrogate, learnt.proposal, learnt.archives, walk * n_steps, n_walkers, rngs, len(walk))
     return CorrectedSteps(walks, density, n_steps, rngs)
 

@@ -34,6 +34,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from bayesplate.posterior.proposals import Proposal
 from bayesplate.posterior.starting import LogPosterior
@@ -41,20 +42,34 @@ from bayesplate.posterior.starting import LogPosterior
 FloatArray = NDArray[np.float64]
 Generators = Sequence[np.random.Generator]
 
-ORDER = "IIID"
-"""Of the steps: three independent ones, which are cheap, and a differential one."""
-_STRIDE, _LAST = "IID", "II"
+ORDERS = ((0.3, "IIID"), (0.15, "ID"), (0.0, "IDDD"))
+"""Of the steps, by the acceptance that independent ones will have: where it is good they are most of them, for they
+are cheap and forget everything; where it is poor, as with twenty parameters and more, differential ones must do it."""
 DIRECT_EVERY = 8
 """Every so many steps one is an independent one under the density itself, so that places which the surrogate does not
 know, where it has next to no probability, are entered and left at their right rate."""
 
 
-def walk_order(n_dim: int) -> str:
+def order_for(log_ratios: FloatArray) -> str:
+    """Order of the steps, one letter each, repeated as long as wanted.
+
+    Parameters
+    ----------
+    log_ratios : (n_draws,) array
+        ln of the density less that of the proposal, at draws of the density. If they are normal with the variance v,
+        independent proposals are accepted with the probability 2 Phi(-sqrt(v / 2)).
+    """
+    acceptance = 2.0 * ndtr(-np.sqrt(0.5 * np.var(log_ratios)))
+    return next((order for least, order in ORDERS if acceptance >= least), ORDERS[-1][1])
+
+
+def walk_order(order: str, n_dim: int) -> str:
     """Order of the updates of one walk under a surrogate, longer where there are more parameters to forget.
 
     The same backwards: only then may the end of a walk be corrected as it is.
     """
-    return _STRIDE * max(2, n_dim // 2) + _LAST
+    there = order * max(1, round(n_dim / 5))
+    return there + there[::-1]
 
 
 def differences(archive: FloatArray, n_differences: int, rng: np.random.Generator) -> FloatArray:

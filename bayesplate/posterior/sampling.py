@@ -216,8 +216,7 @@ def sample(
                 coords, log_prob = chunks[-1].draws[:, -1], chunks[-1].log_prob[:, -1]
             rngs = [random_numbers(settings.seed, i, len(chunks)) for i in range(settings.n_ensembles)]
             if learnt is None or len(chunks) <= WARM_UP_CHUNKS:
-                warm_up = [chunk.draws for chunk in chunks[:WARM_UP_CHUNKS]]
-                learnt = Learnt.of(warm_up, centre, covariance, rngs, WARM_UP_CHUNKS)
+                learnt = Learnt.of(chunks[:WARM_UP_CHUNKS], centre, covariance, rngs, WARM_UP_CHUNKS)
             supply = (learnt, settings.chunk_steps, n_walkers, rngs)
             move: Steps | CorrectedSteps
             if cheap is None:

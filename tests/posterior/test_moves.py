@@ -7,9 +7,10 @@ import pytest
 from scipy import stats
 from statistics_checks import differences_from_normal
 
+from bayesplate.posterior.checkpoint import Chunk
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.ensembles import Learnt, advance, correcting, stepping
-from bayesplate.posterior.moves import CorrectedSteps, differences, walk_order
+from bayesplate.posterior.moves import ORDERS, CorrectedSteps, differences, order_for, walk_order
 from bayesplate.posterior.proposals import DEGREES_OF_FREEDOM, N_PARTS, Proposal
 from bayesplate.posterior.sampling import SamplerSettings, sample
 from bayesplate.posterior.starting import random_numbers
@@ -90,16 +91,23 @@ def test_differences_of_an_archive_are_as_probable_as_their_opposites():
 
 @pytest.mark.parametrize("n_dim", [2, 5, 12])
 def test_a_walk_reads_the_same_backwards(n_dim):
-    order = walk_order(n_dim)
-    assert order == order[::-1]
-    assert set(order) == {"I", "D"}
+    for _, order in ORDERS:
+        walk = walk_order(order, n_dim)
+        assert walk == walk[::-1]
+        assert set(walk) == {"I", "D"}
+
+
+@pytest.mark.parametrize(("sd", "order"), [(0.5, "IIID"), (1.4, "IIID"), (1.6, "ID"), (2.1, "IDDD")])
+def test_the_worse_the_proposal_the_fewer_steps_are_independent(sd, order):
+    """Acceptance 2 Phi(-sd / sqrt 2): 0.72, 0.32, 0.26, 0.14."""
+    assert order_for(sd * np.random.default_rng(0).standard_normal(10_000)) == order
 
 
 def moves_of(which, ensembles):
     """The moves of some of four ensembles, from their own random numbers and archives."""
     draws = np.random.default_rng(0).multivariate_normal(MEAN, COVARIANCE, (N_ENSEMBLES, 20, N_WALKERS))
     rngs = [random_numbers(7, i, 2) for i in ensembles]
-    whole = Learnt.of([draws], MEAN, COVARIANCE, rngs, 1)
+    whole = Learnt.of([Chunk(draws, log_density(draws))], MEAN, COVARIANCE, rngs, 1)
     learnt = Learnt(whole.proposal, whole.archives[ensembles])
     if which == "plain":
         return stepping(log_density, learnt, N_STEPS, N_WALKERS, rngs), draws[ensembles, -1]
