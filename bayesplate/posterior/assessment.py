@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.identifiability import identifiability
-from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.spectrum import NamedMode, doubtful_labels, sign_conflicts, spectra
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.draws import Draws, posterior_mean_values
@@ -39,6 +39,8 @@ class Assessment:
         Whether these stay below their share of the posterior's own noise.
     exact_worst : float, cents
         Largest error of the exact law against full solves.
+    surrogate_errors : (n_draws, n_modes) array, cents
+        Surrogate of the exact law less that law over the posterior; without draws where the walkers walked on none.
     means : dict of (dict of float, float)
         By law: posterior means of E_x ... D_s, and how many draws of equal weight they rest on.
     named : dict of tuple of NamedMode
@@ -52,6 +54,7 @@ class Assessment:
     linear_errors: Floats
     linear_is_enough: bool
     exact_worst: float
+    surrogate_errors: Floats
     means: Mapping[LawName, tuple[Mapping[str, float], float]]
     named: Mapping[str, tuple[NamedMode, ...]]
     doubts: tuple[str, ...]
@@ -85,7 +88,16 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
         linear_errors=errors,
         linear_is_enough=linear_is_enough(inference, draws, errors),
         exact_worst=worst_cents(models),
+        surrogate_errors=_surrogate_errors(inference, draws),
         means={law: means_under(inference, draws, law, errors) for law in get_args(LawName)},
         named={setup: named for setup, (_, named) in found.items()},
         doubts=(*doubtful_labels(models), *conflicts),
     )
+
+
+def _surrogate_errors(inference: Inference, draws: Draws) -> Floats:
+    n_modes = draws.log_frequency.shape[-1]
+    if inference.surrogate is None:
+        return np.empty((0, n_modes))
+    exact = draws.log_frequency.reshape(-1, n_modes)
+    return np.asarray(cents(inference.surrogate.log_frequencies(draws.flat) - exact))

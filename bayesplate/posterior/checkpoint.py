@@ -26,28 +26,21 @@ from bayesplate.errors import CheckpointError
 
 FloatArray = NDArray[np.float64]
 
-FORMAT = 2  # to be raised whenever the same seed would give other draws, so that two programs never share one run
-RANDOM_WORDS = 626  # 624 words of the Mersenne twister, its position, and whether a normal deviate is kept back
+FORMAT = 3  # to be raised whenever the same seed would give other draws, so that two programs never share one run
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Some steps of all ensembles, and what is needed to continue after them.
+    """Some steps of all ensembles; the walkers go on from the last of them.
 
     Attributes
     ----------
     draws : (n_ensembles, n_steps, n_walkers, n_dim) array
     log_prob : (n_ensembles, n_steps, n_walkers) array
-    random_words : (n_ensembles, 626) array of uint32
-        Random state after the last step: key, position, and 1 if a normal deviate is kept back.
-    random_cached : (n_ensembles,) array
-        That deviate.
     """
 
     draws: FloatArray
     log_prob: FloatArray
-    random_words: NDArray[np.uint32]
-    random_cached: FloatArray
 
 
 class Checkpoint:
@@ -269,8 +262,6 @@ def _read_chunk(path: Path, identity: Mapping[str, int]) -> tuple[Chunk | None, 
     shapes = {
         "draws": (n_ensembles, n_steps, n_walkers, n_dim),
         "log_prob": (n_ensembles, n_steps, n_walkers),
-        "random_words": (n_ensembles, RANDOM_WORDS),
-        "random_cached": (n_ensembles,),
     }
     try:
         content = path.read_bytes()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from bayesplate.estimates.identifiability import (
     require_labels,
 )
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
-from bayesplate.frequencies.laws import LawName, cents
+from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
@@ -26,11 +26,9 @@ from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.region import Region, find_region, linearisation_errors
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
+from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
-from bayesplate.posterior.target import Posterior
-
-LINEAR_SHARE = 0.25
-"""The linear law serves while its error over the posterior stays below this share of the noise."""
+from bayesplate.posterior.target import Posterior, linear_suffices
 
 _N_CHECKS = 256
 
@@ -49,6 +47,8 @@ class Problem:
         Its models hold both laws.
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
         Normal approximation of the posterior, for the starts.
+    is_forced : bool
+        Whether the law was asked for: then no surrogate stands for it between its evaluations.
     """
 
     board: Board
@@ -58,6 +58,7 @@ class Problem:
     posterior: Posterior
     centre: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    is_forced: bool = False
 
     @property
     def parameters(self) -> Parameters:
@@ -71,11 +72,21 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Inference:
-    """Draws of a problem and the verdict of the convergence gate."""
+    """Draws of a problem and the verdict of the convergence gate.
+
+    Attributes
+    ----------
+    problem : Problem
+    chains : Chains
+    convergence : Convergence
+    surrogate : Surrogate or None
+        What the walkers walked on between two evaluations of the exact law.
+    """
 
     problem: Problem
     chains: Chains
     convergence: Convergence
+    surrogate: Surrogate | None = None
 
 
 def replace_law(posterior: Posterior, law: LawName) -> Posterior:
@@ -116,6 +127,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     require_identifiable(board, found)
     region = find_region(board, estimate)
     require_identifiable(board, _identifiable_at(board, region, estimate))
+    is_forced = law is not None
     if law is None:
         draws = np.random.default_rng(0).multivariate_normal(region.centre, region.covariance, _N_CHECKS)
         draws[:, :N_RIGIDITIES] += (_widening(board) - 1.0) * (draws - region.centre)[:, :N_RIGIDITIES]
@@ -127,7 +139,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     posterior = Posterior(board, prior, region.models, law, robust)
     require_reachable(posterior, region.centre, region.covariance)
     require_possible_noise(posterior, region.centre)
-    return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance)
+    return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance, is_forced)
 
 
 def _widening(board: Board) -> float:
@@ -145,26 +157,6 @@ def _identifiable_at(board: Board, region: Region, estimate: Estimate) -> Identi
     values = Parameters(board).values(region.centre[None, :])
     there = {name: np.ravel(value)[0] for name, value in values.items()}
     return identifiability(np.concatenate([m.sensitivities(there) for m in region.models]), estimate.scales)
-
-
-def linear_suffices(board: Board, errors: NDArray[np.float64], noise: Sequence[float]) -> bool:
-    """Whether linearisation errors stay below a quarter of the noise for every mode, rms over draws.
-
-    Parameters
-    ----------
-    board : Board
-    errors : (n_draws, n_modes) array, cents
-    noise : sequence of float
-        Relative, one a setup.
-    """
-    limit = LINEAR_SHARE * cents(
-        np.concatenate([np.full(len(s.readings), n) for s, n in zip(board.setups, noise, strict=True)])
-    )
-    finite = np.isfinite(errors).all(axis=1)
-    if finite.mean() < 0.5:
-        return False
-    rms = np.sqrt(np.mean(errors[finite] ** 2, axis=0))
-    return bool(np.all(rms < limit))
 
 
 def infer(
@@ -191,15 +183,20 @@ def infer(
     coordinates = TailCoordinates.around(
         problem.centre, problem.covariance, range(N_RIGIDITIES), problem.parameters.effect_columns
     )
+    surrogate = None
+    if problem.posterior.law == "exact" and not problem.is_forced:
+        surrogate = find_surrogate(problem.posterior, problem.centre, problem.covariance, coordinates)
+    cheap = None if surrogate is None else coordinates.density(with_surrogate(problem.posterior, surrogate))
     chains, convergence = sample(
         coordinates.density(problem.posterior),
         coordinates.start,
         coordinates.start_covariance(problem.covariance),
         settings,
+        surrogate=cheap,
         names=problem.parameters.names,
         checkpoint=checkpoint,
         progress=progress,
     )
     log_posterior = chains.log_prob - coordinates.log_jacobian(chains.draws)
     theta = Chains(coordinates.theta(chains.draws), log_posterior, chains.burn_in)
-    return Inference(problem, theta, convergence)
+    return Inference(problem, theta, convergence, surrogate)

@@ -1,4 +1,4 @@
-"""Draws from a posterior: four emcee ensembles, in chunks, until the convergence gate passes."""
+"""Draws from a posterior: four emcee ensembles side by side, in chunks, until the convergence gate passes."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.errors import CheckpointError, Fault, InputError
+from bayesplate.errors import Fault, InputError
 from bayesplate.posterior.checkpoint import Checkpoint, Chunk
 from bayesplate.posterior.convergence import Convergence, Gate, acceptance_by_walker, assess, burn_in_steps
-from bayesplate.posterior.moves import Proposal, moves
-from bayesplate.posterior.starting import EnsembleState, GuardedPosterior, LogPosterior, start_ensembles
+from bayesplate.posterior.ensembles import Learnt, advance, correcting, crossed, stepping
+from bayesplate.posterior.moves import CorrectedSteps, Steps
+from bayesplate.posterior.starting import GuardedPosterior, LogPosterior, random_numbers, start_ensembles
 
 FloatArray = NDArray[np.float64]
 
-WARM_UP_CHUNKS = 3
+WARM_UP_CHUNKS = 6
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class SamplerSettings:
     n_ensembles : int
         Independent ensembles, at least two.
     n_walkers : int, optional
-        Walkers of each, even and at least twice the number of parameters; by default four times, and at least 32.
+        Walkers of each, even and at least twice the number of parameters; by default at least 32.
     chunk_steps : int
         Steps between two checkpoints.
     max_steps : int
@@ -43,7 +44,7 @@ class SamplerSettings:
     seed: int
     n_ensembles: int = 4
     n_walkers: int | None = None
-    chunk_steps: int = 100
+    chunk_steps: int = 25
     max_steps: int = 20_000
     gate: Gate = field(default_factory=Gate)
 
@@ -55,7 +56,7 @@ class SamplerSettings:
         InputError
             If the settings cannot be used.
         """
-        n_walkers = max(32, 4 * n_dim) if self.n_walkers is None else self.n_walkers
+        n_walkers = max(32, 2 * n_dim + 2) if self.n_walkers is None else self.n_walkers
         faults = []
         if n_walkers < 2 * n_dim or n_walkers % 2:
             faults.append(Fault("sampler n_walkers", f"an even number of at least {2 * n_dim}", f"{n_walkers}"))
@@ -126,6 +127,7 @@ def sample(
     covariance: FloatArray,
     settings: SamplerSettings,
     *,
+    surrogate: LogPosterior | None = None,
     names: Sequence[str] = (),
     checkpoint: Checkpoint | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -143,6 +145,9 @@ def sample(
     covariance : (n_dim, n_dim) array
         Its covariance; the walkers start three times as wide.
     settings : SamplerSettings
+    surrogate : callable, optional
+        A cheap density near the posterior, on which the walkers then walk between two evaluations of the posterior; it
+        serves alone during the warm-up. The draws that are kept follow the posterior itself (`CorrectedSteps`).
     names : sequence of str, optional
         Parameter names for messages.
     checkpoint : Checkpoint, optional
@@ -170,7 +175,9 @@ def sample(
     centre = np.asarray(centre, dtype=np.float64)
     n_dim = centre.size
     n_walkers = settings.walkers(n_dim)
-    guarded = GuardedPosterior(log_posterior, tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim)))
+    names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
+    guarded = GuardedPosterior(log_posterior, names)
+    cheap = None if surrogate is None else GuardedPosterior(surrogate, names)
     session = (
         nullcontext(())
         if checkpoint is None
@@ -184,80 +191,46 @@ def sample(
     )
     with session as saved:
         chunks = list(saved)
-        if chunks:
-            states = _states_after(chunks[-1])
-        else:
-            states = start_ensembles(
-                guarded,
+        if not chunks:
+            coords, log_prob = start_ensembles(
+                guarded if cheap is None else cheap,
                 centre,
                 covariance,
                 n_ensembles=settings.n_ensembles,
                 n_walkers=n_walkers,
                 seed=settings.seed,
             )
+        learnt = None
         convergence = None
         while True:
             n_steps = len(chunks) * settings.chunk_steps
             at_end = n_steps >= settings.max_steps
             if at_end or _gate_is_due(n_steps, settings.chunk_steps):
-                chains = _joined(chunks)
+                chains = _joined(chunks, is_corrected=cheap is not None)
                 convergence = assess(chains.kept, settings.gate, names=names)
             if progress is not None and chunks:
                 progress(Progress(n_steps, settings.max_steps, convergence))
             if convergence is not None and (at_end or convergence.passed):
                 return chains, convergence
-            chunk = _advance(guarded, states, settings.chunk_steps, _proposal(centre, covariance, chunks))
+            if chunks:
+                coords, log_prob = chunks[-1].draws[:, -1], chunks[-1].log_prob[:, -1]
+            rngs = [random_numbers(settings.seed, i, len(chunks)) for i in range(settings.n_ensembles)]
+            if learnt is None or len(chunks) <= WARM_UP_CHUNKS:
+                learnt = Learnt.of(chunks[:WARM_UP_CHUNKS], centre, covariance, rngs, WARM_UP_CHUNKS)
+            supply = (learnt, settings.chunk_steps, n_walkers, rngs)
+            move: Steps | CorrectedSteps
+            if cheap is None:
+                move = stepping(guarded, *supply)
+            elif len(chunks) < WARM_UP_CHUNKS:
+                move = stepping(cheap, *supply)
+            else:
+                move = correcting(cheap, guarded, *supply)
+                if len(chunks) == WARM_UP_CHUNKS:
+                    coords, log_prob = crossed(guarded, coords)
+            chunk = Chunk(*advance(move, coords, log_prob, settings.chunk_steps))
             if checkpoint is not None:
                 checkpoint.append(chunk)
             chunks.append(chunk)
-            states = _states_after(chunk)
-
-
-def _proposal(centre: FloatArray, covariance: FloatArray, chunks: Sequence[Chunk]) -> Proposal:
-    """What the next chunk proposes from: the estimate, each warm-up chunk in turn, and the last of them ever after."""
-    if not chunks:
-        return Proposal.with_covariance(centre, covariance)
-    return Proposal.fitted(chunks[min(len(chunks), WARM_UP_CHUNKS) - 1].draws)
-
-
-def _advance(guarded: GuardedPosterior, states: list[EnsembleState], n_steps: int, proposal: Proposal) -> Chunk:
-    """Advance every ensemble by one chunk."""
-    import emcee
-
-    n_walkers, n_dim = states[0].coords.shape
-    draws, log_prob, words, cached = [], [], [], []
-    for state in states:
-        sampler = emcee.EnsembleSampler(n_walkers, n_dim, guarded, moves=moves(proposal), vectorize=True)
-        sampler.log_prob_fn = guarded  # emcee's own wrapper prints every exception to the terminal
-        random_state = _to_emcee(state)
-        sampler.random_state = random_state
-        # emcee ignores a state it cannot use and would then go on from the global one, so read it back.
-        if not _same_random_state(sampler.random_state, random_state):
-            raise CheckpointError("random state: wanted the saved one, got another; the checkpoint cannot be resumed")
-        start = emcee.State(state.coords, log_prob=state.log_prob, random_state=random_state)
-        # The start was made positive definite on purpose; emcee's own check depends on the units of the parameters.
-        sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
-        _, key, position, kept_back, deviate = sampler.random_state
-        draws.append(sampler.get_chain())
-        log_prob.append(sampler.get_log_prob())
-        words.append(np.concatenate([key, [position, kept_back]]).astype(np.uint32))
-        cached.append(deviate)
-    return Chunk(np.array(draws), np.array(log_prob), np.array(words), np.array(cached, dtype=np.float64))
-
-
-def _to_emcee(state: EnsembleState) -> tuple[str, NDArray[np.uint32], int, int, float]:
-    words = state.random_words
-    return ("MT19937", words[:624], int(words[624]), int(words[625]), state.random_cached)
-
-
-def _same_random_state(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
-    return np.array_equal(np.asarray(one[1]), np.asarray(other[1])) and (one[0], *one[2:]) == (other[0], *other[2:])
-
-
-def _states_after(chunk: Chunk) -> list[EnsembleState]:
-    """What the ensembles continue from; taken from the arrays that are saved, so resuming is the same path."""
-    rows = zip(chunk.draws[:, -1], chunk.log_prob[:, -1], chunk.random_words, chunk.random_cached, strict=True)
-    return [EnsembleState(coords, log_prob, words, float(cached)) for coords, log_prob, words, cached in rows]
 
 
 def _gate_is_due(n_steps: int, chunk_steps: int) -> bool:
@@ -268,8 +241,11 @@ def _gate_is_due(n_steps: int, chunk_steps: int) -> bool:
     return due == n_steps
 
 
-def _joined(chunks: list[Chunk]) -> Chains:
+def _joined(chunks: list[Chunk], *, is_corrected: bool) -> Chains:
+    """All draws; behind a surrogate's warm-up a sixth of the corrected steps is discarded too."""
     draws = np.concatenate([chunk.draws for chunk in chunks], axis=1)
     log_prob = np.concatenate([chunk.log_prob for chunk in chunks], axis=1)
+    n_steps = draws.shape[1]
     warm_up = min(WARM_UP_CHUNKS, len(chunks) - 1) * chunks[0].draws.shape[1]
-    return Chains(draws, log_prob, max(warm_up, burn_in_steps(draws.shape[1])))
+    burn_in = warm_up + -(-(n_steps - warm_up) // 6) if is_corrected else burn_in_steps(n_steps)
+    return Chains(draws, log_prob, max(warm_up, burn_in))

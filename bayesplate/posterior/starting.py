@@ -19,25 +19,7 @@ LogPosterior = Callable[[FloatArray], FloatArray]
 
 _START_SPREAD = 3.0  # standard errors
 _START_TRIES = 1000
-
-
-@dataclass(frozen=True)
-class EnsembleState:
-    """What one ensemble continues from: a step just made and one read from disk look the same.
-
-    Attributes
-    ----------
-    coords : (n_walkers, n_dim) array
-    log_prob : (n_walkers,) array
-    random_words : (626,) array of uint32
-        Random state, as in `checkpoint.Chunk`.
-    random_cached : float
-    """
-
-    coords: FloatArray
-    log_prob: FloatArray
-    random_words: NDArray[np.uint32]
-    random_cached: float
+_FOR_STARTS, _FOR_MOVES = 0, 1
 
 
 @dataclass(frozen=True)
@@ -79,7 +61,7 @@ def start_ensembles(
     n_ensembles: int,
     n_walkers: int,
     seed: int,
-) -> list[EnsembleState]:
+) -> tuple[FloatArray, FloatArray]:
     """Start every ensemble from its own random numbers, which nothing else uses.
 
     Parameters
@@ -90,6 +72,11 @@ def start_ensembles(
     covariance : (n_dim, n_dim) array
         Its covariance.
     n_ensembles, n_walkers, seed : int
+
+    Returns
+    -------
+    coords : (n_ensembles, n_walkers, n_dim) array
+    log_prob : (n_ensembles, n_walkers) array
 
     Raises
     ------
@@ -109,14 +96,23 @@ def start_ensembles(
             "covariance of the starting estimate: wanted a positive definite matrix, got one that is not; "
             "the data and priors leave a direction undetermined"
         ) from None
-    states = []
-    for child in np.random.SeedSequence(seed).spawn(n_ensembles):
-        for_starts, for_moves = child.spawn(2)
-        coords, log_prob = _finite_starts(guarded, centre, factor, n_walkers, np.random.default_rng(for_starts))
-        generator = np.random.MT19937(for_moves).state["state"]
-        words = np.concatenate([generator["key"], [generator["pos"], 0]]).astype(np.uint32)
-        states.append(EnsembleState(coords, log_prob, words, 0.0))
-    return states
+    starts = [
+        _finite_starts(guarded, centre, factor, n_walkers, np.random.default_rng(_line(seed, ensemble, _FOR_STARTS)))
+        for ensemble in range(n_ensembles)
+    ]
+    return np.stack([coords for coords, _ in starts]), np.stack([log_prob for _, log_prob in starts])
+
+
+def random_numbers(seed: int, ensemble: int, chunk: int) -> np.random.Generator:
+    """What an ensemble draws from during one chunk of steps, and nothing else does.
+
+    Every chunk has numbers of its own, so that a run that is continued needs no more than where the walkers stand.
+    """
+    return np.random.default_rng(_line(seed, ensemble, _FOR_MOVES, chunk))
+
+
+def _line(seed: int, *key: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=key)
 
 
 def _finite_starts(

@@ -81,6 +81,12 @@ class TailCoordinates:
         theta[..., self.columns] = self.centre[self.columns] + self.scale * np.sinh(y[..., self.columns])
         return theta
 
+    def y(self, theta: Floats) -> Floats:
+        """y from (..., n_dim) theta, of the same shape; the inverse of `theta`."""
+        y = np.array(theta)
+        y[..., self.columns] = np.arcsinh((theta[..., self.columns] - self.centre[self.columns]) / self.scale)
+        return y
+
     def log_jacobian(self, y: Floats) -> Floats:
         """ln |d theta / d y| of (..., n_dim) y: (...) array."""
         return np.asarray(np.log(self.scale * np.cosh(y[..., self.columns])).sum(axis=-1))

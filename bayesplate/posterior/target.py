@@ -9,13 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
-from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.quantities import Quantity
+
+LINEAR_SHARE = 0.25
+"""The linear law serves while its error over the posterior stays below this share of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +83,35 @@ class Posterior:
 
     def log_likelihood(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log probability of every reading, setup after setup: (n_draws, n_modes) array."""
+        return self.log_likelihood_of(self.log_frequencies(theta), theta)
+
+    def log_likelihood_of(
+        self, log_frequencies: Sequence[NDArray[np.float64]], theta: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The same from frequencies that are known already, as `log_frequencies` gives them."""
         noise = np.exp(self.parameters.log_noise(theta))
         parts = [
             readings.log_likelihood(predicted, noise[:, i])
-            for i, (readings, predicted) in enumerate(zip(self.readings, self.log_frequencies(theta), strict=True))
+            for i, (readings, predicted) in enumerate(zip(self.readings, log_frequencies, strict=True))
         ]
         return np.concatenate(parts, axis=1)
+
+
+def linear_suffices(board: Board, errors: NDArray[np.float64], noise: Sequence[float]) -> bool:
+    """Whether linearisation errors stay below a quarter of the noise for every mode, rms over draws.
+
+    Parameters
+    ----------
+    board : Board
+    errors : (n_draws, n_modes) array, cents
+    noise : sequence of float
+        Relative, one a setup.
+    """
+    limit = LINEAR_SHARE * cents(
+        np.concatenate([np.full(len(s.readings), n) for s, n in zip(board.setups, noise, strict=True)])
+    )
+    finite = np.isfinite(errors).all(axis=1)
+    if finite.mean() < 0.5:
+        return False
+    rms = np.sqrt(np.mean(errors[finite] ** 2, axis=0))
+    return bool(np.all(rms < limit))

@@ -112,6 +112,8 @@ def summarise(
             leave_one_out_rms_cents=rms([row.left_out_cents for row in rows]),
             linearisation_rms_cents=rms(assessment.linear_errors),
             exact_law_worst_cents=assessment.exact_worst,
+            surrogate_rms_cents=rms(assessment.surrogate_errors),
+            surrogate_worst_cents=finite(_worst(assessment.surrogate_errors)),
         ),
         sampler=sampler_health(inference.chains, inference.convergence),
         identifiability=(*remarks(board, problem.identifiability), *input_remarks(draws, board)),
@@ -138,6 +140,11 @@ def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:
         ess_min=finite(convergence.ess_min),
         acceptance=finite(convergence.acceptance),
     )
+
+
+def _worst(values: NDArray[np.float64]) -> float:
+    """Largest magnitude; not a number where there are no values."""
+    return float(np.nanmax(np.abs(values))) if values.size else float("nan")
 
 
 def _effects(problem: Problem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:

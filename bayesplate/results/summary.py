@@ -80,12 +80,16 @@ class ErrorFigures:
         Linear less exact law over the posterior.
     exact_law_worst_cents : float
         Exact law against full solves.
+    surrogate_rms_cents, surrogate_worst_cents : float or None
+        Surrogate of the exact law less that law over the posterior; None where the walkers walked on none.
     """
 
     in_sample_rms_cents: float
     leave_one_out_rms_cents: float | None
     linearisation_rms_cents: float | None
     exact_law_worst_cents: float
+    surrogate_rms_cents: float | None
+    surrogate_worst_cents: float | None
 
 
 @dataclass(frozen=True)

@@ -215,6 +215,7 @@ def fingerprint(prepared: Prepared, problem: Problem) -> str:
         "readings": [repr(setup.readings) for setup in problem.board.setups],
         "attached": [repr(setup.attached) for setup in problem.board.setups],
         "law": problem.posterior.law,
+        "law_alone": problem.is_forced,
         "robust": problem.posterior.robust,
         "versions": versions(),
     }

@@ -112,11 +112,16 @@ def test_a_walker_that_hardly_moves_is_counted():
     assert acceptance_by_walker(draws)[3, 5] == 0.0
 
 
-def test_too_high_an_acceptance_is_refused():
-    draws = np.random.default_rng(1).standard_normal((4, 500, 16, 2))
+def test_too_low_an_acceptance_is_refused_and_independent_draws_are_not():
+    rng = np.random.default_rng(1)
+    draws = rng.standard_normal((4, 4000, 16, 2))
+    assert assess(draws).passed
+    stays = rng.random((4, 4000, 16)) < 0.9
+    for step in range(1, 4000):
+        draws[:, step][stays[:, step]] = draws[:, step - 1][stays[:, step]]
     reasons = assess(draws).reasons
     assert len(reasons) == 4
-    assert all("accepts 100 % of its proposals" in reason for reason in reasons)
+    assert all("accepts 10 % of its proposals" in reason for reason in reasons)
 
 
 def test_a_number_that_is_none_never_passes():

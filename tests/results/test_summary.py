@@ -35,7 +35,8 @@ CONTRACT = {
                 "rounding_cents", "left_out_cents", "leverage", "label_correlation"],
     "modes/0/predicted_hz": ["mean", "q05", "q95"],
     "unlabelled/0": ["setup", "measured_hz", "nearest", "predicted_hz", "cents"],
-    "error": ["in_sample_rms_cents", "leave_one_out_rms_cents", "linearisation_rms_cents", "exact_law_worst_cents"],
+    "error": ["in_sample_rms_cents", "leave_one_out_rms_cents", "linearisation_rms_cents", "exact_law_worst_cents",
+              "surrogate_rms_cents", "surrogate_worst_cents"],
     "sampler": ["ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance"],
 }  # fmt: skip
 """Keys of summary.json in their order, by the place where they stand."""

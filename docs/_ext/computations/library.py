@@ -139,7 +139,7 @@ def gate(folder: Path) -> str:
         ("split R-hat of the ensembles", f"at most {limits.rhat_max:g}"),
         ("length of each ensemble, in its autocorrelation times", f"at least {limits.tau_count_min:g}"),
         ("effective sample size", f"at least {limits.ess_min:g}"),
-        ("mean acceptance", f"{limits.acceptance_min:g} to {limits.acceptance_max:g}"),
+        ("mean acceptance", f"at least {limits.acceptance_min:g}"),
         ("acceptance of every walker", f"at least {limits.walker_acceptance_min:g}"),
     ]
     return words_table(("number", "limit"), rows)

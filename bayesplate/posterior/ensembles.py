@@ -1,0 +1,120 @@
+"""Several ensembles in lock-step: one emcee sampler for the walkers of all, each ensemble as if it were alone.
+
+Arrays here are (n_ensembles, n_walkers, ...); emcee sees the walkers of all ensembles in one row. Its own check that
+walkers span the space is left out: the starts were made positive definite on purpose, and the check depends on the
+units of the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import cycle, islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.posterior.checkpoint import Chunk
+from bayesplate.posterior.moves import ORDERS, CorrectedSteps, Generators, Steps, order_for, walk_order
+from bayesplate.posterior.proposals import Proposal
+from bayesplate.posterior.starting import LogPosterior
+
+FloatArray = NDArray[np.float64]
+
+_N_ARCHIVED = 128
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """What the next steps propose from.
+
+    Attributes
+    ----------
+    proposal : Proposal
+        Common to all ensembles.
+    archives : (n_ensembles, n_archived, n_dim) array
+        Each ensemble's own.
+    order : str
+        Of independent and differential steps.
+    """
+
+    proposal: Proposal
+    archives: FloatArray
+    order: str = ORDERS[0][1]
+
+    @classmethod
+    def of(
+        cls, warm_up: Sequence[Chunk], centre: FloatArray, covariance: FloatArray, rngs: Generators, n_chunks: int
+    ) -> Learnt:
+        """From the chunks of the warm-up so far.
+
+        Before the first chunk there is the estimate alone; on the way each chunk teaches the next; the whole second
+        half of the warm-up, of `n_chunks` chunks, teaches all that is kept.
+        """
+        if not warm_up:
+            proposal = Proposal.with_covariance(centre, covariance)
+            return cls(proposal, np.stack([proposal.points(_N_ARCHIVED, rng) for rng in rngs]))
+        late = warm_up[-1:] if len(warm_up) < n_chunks else warm_up[n_chunks // 2 :]
+        draws = np.concatenate([chunk.draws for chunk in late], axis=1)
+        log_prob = np.concatenate([chunk.log_prob for chunk in late], axis=1)
+        proposal = Proposal.one_fitted(draws) if len(warm_up) < n_chunks else Proposal.fitted(draws)
+        flat = draws.reshape(len(draws), -1, draws.shape[-1])
+        archives = flat[:, :: max(1, flat.shape[1] // _N_ARCHIVED)]
+        return cls(proposal, archives, order_for((log_prob - proposal.log_density(draws)).ravel()))
+
+
+def stepping(density: LogPosterior, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators) -> Steps:
+    """The steps of a chunk under one density."""
+    order = "".join(islice(cycle(learnt.order), n_steps))
+    return Steps(density, learnt.proposal, learnt.archives, order, n_walkers, rngs)
+
+
+def correcting(
+    surrogate: LogPosterior, density: LogPosterior, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators
+) -> CorrectedSteps:
+    """The steps of a chunk under a density whose surrogate the walkers walk on."""
+    walk = walk_order(learnt.order, learnt.archives.shape[-1])
+    walks = Steps(surrogate, learnt.proposal, learnt.archives, walk * n_steps, n_walkers, rngs, len(walk))
+    return CorrectedSteps(walks, density, n_steps, rngs)
+
+
+def crossed(density: LogPosterior, coords: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Walkers that come from a surrogate, under the density itself; who has none there joins one that has."""
+    flat = coords.reshape(-1, coords.shape[-1])
+    log_prob = density(flat)
+    lost = np.flatnonzero(log_prob == -np.inf)
+    found = np.flatnonzero(log_prob > -np.inf)
+    if found.size:
+        taken = found[np.arange(lost.size) % found.size]
+        flat, log_prob = flat.copy(), log_prob.copy()
+        flat[lost], log_prob[lost] = flat[taken], log_prob[taken]
+    return flat.reshape(coords.shape), log_prob.reshape(coords.shape[:-1])
+
+
+def advance(
+    move: Steps | CorrectedSteps, coords: FloatArray, log_prob: FloatArray, n_steps: int
+) -> tuple[FloatArray, FloatArray]:
+    """Advance all ensembles together.
+
+    Parameters
+    ----------
+    move : Steps or CorrectedSteps
+        Made for these walkers and so many steps.
+    coords : (n_ensembles, n_walkers, n_dim) array
+    log_prob : (n_ensembles, n_walkers) array
+    n_steps : int
+
+    Returns
+    -------
+    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
+    log_prob : (n_ensembles, n_steps, n_walkers) array
+    """
+    import emcee
+
+    n_ensembles, n_walkers, n_dim = coords.shape
+    sampler = emcee.EnsembleSampler(n_ensembles * n_walkers, n_dim, move.density, moves=move, vectorize=True)
+    start = emcee.State(coords.reshape(-1, n_dim), log_prob=log_prob.ravel())
+    sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
+    apart = (n_steps, n_ensembles, n_walkers)
+    chain, densities = sampler.get_chain(), sampler.get_log_prob()
+    return np.moveaxis(chain.reshape(*apart, n_dim), 1, 0), np.moveaxis(densities.reshape(apart), 1, 0)

@@ -1,0 +1,217 @@
+"""A law between linear and exact: ln f of each mode as a polynomial of low order in the sampled parameters.
+
+It is fitted by least squares to the exact law where the posterior is: first at draws of the normal approximation, then
+at draws of its own posterior, until it holds at draws that it was not fitted to. It costs microseconds per draw,
+however many effects the board has. The walkers walk on it and the exact law accepts or rejects where they end
+(`bayesplate.posterior.moves.CorrectedSteps`), so that its error costs steps and never moves the posterior.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.frequencies.laws import cents
+from bayesplate.posterior.ensembles import advance
+from bayesplate.posterior.moves import Steps
+from bayesplate.posterior.proposals import Proposal
+from bayesplate.posterior.tails import TailCoordinates
+from bayesplate.posterior.target import Posterior, linear_suffices
+
+Floats = NDArray[np.float64]
+
+_WIDER = 1.5
+"""Than the normal approximation: the first points, so that the posterior's shoulders are among them."""
+_REACH = 5.0
+"""Standard deviations of the points beyond which the polynomial goes on level: it knows nothing there."""
+_POINTS_PER_TERM = 3
+_MOST_TERMS = 400
+_FEWEST_POINTS = 512
+_FEWEST_ROUNDS, _MOST_ROUNDS = 3, 8
+_TEMPERATURE, _LOWEST = 4.0, -40.0
+_FAR = 15.0
+"""Points whose log density is lower than the highest by this and the number of parameters are no part of the posterior:
+of a normal one less than a millionth lies there."""
+_N_STEPS, _N_TAKEN = 40, 4
+_N_ARCHIVED = 128
+_BATCH = 2048
+
+
+class Solved(NamedTuple):
+    """Points with what the law gives there: (n, n_dim) theta, (n, n_modes) ln f, (n,) log density."""
+
+    theta: Floats
+    log_frequency: Floats
+    log_density: Floats
+
+    def where(self, kept: NDArray[np.bool_]) -> Solved:
+        """Some of the points."""
+        return Solved(*(part[kept] for part in self))
+
+    @property
+    def weights(self) -> Floats:
+        """What each point counts for in a fit: the density, tempered, so that far ones hardly matter; (n,) array."""
+        below = self.log_density - self.log_density.max()
+        return np.asarray(np.exp(np.maximum(below, _LOWEST) / _TEMPERATURE))
+
+
+@dataclass(frozen=True, eq=False)
+class Surrogate:
+    """Polynomials for the frequencies of all labelled modes.
+
+    Attributes
+    ----------
+    columns : (n_fitted,) array of int
+        The parameters that frequencies depend on.
+    centre : (n_fitted,) array
+    whitening : (n_fitted, n_fitted) array
+        Takes parameters less the centre to coordinates u of unit spread.
+    degree : int
+        2 or 3.
+    coefficients : (n_terms, n_modes) array
+        Of 1, u_i, u_i u_j and, in third order, u_i u_j u_k.
+    errors : (n_held_out, n_modes) array, cents
+        Surrogate less exact law at draws of the surrogate's posterior that it was not fitted to.
+    """
+
+    columns: NDArray[np.intp]
+    centre: Floats
+    whitening: Floats
+    degree: int
+    coefficients: Floats
+    errors: Floats
+
+    @classmethod
+    def fitted(cls, points: Solved, columns: NDArray[np.intp], degree: int) -> Surrogate:
+        """By weighted least squares; its errors are not known yet."""
+        x, weights = points.theta[:, columns], points.weights
+        factor = np.linalg.cholesky(np.cov(x.T, aweights=weights))
+        none = np.empty((0, points.log_frequency.shape[1]))
+        centre = np.average(x, axis=0, weights=weights)
+        bare = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), degree, none, none)
+        roots = np.sqrt(weights)[:, None]
+        found = np.linalg.lstsq(roots * bare._terms(points.theta), roots * points.log_frequency, rcond=None)[0]
+        return replace(bare, coefficients=np.asarray(found, dtype=np.float64))
+
+    def log_frequencies(self, theta: Floats) -> Floats:
+        """ln f (Hz) of all labelled modes, setup after setup: (n_draws, n_modes) array from (n_draws, n_dim)."""
+        parts = [self._terms(theta[i : i + _BATCH]) @ self.coefficients for i in range(0, len(theta), _BATCH)]
+        return np.concatenate(parts) if parts else np.empty((0, self.coefficients.shape[1]))
+
+    def _terms(self, theta: Floats) -> Floats:
+        u = np.clip((theta[:, self.columns] - self.centre) @ self.whitening, -_REACH, _REACH).T
+        first, second = np.triu_indices(len(u))
+        products = u[first] * u[second]
+        groups = [np.ones((1, u.shape[1])), u, products]
+        if self.degree == 3:
+            groups += [row * products[first >= i] for i, row in enumerate(u)]
+        return np.concatenate(groups).T
+
+
+def n_terms(n_parameters: int, degree: int) -> int:
+    """How many coefficients a polynomial of that degree has."""
+    return comb(n_parameters + degree, degree)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SurrogatePosterior(Posterior):
+    """The posterior with frequencies from a surrogate of its law; priors and likelihood are the same."""
+
+    surrogate: Surrogate
+
+    def log_frequencies(self, theta: Floats) -> list[Floats]:
+        """ln f of the labelled modes: one (n_draws, n_modes) array per setup."""
+        return _by_setup(self, self.surrogate.log_frequencies(theta))
+
+
+def with_surrogate(posterior: Posterior, surrogate: Surrogate) -> SurrogatePosterior:
+    """A posterior whose frequencies a surrogate gives."""
+    return SurrogatePosterior(
+        posterior.board, posterior.prior, posterior.models, posterior.law, posterior.robust, surrogate=surrogate
+    )
+
+
+def serves(posterior: Posterior, errors: Floats) -> bool:
+    """Whether a surrogate of (n_draws, n_modes) errors, cents, may stand for the law of a posterior.
+
+    The rule is the linear law's. A surrogate that is off by one noise level in a single mode does not serve.
+    """
+    return linear_suffices(posterior.board, errors, [setup.noise.median for setup in posterior.board.setups])
+
+
+def find_surrogate(
+    posterior: Posterior, centre: Floats, covariance: Floats, coordinates: TailCoordinates
+) -> Surrogate | None:
+    """Fit a surrogate to the law of a posterior, or find that none serves.
+
+    Each round fits it anew, walks on it, and compares it with the law where the walkers then are; those places join the
+    points of the next rounds. The degree rises from 2 to 3 once there are points enough for its coefficients: the
+    better the surrogate, the more ends of walks are accepted.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
+        Normal approximation.
+    coordinates : TailCoordinates
+        In which the walkers walk.
+
+    Returns
+    -------
+    Surrogate or None
+        None if none meets the linear law's rule within a few rounds.
+    """
+    columns, bounds = posterior.parameters.fitted_columns, posterior.parameters.fitted_bounds
+    n_of = {degree: _POINTS_PER_TERM * n_terms(columns.size, degree) for degree in (2, 3)}
+    n_points = max(_FEWEST_POINTS, n_of[2])
+    highest_degree = next(n for n in (3, 2) if n_terms(columns.size, n) <= _MOST_TERMS or n == 2)
+    rng = np.random.default_rng(0)
+    theta = rng.multivariate_normal(centre, _WIDER**2 * covariance, n_points)
+    theta[:, columns] = np.clip(theta[:, columns], bounds.lower, bounds.upper)
+    points, found = _solved(posterior, coordinates, theta), None
+    for n_rounds in range(1, _MOST_ROUNDS + 1):
+        degree = highest_degree if n_of[highest_degree] <= len(points.theta) else 2
+        surrogate = Surrogate.fitted(points, columns, degree)
+        last = points.theta[-n_points:]
+        walkers = _walked(with_surrogate(posterior, surrogate), coordinates, last, rng)
+        walked = _solved(posterior, coordinates, walkers)
+        held_out = walked.where(walked.log_density > points.log_density.max() - _FAR - theta.shape[1])
+        errors = cents(surrogate.log_frequencies(held_out.theta) - held_out.log_frequency)
+        if 2 * len(errors) > len(walked.theta) and serves(posterior, errors):
+            found = replace(surrogate, errors=errors)
+            if degree == highest_degree and n_rounds >= _FEWEST_ROUNDS:
+                return found
+        points = Solved(*(np.concatenate(parts) for parts in zip(points, walked, strict=True)))
+    return found
+
+
+def _solved(posterior: Posterior, coordinates: TailCoordinates, theta: Floats) -> Solved:
+    """Frequencies and log density in the coordinates of the walk, by the law itself."""
+    by_setup = posterior.log_frequencies(theta)
+    likelihood = posterior.log_likelihood_of(by_setup, theta).sum(axis=1)
+    log_density = posterior.log_prior(theta) + likelihood + coordinates.log_jacobian(coordinates.y(theta))
+    return Solved(theta, np.concatenate(by_setup, axis=1), log_density)
+
+
+def _walked(
+    posterior: SurrogatePosterior, coordinates: TailCoordinates, theta: Floats, rng: np.random.Generator
+) -> Floats:
+    """As many points, walked to where a surrogate's posterior is."""
+    density = coordinates.density(posterior)
+    n_walkers = -(-len(theta) // _N_TAKEN)
+    coords = coordinates.y(theta)
+    start = coords[:n_walkers]
+    archive, proposal = coords[None, :_N_ARCHIVED], Proposal.one_fitted(coords)
+    steps = Steps(density, proposal, archive, "ID" * (_N_STEPS // 2), n_walkers, [rng])
+    draws, _ = advance(steps, start[None], density(start)[None], _N_STEPS)
+    taken = draws[0, -1 :: -(_N_STEPS // (2 * _N_TAKEN))][:_N_TAKEN]
+    return coordinates.theta(taken.reshape(-1, coords.shape[1])[: len(theta)])
+
+
+def _by_setup(posterior: Posterior, log_frequency: Floats) -> list[Floats]:
+    ends = np.cumsum([len(setup.readings) for setup in posterior.board.setups])[:-1]
+    return np.split(log_frequency, ends, axis=1)
