@@ -112,7 +112,7 @@ def test_the_weighted_fit_misses_by_its_residuals(comparisons, card):
         found = [row["cents"] for row in method(theory, "weighted_least_squares")["forward"]]
         assert found == pytest.approx(-cents(estimate.residuals), abs=0.01)
         errors = [-mode["residual_cents"] for mode in theory["modes"]]
-        assert found != pytest.approx(errors, abs=0.3)  # control: the most likely constants are others
+        assert found != pytest.approx(errors, abs=0.05)  # control: the most likely constants are others
 
 
 def test_the_linear_law_gives_other_constants_where_modes_mix(comparisons):
