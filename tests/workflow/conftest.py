@@ -72,7 +72,7 @@ def stopped_once(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
     """The clamped board, stopped after two chunks by a gate that lets nothing through: an unfinished run."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(SETTINGS, partial(SamplerSettings, max_steps=STOPPED_AFTER, gate=CLOSED_GATE))
-        return runs.fit(tmp_path_factory.mktemp("stopped") / "out", "fiemme-spruce-clamped", "--json")
+        return runs.fit(tmp_path_factory.mktemp("stopped") / "out", "fiemme-spruce-clamped", "--json", "--no-report")
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ def test_nothing_is_written_unless_asked_for(tmp_path, monkeypatch, fiemme):
 
 def test_the_default_folder_is_results_and_the_name_of_the_board(quick_fit, monkeypatch, tmp_path, own_card):
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(main, ["fit", str(own_card)])
+    result = CliRunner().invoke(main, ["fit", str(own_card), "--no-report"])
 
     assert result.exit_code == 0
     assert (tmp_path / "results" / "fiemme-spruce-clamped" / "summary.json").is_file()
