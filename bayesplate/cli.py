@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from bayesplate.asking import asked_answers, given_answers
 from bayesplate.terminal import print_json, print_shown, progress_line, reporting, say
 
 
@@ -242,6 +243,33 @@ def diagnose(
 
             print_shown(show_diagnosis(result.diagnosis))
             say(f"written to {result.folder}")
+
+
+@main.command()
+@click.argument("path", required=False)
+@click.option("--length-x", metavar="MM", help="Length along the grain.")
+@click.option("--length-y", metavar="MM", help="Length across the grain.")
+@click.option("--thickness", metavar="MM")
+@click.option("--mass", metavar="G")
+@click.option("--edges", metavar="WORD", help="free, cantilever, clamped, supported, or letters like CFFF.")
+@click.option("--prior", metavar="NAME", help="Prior card, spruce or weakly-informative.")
+@click.option("--title", help="A line for people.")
+@click.option("--notes", help="Free text.")
+@click.option("--frequency", multiple=True, metavar="LABEL=HZ", help='As often as there are modes: "(1,1)=35".')
+@_options("json", "quiet", "debug")
+def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: Any) -> None:
+    """Write a first card to PATH, by asking, or from options where there are any."""
+    given = {name: value for name, value in answers.items() if value}
+    options = given_answers(given)
+    with reporting(as_json=as_json, debug=debug):
+        from bayesplate.workflow.new import new as run
+
+        told = options if given or as_json or quiet else asked_answers(path is None)
+        card = run(path or told.pop("name", "my-board"), **told)
+        if as_json:
+            print_json({"path": str(card)})
+        elif not quiet:
+            say(f"written to {card}. Next: bayesplate modes {card}, which shows where to tap, and bayesplate check")
 
 
 @main.command()

@@ -60,7 +60,7 @@ BAD_CARDS = {
                      '"(2,0)" = 240 and "( 2, 0 )" = 241 (repeated measurements are a list']),
     "rigid label": ([('"(1,1)" = 150', '"(0,0)" = 150')],
                     ['frequencies_hz "(0,0)": wanted a mode of a plate with edges x0 free', "at 0 Hz",
-                     "(the lowest are (0,2), (1,1), (2,0)"]),
+                     "(the lowest are (1,1), (2,0), (0,2), (2,1), (1,2))"]),
     "label beyond the model": ([('"(2,0)" = 240', '"(10,0)" = 240'), ('"(0,2)" = 330', '"(1,0)" = 330')],
                                ['frequencies_hz "(10,0)": wanted a mode of a plate', "more than 9 nodal lines",
                                 'frequencies_hz "(1,0)": wanted a mode of a plate']),

@@ -70,19 +70,25 @@ class Edges(Section):
         return "".join(word[0].upper() for word in (self.x0, self.y0, self.x1, self.y1))
 
 
+def edge_words(text: object) -> dict[str, EdgeWord] | None:
+    """All four edges from one word, or from four letters in the paper's order x0, y0, x1, y1; None from other texts."""
+    letters: dict[str, EdgeWord] = {"C": "clamped", "S": "supported", "F": "free"}
+    for word in letters.values():
+        if text == word:
+            return dict.fromkeys(EDGE_NAMES, word)
+    if not (isinstance(text, str) and len(text) == len(EDGE_NAMES) and {*text} <= {*letters}):
+        return None
+    x0, y0, x1, y1 = (letters[letter] for letter in text)
+    return {"x0": x0, "x1": x1, "y0": y0, "y1": y1}
+
+
 def _edges_table(value: object) -> object:
     """Refuse a word where the table of the edges stands, and write out the table that it may mean."""
     if isinstance(value, dict):
         return value
-    remedy = "x0 is the edge at x = 0"
-    letters = {word[0].upper(): word for word in EDGE_WORDS}
-    words = dict.fromkeys(EDGE_NAMES, value)
-    if isinstance(value, str) and len(value) == 4 and {*value} <= {*letters}:
-        words = dict(zip(("x0", "y0", "x1", "y1"), (letters[letter] for letter in value), strict=True))
-    if {*words.values()} <= {*EDGE_WORDS}:
-        table = ", ".join(f'{edge} = "{words[edge]}"' for edge in EDGE_NAMES)
-        remedy = f"edges = {{ {table} }}"
-    raise Refusal(Complaint("a table", shown(value), remedy))
+    words = edge_words(value)
+    table = ", ".join(f'{edge} = "{word}"' for edge, word in (words or {}).items())
+    raise Refusal(Complaint("a table", shown(value), f"edges = {{ {table} }}" if words else "x0 is the edge at x = 0"))
 
 
 class AttachedItem(Section):

@@ -6,7 +6,7 @@ from bayesplate.errors import Fault
 from bayesplate.labels import HIGHEST_ORDER, Label
 from bayesplate.modes.plate import is_rigid
 from bayesplate.plate.board import Board
-from bayesplate.plate.setup import Setup
+from bayesplate.plate.setup import NO_OFFSET, Ends, Setup
 
 
 def label_faults(board: Board) -> list[Fault]:
@@ -25,7 +25,7 @@ def label_faults(board: Board) -> list[Fault]:
             f'{board.name}.toml setup "{setup.name}" frequencies_hz "{reading.label}"',
             f"a mode of a plate with edges {', '.join(f'{e} {w}' for e, w in setup.edges.items())}",
             problem,
-            f"the lowest are {', '.join(str(label) for label in _examples(setup))}",
+            f"the lowest are {', '.join(str(one) for one in _examples(setup))}",
         )
         for setup in board.setups
         for reading in setup.readings
@@ -43,7 +43,11 @@ def _problem(setup: Setup, beams: tuple[int, int]) -> str:
     return ""
 
 
+def lowest_labels(ends_x: Ends, ends_y: Ends, first: Label = NO_OFFSET) -> list[Label]:
+    """Labels of modes with few nodal lines that a plate with these edges has, the fewest first."""
+    beams = [(i, j) for i in range(4) for j in range(4) if not is_rigid((i, j), ends_x, ends_y)]
+    return [Label(i + first.m, j + first.n) for i, j in sorted(beams, key=lambda b: (sum(b), abs(b[0] - b[1]), -b[0]))]
+
+
 def _examples(setup: Setup) -> list[Label]:
-    first = setup.first_label
-    beams = [(i, j) for i in range(4) for j in range(4) if not is_rigid((i, j), setup.ends_x, setup.ends_y)]
-    return [Label(i + first.m, j + first.n) for i, j in sorted(beams, key=sum)[:5]]
+    return lowest_labels(setup.ends_x, setup.ends_y, setup.first_label)[:5]

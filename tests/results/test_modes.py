@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ritz
+from bayesplate.posterior.likelihood import Readings
 from made_boards import setup_of
 
 from bayesplate.frequencies.spectrum import NamedMode
 from bayesplate.labels import Label
-from bayesplate.posterior.likelihood import Readings
 from bayesplate.quantities import Quantity
 from bayesplate.results.modes import mode_rows, unlabelled_peaks
 

@@ -1,0 +1,58 @@
+"""What `new` is told on the command line: answers to questions, each of which may be skipped, or options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import click
+
+SIZES = {
+    "length_x": "Length along the grain, mm",
+    "length_y": "Length across the grain, mm",
+    "thickness": "Thickness, mm",
+    "mass": "Mass, g",
+}
+
+
+def given_answers(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `bayesplate.workflow.new.new` from options that were given."""
+    told = {name: value for name, value in options.items() if name not in (*SIZES, "frequency")}
+    told["sizes"] = {name: options[name] for name in SIZES if name in options}
+    told["frequencies"] = {}
+    for text in options.get("frequency", ()):
+        label, sign, hertz = text.rpartition("=")
+        if not sign:
+            raise click.UsageError(f'--frequency {text!r}: write a label and its frequency, "(1,1)=35".')
+        told["frequencies"][label.strip()] = hertz.strip()
+    return told
+
+
+def asked_answers(ask_name: bool) -> dict[str, Any]:
+    """The same from questions on the terminal; an empty answer leaves the matter open."""
+    from bayesplate.workflow.new import example_labels
+
+    click.echo("An empty answer skips a question; an example stands in for it, marked on the card.", err=True)
+    told: dict[str, Any] = {"name": click.prompt("Name", default="my-board", err=True)} if ask_name else {}
+    told["sizes"] = _answered({name: _number(question) for name, question in SIZES.items()})
+    told["edges"] = click.prompt("Edges: free, cantilever, clamped, supported", default="free", err=True)
+    told["prior"] = click.prompt("Wood: spruce, or weakly-informative", default="weakly-informative", err=True)
+    click.echo("Frequencies; (m,n) crosses m nodal lines along the grain and n across.", err=True)
+    told["frequencies"] = _answered({label: _number(f"{label}, Hz") for label in example_labels(told["edges"])})
+    told["notes"] = click.prompt("Notes", default="", show_default=False, err=True)
+    return told
+
+
+def _number(question: str) -> str:
+    return str(click.prompt(question, default="", show_default=False, value_proc=_number_or_nothing, err=True))
+
+
+def _number_or_nothing(text: str) -> str:
+    try:
+        return text and str(float(text))
+    except ValueError:
+        raise click.BadParameter("a number with a decimal point, 2.8, or nothing") from None
+
+
+def _answered(answers: Mapping[str, str]) -> dict[str, str]:
+    return {name: answer for name, answer in answers.items() if answer}

@@ -1,0 +1,127 @@
+"""`new`: a first card, from a few numbers; what is written can be read, and nothing is ever overwritten."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from bayesplate.cards import EDGE_NAMES, load_prior, physical_faults, read_board_text
+from bayesplate.cards.setup import EdgeWord, edge_words
+from bayesplate.cards.starter import Starter, starter_text
+from bayesplate.cards.values import Number, Refusal
+from bayesplate.cards.words import plain, shown
+from bayesplate.errors import Fault, InputError
+from bayesplate.frequencies.labels import label_faults, lowest_labels
+from bayesplate.labels import Label
+from bayesplate.plate.board import board_from_card
+from bayesplate.results.folder import writing
+
+_EDGES_WANTED = (
+    '"free", "cantilever", "clamped", "supported", or four letters of C, S and F for x0, y0, x1, y1, like "CFFF"'
+)
+_ARRANGEMENTS = {"cantilever": "CFFF"}
+_ANY = Number(-1e300, 1e300)
+_N_EXAMPLES = 8
+
+
+def new(
+    path: str | os.PathLike[str],
+    *,
+    sizes: Mapping[str, float | str] | None = None,
+    edges: str = "free",
+    prior: str = "weakly-informative",
+    title: str = "",
+    notes: str = "",
+    frequencies: Mapping[str, float | str] | None = None,
+) -> Path:
+    """Write a first card.
+
+    Parameters
+    ----------
+    path : str or path
+        Of the card; .toml is added where it is missing.
+    sizes : mapping, optional
+        Any of length_x, length_y, thickness (mm) and mass (g); those of an example stand for the others.
+    edges : str
+        "free", "cantilever", "clamped", "supported", or four letters of C, S and F for x0, y0, x1, y1.
+    prior : str
+        Name of a prior card.
+    title, notes : str
+        Any text.
+    frequencies : mapping, optional
+        Label to Hz. Without any the card serves `modes`, which shows where to look for them.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If there is a file of that name, or what was given cannot stand on a card; then nothing is written.
+    """
+    card = Path(path)
+    card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
+    if card.exists():
+        raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
+    words = edge_words(_ARRANGEMENTS.get(edges, edges))
+    faults: list[Fault] = []
+    if words is None:
+        faults.append(Fault("edges", _EDGES_WANTED, shown(edges)))
+        words = dict.fromkeys(EDGE_NAMES, "free")
+    starter = Starter(
+        name=card.stem,
+        title=title,
+        notes=notes,
+        sizes=_numbers(sizes or {}, faults),
+        edges=words,
+        prior=prior,
+        frequencies=_numbers(frequencies or {}, faults),
+    )
+    text = starter_text(starter, _examples(words))
+    faults += _faults(text, card.stem)
+    if faults:
+        raise InputError(faults)
+    with writing(card):
+        card.parent.mkdir(parents=True, exist_ok=True)
+        with card.open("x", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+    return card
+
+
+def example_labels(edges: str) -> list[str]:
+    """Labels of modes that a board held this way has; those of a free one where the arrangement is not known."""
+    words = edge_words(_ARRANGEMENTS.get(edges, edges))
+    return [str(label) for label in _examples(words or dict.fromkeys(EDGE_NAMES, "free"))]
+
+
+def _examples(words: Mapping[str, EdgeWord]) -> list[Label]:
+    return lowest_labels((words["x0"], words["x1"]), (words["y0"], words["y1"]))[:_N_EXAMPLES]
+
+
+def _numbers(given: Mapping[str, float | str], faults: list[Fault]) -> dict[str, float]:
+    """Numbers from texts, with the hints of a card where they are none."""
+    found = {}
+    for name, value in given.items():
+        try:
+            found[name] = _ANY(_number(value))
+        except Refusal as refusal:
+            faults += [Fault(plain(name), one.wanted, one.got, one.remedy) for one in refusal.complaints]
+    return found
+
+
+def _number(value: float | str) -> float | str:
+    try:
+        return float(value)
+    except ValueError:
+        return value
+
+
+def _faults(text: str, name: str) -> list[Fault]:
+    """Everything that a card is held to."""
+    try:
+        read = read_board_text(text, name, may_lack_frequencies=True)
+    except InputError as error:
+        return list(error.faults)
+    return physical_faults(read) or label_faults(board_from_card(read, load_prior(read.material.prior)))

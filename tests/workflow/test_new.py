@@ -1,0 +1,107 @@
+"""`new`: what is asked or given becomes a card that is read; nothing is overwritten."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import bayesplate
+from bayesplate.cards import load_board
+from bayesplate.cli import main
+from bayesplate.frequencies.labels import label_faults
+from bayesplate.labels import Label
+from bayesplate.plate.board import board_from_card
+from bayesplate.workflow.new import new
+
+ANSWERS = ["", "550", "2,0", "200", "2.8", "125", "", "spruce", "35", "50", "111", "86", "", "", "", "", "Küche, 21 °C"]
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def invoke(*arguments: str, answers: str = ""):
+    return CliRunner().invoke(main, ["new", *arguments], input=answers)
+
+
+def test_answers_become_a_card_that_check_takes():
+    """A decimal comma is asked again; the modes asked about are modes of the board."""
+    result = invoke(answers="\n".join(ANSWERS) + "\n")
+    card = load_board("my-board.toml")
+
+    assert result.exit_code == 0, result.output
+    assert "a number with a decimal point" in result.stderr
+    assert (card.plate.length_x_mm.mean, card.plate.length_y_mm.mean, card.plate.mass_g.mean) == (550, 200, 125)
+    assert (card.plate.thickness_mm.mean, card.plate.thickness_mm.sd) == (2.8, 0.05)
+    assert card.material.prior == "spruce"
+    assert card.notes == "Küche, 21 °C"
+    readings = {str(label): hz.mean for label, hz in card.setups[0].frequencies_hz.items()}
+    assert readings == {"(1,1)": 35, "(2,0)": 50, "(0,2)": 111, "(2,1)": 86}
+    assert bayesplate.check("my-board.toml")["name"] == "my-board"
+
+
+def test_every_question_can_be_skipped_and_modes_works_on_the_card():
+    from bayesplate.workflow.modes import modes
+
+    result = invoke("first.toml", answers="\n" * 20)
+
+    assert result.exit_code == 0, result.output
+    assert "# an example: put yours here" in Path("first.toml").read_text(encoding="utf-8")
+    assert modes("first.toml", write=False).report["basis"] == "at the median of the prior"
+
+
+@pytest.mark.parametrize("edges", ["free", "cantilever", "clamped", "supported", "CFSF"])
+def test_the_examples_are_modes_that_the_board_has(edges):
+    text = new("a", edges=edges).read_text(encoding="utf-8")
+    labels = [line[2:9] for line in text.splitlines() if line.startswith('# "(')]
+    named = "\n".join(f"{label} = {100 + 7 * i}" for i, label in enumerate(labels))
+    Path("b.toml").write_text(text.replace('name = "a"', 'name = "b"') + named + "\n", encoding="utf-8")
+
+    assert len(labels) == 8
+    assert label_faults(board_from_card(load_board("b.toml"))) == []
+    if edges == "free":
+        assert labels[:3] == ['"(1,1)"', '"(2,0)"', '"(0,2)"']
+
+
+def test_options_ask_nothing():
+    options = ["--length-x", "253", "--edges", "cantilever", "--title", 'a "b" \\ ü', "--frequency", "( 1, 0 ) = 52"]
+    result = invoke("mine", *options)
+    card = load_board("mine.toml")
+
+    assert result.exit_code == 0, result.output
+    assert card.title == 'a "b" \\ ü'
+    assert card.setups[0].edges.letters == "CFFF"
+    assert card.setups[0].frequencies_hz[Label(1, 0)].mean == 52
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "said"),
+    [
+        (["--thickness", "2,8", "--length-x=-3", "--edges", "round"], 3,
+         ['thickness: wanted a number, got "2,8" (a decimal point and no quotes: 2.8)',
+          "[plate] length_x_mm: wanted a positive number, got -3", 'edges: wanted "free", "cantilever"']),
+        (["--frequency", "(0,0)=35"], 3, ["a motion without bending, at 0 Hz"]),
+        (["--frequency", "10=35"], 3, ["wanted two whole numbers"]),
+        (["--prior", "spruse"], 3, ["did you mean spruce?"]),
+        (["--frequency", "35"], 2, ["write a label and its frequency"]),
+    ],
+)  # fmt: skip
+def test_what_cannot_stand_on_a_card_is_refused_and_nothing_written(options, code, said):
+    result = invoke("mine", *options)
+
+    assert result.exit_code == code
+    assert [passage for passage in said if passage not in result.stderr] == []
+    assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [["mine"], ["mine.toml", "--mass", "40"]])
+def test_a_card_that_is_there_is_not_overwritten(arguments):
+    Path("mine.toml").write_text("mine", encoding="utf-8")
+    result = invoke(*arguments, answers="\n" * 20)
+
+    assert result.exit_code == 3
+    assert "mine.toml: wanted a new file, got one that exists" in result.stderr
+    assert Path("mine.toml").read_text(encoding="utf-8") == "mine"
