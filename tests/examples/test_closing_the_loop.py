@@ -7,6 +7,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -41,8 +42,11 @@ def test_a_hidden_effect_is_named_and_the_error_falls(computed):
     assert one["verdict"] == "named"
     assert one["effects"] == ["transverse_shear"]
     assert one["claim"]
-    # Readings rounded to 1 Hz leave 2.9 cents rms of themselves: (1 Hz / f) / sqrt(12), averaged over the six.
-    assert one["after"]["in_sample_rms_cents"] < 3.0 < 10.0 < one["before"]["in_sample_rms_cents"]
+    # An interval of 1 Hz is all that is known of a reading, and the fit may end anywhere inside: 4.6 cents rms over the
+    # six, (1 Hz / f) / sqrt(12) each.
+    read = np.array([51, 100, 315, 336, 394, 629])
+    rounding = np.sqrt(np.mean((1200 / np.log(2) / read) ** 2 / 12))
+    assert one["after"]["in_sample_rms_cents"] < rounding < 10.0 < one["before"]["in_sample_rms_cents"]
     assert one["after"]["nested_leave_one_out_rms_cents"] < 0.5 * one["before"]["nested_leave_one_out_rms_cents"]
 
 
