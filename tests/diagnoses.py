@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from bayesplate.diagnosis.decision.verdict import Word
+from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import (
-    Amplitude,
     Diagnosis,
-    EffectEntry,
     ElasticShift,
     Errors,
-    ExchangeEntry,
     Explanation,
     Finalist,
     Gates,

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis, EffectEntry
+from bayesplate.diagnosis.wording.candidates import EffectEntry
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.words import MERITS, names_of
 from bayesplate.report.style import (
     BLUE,

@@ -12,7 +12,7 @@ from bayesplate.diagnosis.evidence.folds import NEEDED
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
-from bayesplate.diagnosis.wording.diagnosis import Amplitude, EffectEntry, ExchangeEntry, Fate
+from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_names
 from bayesplate.frequencies.laws import cents

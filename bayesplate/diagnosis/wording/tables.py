@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bayesplate.diagnosis.wording.diagnosis import Amplitude, CandidateEntry, Diagnosis
+from bayesplate.diagnosis.wording.candidates import Amplitude, CandidateEntry
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.words import MERITS, MISSING, Merit, names_of, worth_showing
 from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.results.contract import Spread

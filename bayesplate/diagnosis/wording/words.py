@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from bayesplate.diagnosis.decision.verdict import Word
-from bayesplate.diagnosis.wording.diagnosis import CandidateEntry, Diagnosis, Errors, ExchangeEntry
+from bayesplate.diagnosis.wording.candidates import CandidateEntry, ExchangeEntry
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Errors
 from bayesplate.effects.words import effect_name, effect_names
 
 MISSING = "–"

@@ -18,7 +18,8 @@ from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.diagnosis.shifts.tables import nothing
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis, EffectEntry, diagnosis_json
+from bayesplate.diagnosis.wording.candidates import EffectEntry
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.effects import EFFECTS
