@@ -121,7 +121,7 @@ def unit_faults(board: Board, prior: PriorCard, rng: np.random.Generator) -> lis
     list of Fault
         One or none.
     """
-    if not any(setup.readings for setup in board.setups):
+    if not all(setup.readings for setup in board.setups):  # refused later, or still to be measured
         return []
     predicted, measured, speed = prior_predictive(board, prior, rng), log_measured(board), plate_speed(board)
     distances = {f: predicted.distance(measured - np.log(f)) for f in SUSPECTS if SLOWEST < speed / f < FASTEST}

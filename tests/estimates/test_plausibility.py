@@ -71,6 +71,13 @@ def test_a_prior_that_knows_the_wood_also_asks_about_a_factor_of_ten(name):
     assert "is thickness_mm ten times too large" in asked(measured_as(board, 10.0, ("thickness",)), "spruce")
 
 
+def test_a_setup_without_labels_is_asked_nothing():
+    board = board_of("spruce-free-2R", "spruce")
+    peaks = replace(board.setups[0], name="other", readings=(), unlabelled=(50.0, 70.0))
+
+    assert asked(replace(board, setups=(board.setups[0], peaks)), "spruce") == ""
+
+
 MATERIALS = {
     "expanded foam": (0.006, 0.006, 0.0023, 25),
     "balsa": (2.0, 0.1, 0.12, 120),
