@@ -33,7 +33,7 @@ Measure = tuple[tuple[Products, Products], ...]
 """Integrals along x and along y by orders of derivatives, on the functions of the free lines; summed over the pairs."""
 
 _POINTS = 6
-"""Gauss points an element: a product of two cubics with a field of degree five is exact."""
+"""Gauss points per element: a product of two cubics with a field of degree five is exact."""
 _NEGLIGIBLE = 1e-12
 
 _GHOST: dict[Group, float] = {"bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
@@ -111,7 +111,7 @@ def _over_rectangle(x: Line, y: Line, factor: Field) -> Measure:
 
 
 def _inside(x: Line, y: Line, factor: Field | None, outline: Outline) -> Measure:
-    """The same within an outline, from the integrals across the plate at every point along it."""
+    """Integrals of a field within an outline, from the integrals across the plate at every point along it."""
     at_x, ahead = gauss_points(x.nodes[:-1], np.diff(x.nodes), _POINTS)
     low, high = (limit[..., None] for limit in outline(at_x))
     # Elements across the plate, cut at its outline: (elements along x, points, elements across).

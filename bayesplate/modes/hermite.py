@@ -127,7 +127,7 @@ def even_and_odd(ends: Ends, n_elements: int, kept: NDArray[np.intp]) -> tuple[A
 
 
 def end_products(n_elements: int, at: tuple[bool, bool]) -> Products:
-    """Like `products`, but a sum over the ends that are asked for, of derivatives up to the first.
+    """Products of derivatives, up to the first, at the ends of the free line, summed over the ends asked for.
 
     Parameters
     ----------

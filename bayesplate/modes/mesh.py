@@ -7,7 +7,7 @@ import numpy as np
 from bayesplate.modes.plate import Weights
 
 ELEMENTS_PER_SIDE = 22
-"""Elements a side of a plate that bends alike both ways: twelve modes within 0.02 %, in about 30 ms."""
+"""Elements per side of a plate that bends alike both ways: twelve modes within 0.02 %, in about 30 ms."""
 
 _MOST_ELONGATED = 3.0
 

@@ -38,10 +38,19 @@ def pencil_eigenvalues(stiffness: Floats, mass: Floats, shift: Floats | float) -
         return np.concatenate([_one_or_nan(*draw) for draw in zip(stiffness, mass, shifts, strict=True)])
 
 
-def _eigenvalues(stiffness: Floats, mass: Floats, shift: Floats) -> Floats:
-    """The stiffness is factorised, for shear strains have no mass."""
+def _flexibility(stiffness: Floats, mass: Floats, shift: Floats | float) -> tuple[Floats, Floats]:
+    """Coordinates in which the shifted stiffness is one, and the mass in them, whose eigenvalues are flexibilities.
+
+    The stiffness is factorised and not the mass, for shear strains have no mass.
+    """
     inverse = np.linalg.inv(np.linalg.cholesky(stiffness + shift * mass))
-    values = 1.0 / np.linalg.eigvalsh(inverse @ mass @ np.swapaxes(inverse, -1, -2)) - shift[:, :, 0]
+    across = np.swapaxes(inverse, -1, -2)
+    return across, inverse @ mass @ across
+
+
+def _eigenvalues(stiffness: Floats, mass: Floats, shift: Floats) -> Floats:
+    _, flexibility = _flexibility(stiffness, mass, shift)
+    values = 1.0 / np.linalg.eigvalsh(flexibility) - shift[:, :, 0]
     return np.asarray(values[:, ::-1])
 
 
@@ -73,9 +82,8 @@ def pencil_modes(stiffness: Floats, mass: Floats, shift: float, n_modes: int) ->
     numpy.linalg.LinAlgError
         If the weights are those of no material.
     """
-    inverse = np.linalg.inv(np.linalg.cholesky(stiffness + shift * mass))
-    across = np.swapaxes(inverse, -1, -2)
-    flexibilities, turned = np.linalg.eigh(inverse @ mass @ across)
+    across, flexibility = _flexibility(stiffness, mass, shift)
+    flexibilities, turned = np.linalg.eigh(flexibility)
     highest = flexibilities[:, : -n_modes - 1 : -1]
     vectors = across @ turned[:, :, : -n_modes - 1 : -1] / np.sqrt(highest)[:, None, :]
     return 1.0 / highest - shift, vectors

@@ -96,7 +96,7 @@ class ReducedBlock:
 
 
 def _weighted(weights: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weighted sums of terms, one (r, r) matrix a draw."""
+    """Weighted sums of terms, one (r, r) matrix per draw."""
     n_terms, r, _ = terms.shape
     return (weights @ terms.reshape(n_terms, r * r)).reshape(-1, r, r)
 
@@ -217,7 +217,7 @@ def _project(
 
 
 def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Iterator[ReducedBlock]:
-    """Where the basis is large, the same space with all but its lowest modes at the centre condensed; then as it is."""
+    """The basis with all but its lowest modes at the centre condensed, where it is large; then as it is."""
     from scipy.linalg import eigh
 
     n_kept = whole.n_rigid + n_modes + _BEYOND

@@ -46,7 +46,7 @@ SHEAR_CORRECTION = 5.0 / 6.0
 """kappa: what the parabolic course of the shear stress over the thickness leaves of the shear stiffness."""
 
 SHEAR_ELEMENTS_PER_SIDE = 16
-"""Elements a side for `bayesplate.modes.mesh.mesh`: six modes within 0.15 cent, twelve within 0.3, in about 60 ms."""
+"""Elements per side for `bayesplate.modes.mesh.mesh`: six modes within 0.15 cent, twelve within 0.3, in about 60 ms."""
 
 _UNKNOWNS = ("w", "g_x", "g_y")
 

@@ -1,4 +1,4 @@
-"""How an ideal plate rings: eigenvalues and shapes of K phi = omega^2 M phi, class by class."""
+"""Modes of a plate: eigenvalues and shapes of K phi = omega^2 M phi, class by class."""
 
 from __future__ import annotations
 
