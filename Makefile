@@ -32,7 +32,7 @@ coverage: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl --publish docs/validation
 
 benchmarks: $(VENV)/installed
-	$(BIN)/python tests/benchmarks/run.py
+	$(BIN)/python tests/benchmarks/run.py --publish docs/validation --repeats 3
 
 # The stamps: an environment is made again when pyproject.toml changes. pip knows dependency groups from 25.1 on.
 $(VENV)/installed: pyproject.toml

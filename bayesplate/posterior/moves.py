@@ -45,6 +45,8 @@ Generators = Sequence[np.random.Generator]
 ORDERS = ((0.3, "IIID"), (0.15, "ID"), (0.0, "IDDD"))
 """Of the steps, by the acceptance that independent ones will have: where it is good they are most of them, for they
 are cheap and forget everything; where it is poor, as with twenty parameters and more, differential ones must do it."""
+_SHORT = 0.25
+"""Of whole differences, which overshoot where a tail of the posterior is thinner than its middle."""
 DIRECT_EVERY = 8
 """Every so many steps one is an independent one under the density itself, so that places which the surrogate does not
 know, where it has next to no probability, are entered and left at their right rate."""
@@ -73,13 +75,14 @@ def walk_order(order: str, n_dim: int) -> str:
 
 
 def differences(archive: FloatArray, n_differences: int, rng: np.random.Generator) -> FloatArray:
-    """Differences of an archive's pairs, as emcee's move proposes them: (n_differences, n_dim) array."""
+    """Differences of an archive's pairs, as emcee's move proposes them, half of them short: (n_differences, n_dim)."""
     import emcee
 
     move = emcee.moves.DEMove()
     move.setup(archive)
     legacy = SimpleNamespace(choice=rng.choice, randn=lambda *shape: rng.standard_normal(shape))  # names of emcee's
-    return np.asarray(move.get_proposal(np.zeros((n_differences, archive.shape[1])), [archive], legacy)[0])
+    whole = np.asarray(move.get_proposal(np.zeros((n_differences, archive.shape[1])), [archive], legacy)[0])
+    return whole * np.where(rng.random(n_differences) < 0.5, 1.0, _SHORT)[:, None]
 
 
 def log_uniform(n: int, rng: np.random.Generator) -> FloatArray:

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +21,13 @@ from bayesplate.modes.plate import Weights
 from bayesplate.modes.solve import solve, solve_classes
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.setup import Ends
-from bayesplate.posterior.inference import Problem, pose
+from bayesplate.posterior.convergence import autocorrelation_time, burn_in_steps
+from bayesplate.posterior.inference import Problem, infer, pose
+from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.workflow.prepare import prepare
 
 N_MODES = 12
+PLAIN_WALKERS, PLAIN_STEPS = 32, 3000
 
 
 def best(run: Callable[[], object], repeats: int) -> float:
@@ -37,9 +40,9 @@ def best(run: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def posed(board: str, law: LawName) -> Problem:
-    """A shipped board under a law, ready to be sampled."""
-    prepared = prepare(board)
+def posed(board: str, law: LawName | None, effects: Sequence[str] | None = None) -> Problem:
+    """A shipped board under a law, or the law that serves, ready to be sampled."""
+    prepared = prepare(board, effects)
     return pose(prepared.board, prepared.prior, law=law)
 
 
@@ -77,6 +80,32 @@ def full_solve(problem: Problem, repeats: int = 7) -> float:
     for place in model.places:
         wanted[place.parity] = max(wanted[place.parity], place.rank + 1)
     return best(lambda: solve_classes(model.plate, weights, wanted), repeats)
+
+
+def plain_emcee(problem: Problem, seed: int) -> float:
+    """Effective draws per second of emcee as it comes: stretch moves, vectorised, one ensemble; burn-in left out of
+    the draws and not of the time."""
+    import emcee
+
+    n_walkers = max(PLAIN_WALKERS, 2 * problem.parameters.n_dim)
+    start = draws(problem, n_walkers)
+    sampler = emcee.EnsembleSampler(n_walkers, problem.parameters.n_dim, problem.posterior, vectorize=True)
+    state = emcee.State(start, random_state=np.random.RandomState(seed).get_state())
+
+    def run() -> None:
+        sampler.run_mcmc(state, PLAIN_STEPS, skip_initial_state_check=True)
+
+    seconds = best(run, 1)
+    kept = sampler.get_chain(discard=burn_in_steps(PLAIN_STEPS))
+    return float(kept.shape[0] * n_walkers / autocorrelation_time(kept).max() / seconds)
+
+
+def our_sampling(problem: Problem, seed: int) -> float:
+    """Effective draws per second of the package, of the parameter that has fewest: surrogate, warm-up and judgements
+    of convergence count as time."""
+    started = time.perf_counter()
+    inference = infer(problem, SamplerSettings(seed=seed))
+    return inference.convergence.ess_min / (time.perf_counter() - started)
 
 
 def plate_at_estimate(problem: Problem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
@@ -143,7 +172,23 @@ def after_sampling(board: str, repeats: int = 1) -> float:
     return min(times)
 
 
-def whole_fit(board: str, repeats: int = 1) -> float:
-    """`bayesplate fit` of a shipped board, cold."""
+def whole_fit(board: str, *options: str, repeats: int = 1, what: str = "fit") -> float:
+    """`bayesplate fit` (or another command) of a shipped board, cold."""
     with tempfile.TemporaryDirectory() as folder:
-        return command("fit", board, "--force", "--out", str(Path(folder) / "out"), repeats=repeats)
+        return command(what, board, *options, "--force", "--out", str(Path(folder) / "out"), repeats=repeats)
+
+
+_PLAIN = """
+from benchmarks import timing
+
+timing.plain_emcee(timing.posed("fiemme-spruce-clamped", "linear", ["poisson_ratio"]), seed=1)
+"""
+
+
+def unit(repeats: int = 1) -> float:
+    """The unit of cold times: a process that poses a board of five parameters and samples it with plain emcee."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    paths = [str(Path(__file__).resolve().parents[1]), *filter(None, [environment.get("PYTHONPATH")])]
+    environment["PYTHONPATH"] = os.pathsep.join(paths)
+    program = [sys.executable, "-c", _PLAIN]
+    return best(lambda: subprocess.run(program, check=True, capture_output=True, env=environment), repeats)

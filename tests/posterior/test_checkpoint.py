@@ -66,6 +66,24 @@ def test_a_run_continued_equals_the_uninterrupted_one(folder, uninterrupted):
     assert len(list(folder.glob("chunk-*.npz"))) == 5
 
 
+def surrogate(theta):
+    return log_posterior(theta - 0.3)
+
+
+@pytest.mark.parametrize("stand_in", [None, surrogate])
+@pytest.mark.parametrize("stopped_at", [30, 60, 90])
+def test_a_run_stopped_in_or_after_its_warm_up_continues_to_the_same_bytes(tmp_path, stand_in, stopped_at):
+    """In the warm-up, at its end, and where proposals are fixed or walks are corrected."""
+
+    def drawn(max_steps, checkpoint=None):
+        target = (log_posterior, np.zeros(2), np.eye(2), settings(max_steps))
+        chains, _ = sample(*target, surrogate=stand_in, checkpoint=checkpoint)
+        return chains.draws.tobytes() + chains.log_prob.tobytes()
+
+    drawn(stopped_at, Checkpoint(tmp_path / "checkpoint", "f"))
+    assert drawn(120, Checkpoint(tmp_path / "checkpoint", "f")) == drawn(120)
+
+
 def test_a_finished_run_is_read_back_without_new_steps(folder):
     def must_not_be_called(theta):
         raise AssertionError

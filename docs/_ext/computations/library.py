@@ -29,6 +29,11 @@ from computations.runs import SOURCE
 RESULTS = SOURCE / "validation"
 CHECKS = (
     (
+        "benchmarks",
+        "make benchmarks",
+        "What sampling and whole commands cost beside emcee as it comes, measured in one run, each with its limit.",
+    ),
+    (
         "closing-the-loop",
         "python examples/closing_the_loop.py --out docs/validation",
         "Shipped boards through `diagnose`: the verdict, whether an improvement is claimed, errors in cents before and "
