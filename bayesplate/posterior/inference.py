@@ -36,8 +36,8 @@ _N_CHECKS = 256
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """A board ready to be sampled.
+class PosedProblem:
+    """A board posed as a problem of inference: its estimate, both laws, and where the posterior lies.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Problem:
         """The sampled columns."""
         return self.posterior.parameters
 
-    def under(self, law: LawName) -> Problem:
+    def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""
         return replace(self, posterior=replace_law(self.posterior, law))
 
@@ -73,7 +73,7 @@ class Problem:
 class Inference:
     """Draws of a problem and the verdict of the convergence gate."""
 
-    problem: Problem
+    problem: PosedProblem
     chains: Chains
     convergence: Convergence
 
@@ -83,7 +83,7 @@ def replace_law(posterior: Posterior, law: LawName) -> Posterior:
     return Posterior(posterior.board, posterior.prior, posterior.models, law, posterior.robust)
 
 
-def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: bool = False) -> Problem:
+def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: bool = False) -> PosedProblem:
     """Estimate by least squares, check that the constants are identifiable, build both laws and choose one.
 
     Parameters
@@ -98,7 +98,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
 
     Returns
     -------
-    Problem
+    PosedProblem
 
     Raises
     ------
@@ -126,7 +126,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     posterior = Posterior(board, prior, region.models, law, robust)
     require_reachable(posterior, region.centre, region.covariance)
     require_possible_noise(posterior, region.centre)
-    return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance)
+    return PosedProblem(board, prior, estimate, found, posterior, region.centre, region.covariance)
 
 
 def _identifiable_at(board: Board, region: Region, estimate: Estimate) -> Identifiability:
@@ -157,7 +157,7 @@ def linear_suffices(board: Board, errors: NDArray[np.float64], noise: Sequence[f
 
 
 def infer(
-    problem: Problem,
+    problem: PosedProblem,
     settings: SamplerSettings,
     *,
     checkpoint: Checkpoint | None = None,
@@ -167,7 +167,7 @@ def infer(
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     settings : SamplerSettings
     checkpoint, progress
         See `bayesplate.posterior.sampling.sample`.

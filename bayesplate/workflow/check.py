@@ -11,7 +11,7 @@ from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_al
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, moduli
-from bayesplate.posterior.inference import Problem, pose
+from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.contract import Constants, Elastic
 from bayesplate.workflow.arguments import require_arguments
@@ -99,7 +99,7 @@ def _effects(found: Sequence[Signature]) -> list[CheckedEffect]:
     ]
 
 
-def expected_sd(problem: Problem) -> dict[str, float]:
+def expected_sd(problem: PosedProblem) -> dict[str, float]:
     """Relative standard deviation of each modulus in the normal approximation of the posterior."""
     draws = np.random.default_rng(0).multivariate_normal(problem.centre, problem.covariance, _N_DRAWS)
     values = problem.parameters.values(draws)

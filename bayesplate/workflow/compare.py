@@ -13,7 +13,7 @@ from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws, named_draws
-from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.mode_errors import mode_errors
 from bayesplate.posterior.reweighting import effective_draws, law_weights
@@ -113,7 +113,7 @@ def compare(
     return result
 
 
-def _posteriors(problem: Problem, settings: SamplerSettings, progress: Tell) -> tuple[list[Method], Inference, Draws]:
+def _posteriors(problem: PosedProblem, settings: SamplerSettings, progress: Tell) -> tuple[list[Method], Inference, Draws]:
     """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough."""
     inference, draws = _sampled(problem, settings, progress)
     methods = []
@@ -127,7 +127,7 @@ def _posteriors(problem: Problem, settings: SamplerSettings, progress: Tell) -> 
     return methods, inference, draws
 
 
-def _sampled(problem: Problem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
+def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
         reasons = "\n".join(inference.convergence.reasons)

@@ -15,7 +15,7 @@ from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.draws import Draws, named_draws
-from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import OutputFolder
@@ -68,14 +68,14 @@ class Opened:
     ----------
     prepared : Prepared
     request : Request
-    problem : Problem
+    problem : PosedProblem
     folder : OutputFolder or None
         None if nothing is to be written.
     """
 
     prepared: Prepared
     request: Request
-    problem: Problem
+    problem: PosedProblem
     folder: OutputFolder | None
 
     @property
@@ -96,7 +96,7 @@ def with_board(prepared: Prepared, board: Board) -> Prepared:
     return replace(prepared, board=board)
 
 
-def posed(prepared: Prepared, request: Request) -> Problem:
+def posed(prepared: Prepared, request: Request) -> PosedProblem:
     """The problem of a prepared board; see `bayesplate.posterior.inference.pose`."""
     return pose(prepared.board, prepared.prior, law=request.law, robust=request.robust)
 
@@ -154,7 +154,7 @@ def opened(
 
 def fitted(
     prepared: Prepared,
-    problem: Problem,
+    problem: PosedProblem,
     request: Request,
     checkpoints: Path | None,
     refuse: Refuse,
@@ -165,7 +165,7 @@ def fitted(
     Parameters
     ----------
     prepared : Prepared
-    problem : Problem
+    problem : PosedProblem
     request : Request
     checkpoints : Path or None
         Folder of the unfinished run's chunks, one subfolder a law; None keeps none.
@@ -178,7 +178,7 @@ def fitted(
     Fitted
     """
 
-    def sampled(under: Problem) -> tuple[Inference, Draws]:
+    def sampled(under: PosedProblem) -> tuple[Inference, Draws]:
         checkpoint = None if checkpoints is None else checkpoint_in(checkpoints, prepared, under)
         settings = SamplerSettings(seed=request.seed)
         inference = infer(under, settings, checkpoint=checkpoint, progress=progress)
@@ -197,12 +197,12 @@ def fitted(
     return Fitted(prepared, inference, draws, summary)
 
 
-def checkpoint_in(folder: Path, prepared: Prepared, problem: Problem) -> Checkpoint:
+def checkpoint_in(folder: Path, prepared: Prepared, problem: PosedProblem) -> Checkpoint:
     """Where the chunks of a problem under its law are kept."""
     return Checkpoint(folder / problem.posterior.law, fingerprint(prepared, problem))
 
 
-def fingerprint(prepared: Prepared, problem: Problem) -> str:
+def fingerprint(prepared: Prepared, problem: PosedProblem) -> str:
     """Hash of everything besides the sampler's settings that decides the draws."""
     prior = {name: repr(density) for name, density in problem.prior.constants.items()}
     identity = {

@@ -21,7 +21,7 @@ from bayesplate.modes.plate import Weights
 from bayesplate.modes.solve import solve, solve_classes
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.setup import Ends
-from bayesplate.posterior.inference import Problem, pose
+from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.workflow.prepare import prepare
 
 N_MODES = 12
@@ -37,18 +37,18 @@ def best(run: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def posed(board: str, law: LawName) -> Problem:
+def posed(board: str, law: LawName) -> PosedProblem:
     """A shipped board under a law, ready to be sampled."""
     prepared = prepare(board)
     return pose(prepared.board, prepared.prior, law=law)
 
 
-def draws(problem: Problem, n_draws: int) -> NDArray[np.float64]:
+def draws(problem: PosedProblem, n_draws: int) -> NDArray[np.float64]:
     """Points where the sampler would ask: a normal approximation of the posterior, (n_draws, n_dim) array."""
     return np.random.default_rng(1).multivariate_normal(problem.centre, problem.covariance, n_draws)
 
 
-def likelihood(problem: Problem, n_draws: int, repeats: int = 7) -> float:
+def likelihood(problem: PosedProblem, n_draws: int, repeats: int = 7) -> float:
     """One evaluation of the log likelihood at `n_draws` points together."""
     theta = draws(problem, n_draws)
     together = max(1, 2048 // n_draws)
@@ -61,14 +61,14 @@ def likelihood(problem: Problem, n_draws: int, repeats: int = 7) -> float:
     return best(run, repeats) / together
 
 
-def law(problem: Problem, name: LawName, n_draws: int, repeats: int = 7) -> float:
+def law(problem: PosedProblem, name: LawName, n_draws: int, repeats: int = 7) -> float:
     """The frequencies of the labelled modes alone at `n_draws` points, without noise and readings."""
     values = problem.parameters.values(draws(problem, n_draws))
     (model,) = problem.posterior.models
     return best(lambda: model.log_frequencies(values, name), repeats)
 
 
-def full_solve(problem: Problem, repeats: int = 7) -> float:
+def full_solve(problem: PosedProblem, repeats: int = 7) -> float:
     """The labelled modes of one draw from the matrices of the whole plate, only as many as are needed in each class."""
     (model,) = problem.posterior.models
     values = problem.parameters.values(draws(problem, 1))
@@ -79,14 +79,14 @@ def full_solve(problem: Problem, repeats: int = 7) -> float:
     return best(lambda: solve_classes(model.plate, weights, wanted), repeats)
 
 
-def plate_at_estimate(problem: Problem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
+def plate_at_estimate(problem: PosedProblem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
     """Edges, mesh and weights of a problem's plate."""
     (model,) = problem.posterior.models
     weights = term_weights(problem.estimate.values, model.setup).at(0)
     return model.setup.ends_x, model.setup.ends_y, mesh(weights), weights
 
 
-def assembly(problem: Problem, repeats: int = 5) -> float:
+def assembly(problem: PosedProblem, repeats: int = 5) -> float:
     """Matrices of a plate that was never assembled before in this process, its libraries imported."""
     ends_x, ends_y, (n_x, n_y), _ = plate_at_estimate(problem)
 
@@ -98,7 +98,7 @@ def assembly(problem: Problem, repeats: int = 5) -> float:
     return best(run, repeats)
 
 
-def twelve_modes(problem: Problem, repeats: int = 7) -> float:
+def twelve_modes(problem: PosedProblem, repeats: int = 7) -> float:
     """The lowest twelve modes from matrices that are there."""
     ends_x, ends_y, (n_x, n_y), weights = plate_at_estimate(problem)
     plate = thin_plate(ends_x, ends_y, n_x, n_y)

@@ -10,7 +10,7 @@ import pytest
 
 from bayesplate.diagnosis.evidence.search import Ground, prepare_search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
 from bayesplate.workflow.fitting import Request, posed
 from bayesplate.workflow.prepare import prepare
@@ -23,7 +23,7 @@ N_NULL = 100
 class Grounded:
     """A board's problem and the ground of its search."""
 
-    problem: Problem
+    problem: PosedProblem
     ground: Ground
 
 
