@@ -157,10 +157,12 @@ def load_board(name_or_path: str | os.PathLike[str], *, may_lack_frequencies: bo
     return _read_board(read_file(path), plain(path.name), path.stem, path, may_lack_frequencies)
 
 
-def read_board_text(text: str, name: str) -> BoardCard:
+def read_board_text(text: str, name: str, *, may_lack_frequencies: bool = False) -> BoardCard:
     """Read a board card from a text, as if it stood in NAME.toml; raises InputError like `load_board`."""
     stem = name.removesuffix(".toml")
-    return _read_board(text.encode("utf-8", "surrogatepass"), f"{plain(stem)}.toml", stem, None)
+    return _read_board(
+        text.encode("utf-8", "surrogatepass"), f"{plain(stem)}.toml", stem, None, may_lack_frequencies
+    )
 
 
 def _read_board(data: bytes, file: str, stem: str, path: Path | None, may_lack_frequencies: bool = False) -> BoardCard:

@@ -9,7 +9,8 @@ import pytest
 
 from bayesplate.cards import card_names, read_board_text
 from bayesplate.labels import Label
-from bayesplate.plate.board import board_from_card, made_board
+from bayesplate.plate.board import made_board
+from bayesplate.plate.from_card import board_from_card
 from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup
 from bayesplate.plate.writing import card_text
 from bayesplate.quantities import Quantity
