@@ -75,7 +75,7 @@ def run(folder: Path | None = None, n_boards: int = 40, seed: int = 1) -> dict[s
 
 
 def _measured(card: str, folder: Path | None, seed: int) -> dict[str, Any]:
-    result = bayesplate.fit(card, write=False, seed=seed)
+    result = bayesplate.fit(card, seed=seed)
     problem = result.inference.problem
     system = paper_system(problem.board, problem.estimate)
     percentile = percentile_estimate(system)

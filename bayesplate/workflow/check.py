@@ -12,10 +12,10 @@ from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, moduli
 from bayesplate.posterior.inference import PosedProblem
+from bayesplate.report.plots import CheckPlots
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.plots import CheckPlots
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_check

@@ -19,6 +19,7 @@ from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.mode_errors import mode_errors
 from bayesplate.posterior.reweighting import effective_draws, law_weights
 from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.report.plots import ComparePlots
 from bayesplate.results.archive import to_arviz
 from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, theory_row
 from bayesplate.results.contract import NOT_IN_JSON
@@ -27,7 +28,6 @@ from bayesplate.results.store import posterior_archive
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.check import expected_sd
-from bayesplate.workflow.plots import ComparePlots
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_compare

@@ -24,6 +24,7 @@ from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import DiagnosePlots
 from bayesplate.results.archive import to_arviz
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder, write_text
 from bayesplate.results.store import attributes_of, posterior_archive
@@ -31,7 +32,6 @@ from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.workflow.fitting import Fitted, fitted, opened, with_board
-from bayesplate.workflow.plots import DiagnosePlots
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem, as_problem
 

@@ -15,6 +15,7 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import FitPlots
 from bayesplate.results.archive import to_arviz
 from bayesplate.results.folder import ARCHIVE, SUMMARY, json_text, write_text
 from bayesplate.results.store import attributes_of, posterior_archive, write_posterior
@@ -23,7 +24,6 @@ from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fitting import Fitted, fitted, opened
-from bayesplate.workflow.plots import FitPlots
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_fit

@@ -18,10 +18,10 @@ from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.region import noise_widenings
+from bayesplate.report.plots import ModesPlots
 from bayesplate.results.folder import make_folder, require_new
 from bayesplate.results.sheets import ModesReport, sheet_report
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.plots import ModesPlots
 from bayesplate.workflow.prepare import Card, Prepared, prepare
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_modes

@@ -48,7 +48,7 @@ class Problem:
     >>> import bayesplate
     >>> problem = bayesplate.Problem.from_card("fiemme-spruce-clamped")
     >>> problem.names
-    ('log_D_x', 'log_D_y', 'log_D_s', 'log_noise[setup]')
+    ('log_D_x', 'log_D_y', 'log_D_s', 'log_noise[clamped]')
     """
 
     prepared: Prepared

@@ -10,10 +10,10 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from bayesplate.diagnosis.forms import forms
 from effect_plates import MADE, modes_of
 from generator.known_boards import FREE
 
-from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS, declare
 from bayesplate.posterior.inference import pose
 from bayesplate.workflow.prepare import prepare
