@@ -1,11 +1,14 @@
 """Elastic constants of a rectangular orthotropic plate from its modal frequencies, with an honest uncertainty.
 
-    fit(card)       board card to posterior
-    check(card)     what a card can identify, without sampling
-    compare(card)   every method side by side
-    cite(card)      references of exactly what a fit uses
+    fit(card)        a board to the posterior of its constants
+    diagnose(card)   the fit, what its residual points to, and the error before and after
+    compare(card)    every method side by side
+    check(card)      what a card can identify, without sampling
+    modes(card)      the lowest modes and their Chladni figures
+    cite(card)       references of exactly what a fit uses
 
-`modes(card)` is imported from `bayesplate.workflow.modes`: its name here is that of the folder of plate solutions.
+`card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
+densities and the frequencies that other samplers ask for. Nothing is written unless `out=` names a folder.
 
 Glossary of symbols
 -------------------
@@ -30,24 +33,108 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bayesplate.workflow.check import check
+    from bayesplate.cards.prior import PriorCard
+    from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+    from bayesplate.errors import (
+        BatchError,
+        BayesplateError,
+        CheckpointError,
+        Fault,
+        InputError,
+        NotConvergedError,
+        NotIdentifiableError,
+    )
+    from bayesplate.labels import Label
+    from bayesplate.plate.board import Board
+    from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup
+    from bayesplate.quantities import Quantity
+    from bayesplate.results.checking import CheckReport
+    from bayesplate.results.comparison import Comparison
+    from bayesplate.results.sheets import ModesReport
+    from bayesplate.results.summary import Summary
+    from bayesplate.workflow.check import CheckResult, check
     from bayesplate.workflow.cite import cite
-    from bayesplate.workflow.compare import compare
+    from bayesplate.workflow.compare import CompareResult, compare
+    from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
     from bayesplate.workflow.fit import FitResult, fit
+    from bayesplate.workflow.modes import ModesResult, modes
+    from bayesplate.workflow.problem import Problem
 
-__all__ = ["FitResult", "check", "cite", "compare", "fit"]
+__all__ = [
+    "AttachedItem",
+    "BatchError",
+    "BayesplateError",
+    "Board",
+    "CheckReport",
+    "CheckResult",
+    "CheckpointError",
+    "CompareResult",
+    "Comparison",
+    "DeclaredAir",
+    "DiagnoseResult",
+    "Diagnosis",
+    "Fault",
+    "FitResult",
+    "InputError",
+    "Label",
+    "ModesReport",
+    "ModesResult",
+    "NotConvergedError",
+    "NotIdentifiableError",
+    "PriorCard",
+    "Problem",
+    "Quantity",
+    "Reading",
+    "Setup",
+    "Summary",
+    "check",
+    "cite",
+    "compare",
+    "diagnose",
+    "fit",
+    "modes",
+]
 
 _HOMES = {
+    "AttachedItem": "bayesplate.plate.setup",
+    "BatchError": "bayesplate.errors",
+    "BayesplateError": "bayesplate.errors",
+    "Board": "bayesplate.plate.board",
+    "CheckReport": "bayesplate.results.checking",
+    "CheckResult": "bayesplate.workflow.check",
+    "CheckpointError": "bayesplate.errors",
+    "CompareResult": "bayesplate.workflow.compare",
+    "Comparison": "bayesplate.results.comparison",
+    "DeclaredAir": "bayesplate.plate.setup",
+    "DiagnoseResult": "bayesplate.workflow.diagnose",
+    "Diagnosis": "bayesplate.diagnosis.wording.diagnosis",
+    "Fault": "bayesplate.errors",
     "FitResult": "bayesplate.workflow.fit",
+    "InputError": "bayesplate.errors",
+    "Label": "bayesplate.labels",
+    "ModesReport": "bayesplate.results.sheets",
+    "ModesResult": "bayesplate.workflow.modes",
+    "NotConvergedError": "bayesplate.errors",
+    "NotIdentifiableError": "bayesplate.errors",
+    "PriorCard": "bayesplate.cards.prior",
+    "Problem": "bayesplate.workflow.problem",
+    "Quantity": "bayesplate.quantities",
+    "Reading": "bayesplate.plate.setup",
+    "Setup": "bayesplate.plate.setup",
+    "Summary": "bayesplate.results.summary",
     "check": "bayesplate.workflow.check",
     "cite": "bayesplate.workflow.cite",
     "compare": "bayesplate.workflow.compare",
+    "diagnose": "bayesplate.workflow.diagnose",
     "fit": "bayesplate.workflow.fit",
 }
+"""Where each name is defined. `modes` is the folder of that name, which can be called: see `bayesplate.modes`."""
 
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used, so that `import bayesplate` costs nothing."""
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
+    if name == "modes":
+        return import_module("bayesplate.modes")
     raise AttributeError(f"module 'bayesplate' has no attribute {name!r}")

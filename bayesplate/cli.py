@@ -132,10 +132,11 @@ def fit(
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.fit import fit as run
+            from bayesplate.workflow.prepare import default_folder
 
             result = run(
                 card,
-                out=out,
+                out=default_folder(card) if out is None else out,
                 seed=seed,
                 effects=effects,
                 law="linear" if linear else "exact" if exact else None,
@@ -170,13 +171,14 @@ def modes(
     """Table of the lowest modes of CARD, and a sheet of Chladni figures."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.modes import modes as run
+        from bayesplate.workflow.prepare import default_folder
         from bayesplate.workflow.shown import show_modes
 
-        result = run(card, out=out, seed=seed, effects=effects, force=force)
+        result = run(card, out=default_folder(card) if out is None else out, seed=seed, effects=effects, force=force)
         if as_json:
-            print_json(result.report)
+            print_json(result.summary)
         elif not quiet:
-            print_shown(show_modes(result.report))
+            print_shown(show_modes(result.summary))
 
 
 @main.command()
@@ -234,8 +236,10 @@ def diagnose(
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.diagnose import diagnose as run
+            from bayesplate.workflow.prepare import default_folder
 
-            result = run(card, out=out, seed=seed, effects=effects, force=force, resume=resume, progress=tell)
+            folder = default_folder(card) if out is None else out
+            result = run(card, out=folder, seed=seed, effects=effects, force=force, resume=resume, progress=tell)
         if as_json:
             print_json(result.to_json())
         elif not quiet:

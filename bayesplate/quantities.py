@@ -139,6 +139,36 @@ class Quantity:
         return cls(statistics.mean(values), sd, kind, readings=values, resolution=float(resolution),
                    at_x=places_x, at_y=places_y)  # fmt: skip
 
+    @classmethod
+    def of(cls, stated: Quantity | ArrayLike, kind: Kind = "log-normal") -> Quantity:
+        """What was stated as a quantity: a number is exact, an array holds readings, a quantity stays.
+
+        Parameters
+        ----------
+        stated : Quantity, number or array of any shape, in the quantity's unit
+        kind : {"normal", "log-normal"}
+            Of readings; see the class.
+
+        Returns
+        -------
+        Quantity
+
+        Raises
+        ------
+        ValueError
+            If it is none of these, or not finite.
+        """
+        if isinstance(stated, Quantity):
+            return stated
+        values = np.asarray(stated)
+        if values.dtype.kind not in "iuf":
+            raise ValueError(f"wanted a number, an array of readings or a Quantity, got {stated!r}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"wanted finite numbers, got {stated!r}")
+        if values.ndim:
+            return cls.from_readings(values.astype(np.float64).ravel().tolist(), kind=kind)
+        return cls.exact(float(values))
+
     @property
     def is_exact(self) -> bool:
         """Whether the number has no uncertainty."""
@@ -298,6 +328,20 @@ class Quantity:
         log_sd = self.log_sd
         return np.asarray(self.log_prior((at - math.log(self.median)) / log_sd) - math.log(log_sd))[()]
 
+    def standard_quantile(self, probability: ArrayLike) -> Floats:
+        """The standard coordinate below which the quantity lies with a given probability.
+
+        Parameters
+        ----------
+        probability : array of any shape, 0 to 1
+
+        Returns
+        -------
+        array of the same shape, no unit
+        """
+        low, high = (float(ndtr(bound)) for bound in self.standard_bounds)
+        return np.asarray(ndtri(low + (high - low) * np.asarray(probability, dtype=np.float64)))[()]
+
     def quantile(self, probability: ArrayLike) -> Floats:
         """The value below which the quantity lies with a given probability.
 
@@ -309,9 +353,7 @@ class Quantity:
         -------
         array of the same shape, in the quantity's unit
         """
-        share = np.asarray(probability, dtype=np.float64)
-        low, high = (float(ndtr(bound)) for bound in self.standard_bounds)
-        return self.value(ndtri(low + (high - low) * share))
+        return self.value(self.standard_quantile(probability))
 
     def sample(self, rng: np.random.Generator, n: int) -> Floats:
         """Draws of the quantity: (n,) array in its unit."""

@@ -48,7 +48,7 @@ def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, D
     dict of Diagnosis
         By board.
     """
-    return {board: diagnose(board, write=False, seed=seed).diagnosis for board in boards}
+    return {board: diagnose(board, seed=seed).diagnosis for board in boards}
 
 
 def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:

@@ -34,7 +34,7 @@ from bayesplate.modes.shear import shear_flexible_plate
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, moduli, rigidities
-from bayesplate.posterior.inference import Problem, pose
+from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.region import predictor
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
@@ -75,7 +75,7 @@ def run(folder: Path | None = None, n_boards: int = 40, seed: int = 1) -> dict[s
 
 
 def _measured(card: str, folder: Path | None, seed: int) -> dict[str, Any]:
-    result = bayesplate.fit(card, write=False, seed=seed)
+    result = bayesplate.fit(card, seed=seed)
     problem = result.inference.problem
     system = paper_system(problem.board, problem.estimate)
     percentile = percentile_estimate(system)
@@ -129,7 +129,7 @@ def _reading(board: Board, frequencies: np.ndarray) -> Board:
     return replace(board, setups=(replace(setup, readings=readings, resolution=0.0),))
 
 
-def _problem(effects: list[str], truth: np.ndarray) -> Problem:
+def _problem(effects: list[str], truth: np.ndarray) -> PosedProblem:
     """The fit that all simulated boards share: the exact law, made at the noise-free board."""
     prepared = prepare(BOARDS[0], effects)
     return pose(_reading(prepared.board, truth), prepared.prior, law="exact")
@@ -163,7 +163,7 @@ def _percentile(board: Board, coefficients: np.ndarray, read: np.ndarray) -> dic
     }
 
 
-def _posterior(problem: Problem, read: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:
+def _posterior(problem: PosedProblem, read: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:
     """Mean and intervals of the posterior, by importance sampling around the weighted fit: boards are many here."""
     board = _reading(problem.board, read)
     posterior = Posterior(board, problem.prior, problem.posterior.models, "exact")
@@ -209,7 +209,7 @@ def _weighted_draws(
     return theta, weights / weights.sum()
 
 
-def _whole(problem: Problem, columns: np.ndarray, fitted: np.ndarray) -> np.ndarray:
+def _whole(problem: PosedProblem, columns: np.ndarray, fitted: np.ndarray) -> np.ndarray:
     theta = problem.centre.copy()
     theta[columns] = fitted
     return theta[None, :]

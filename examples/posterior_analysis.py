@@ -37,7 +37,7 @@ def run(
         For each of E_x, E_y, G_xy in GPa: posterior mean and sd, the paper's least squares, and the posterior
         probability that the constant lies within one percentile-method sd of that method's mean.
     """
-    result = bayesplate.fit(card, write=False, seed=seed)
+    result = bayesplate.fit(card, seed=seed)
     summary = result.summary
     numbers = {}
     for name, entry in summary.elastic.items():

@@ -72,7 +72,7 @@ def run(folder: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
         known) and exact_inputs_percent (the sd of a fit with exact inputs). widths: by quantity, before and after, the
         standard deviation of its logarithm in per cent. effective_draws: of the parameter that has the fewest.
     """
-    result = bayesplate.fit(card, out=folder, write=folder is not None, force=True, seed=seed)
+    result = bayesplate.fit(card, out=folder, force=True, seed=seed)
     board, draws = result.inference.problem.board, result.draws
     alone = exact_inputs(card, seed)
     budget = {}

@@ -19,7 +19,7 @@ from bayesplate.modes.naming import find
 from bayesplate.modes.solve import Modes, solve
 from bayesplate.plate.parameter import Owner, shown_name
 from bayesplate.plate.setup import AttachedItem, Setup
-from bayesplate.posterior.inference import Problem, pose
+from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.workflow.prepare import prepare
 
 SETUP = "made"
@@ -90,7 +90,7 @@ def shifts(plate: Plate, effects: Sequence[Effect], parameters: Parameters, beam
     return 600.0 * np.log2(squared[1] / squared[0])
 
 
-def posed(card: str, effects: Sequence[str], attached: AttachedItem | None = None) -> Problem:
+def posed(card: str, effects: Sequence[str], attached: AttachedItem | None = None) -> PosedProblem:
     """A shipped board with declared effects, ready to be sampled."""
     prepared = prepare(card)
     setups = prepared.board.setups

@@ -49,5 +49,5 @@ def fitted(card: str) -> Fit:
     """Fit a board as far as the loose gate lets it, in memory."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
-        result = fit(card, write=False)
+        result = fit(card)
     return Fit(prepare(card).card, result.inference, result.draws, result.summary)

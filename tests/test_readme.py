@@ -12,7 +12,7 @@ README = Path(__file__).parents[1] / "README.md"
 
 def test_the_printed_tables_are_those_of_the_fit():
     printed = README.read_text(encoding="utf-8")
-    shown = show_fit(fit("finnish-spruce-cantilever", write=False).summary)
+    shown = show_fit(fit("finnish-spruce-cantilever").summary)
     rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in printed.splitlines() if "│" in line]
     wanted = [list(row) for table in shown.tables for row in table.rows]
     assert rows == wanted

@@ -1,6 +1,13 @@
 """Cards: boards, priors and coefficient tables in TOML, read into frozen models with every fault named at once."""
 
-from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, load_board, read_board_text
+from bayesplate.cards.board import (
+    DEFAULT_POISSON,
+    BoardCard,
+    MaterialSection,
+    PlateSection,
+    load_board,
+    read_board_text,
+)
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.named import NamedCards, load_named
 from bayesplate.cards.physical import physical_faults, plate_mass_g
@@ -11,6 +18,7 @@ from bayesplate.cards.shelf import card_names
 from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
 
 __all__ = [
+    "DEFAULT_POISSON",
     "EDGE_NAMES",
     "EDGE_WORDS",
     "EFFECT_NAMES",

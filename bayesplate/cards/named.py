@@ -35,19 +35,37 @@ class NamedCards:
     faults: tuple[Fault, ...]
 
 
-def load_named(card: BoardCard) -> NamedCards:
-    """Read every card that a board card names."""
+def load_named(
+    card: BoardCard, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] | None = None
+) -> NamedCards:
+    """Read every card that a board card names and that is not given.
+
+    Parameters
+    ----------
+    card : BoardCard
+    prior : PriorCard, optional
+        In place of the one that the card names.
+    tables : dict of CoefficientCard, optional
+        By setup, in place of those that the card names.
+
+    Returns
+    -------
+    NamedCards
+    """
     file = plain(card.path.name) if card.path else f"{card.name}.toml"
     beside = card.path.parent if card.path else None
     faults: list[Fault] = []
-    prior = _read(load_prior, card.material.prior, beside, f"{file} [material] prior", faults)
-    tables: dict[str, CoefficientCard] = {}
+    if prior is None:
+        prior = _read(load_prior, card.material.prior, beside, f"{file} [material] prior", faults)
+    if tables is not None:
+        return NamedCards(prior, tables, tuple(faults))
+    found: dict[str, CoefficientCard] = {}
     for setup, where in zip(card.setups, setup_places(file, [setup.name for setup in card.setups]), strict=True):
         if setup.published_coefficients is not None:
             place = f"{where} published_coefficients"
             table = _read(load_coefficients, setup.published_coefficients, beside, place, faults)
-            tables |= {} if table is None else {setup.name: table}
-    return NamedCards(prior, tables, tuple(faults))
+            found |= {} if table is None else {setup.name: table}
+    return NamedCards(prior, found, tuple(faults))
 
 
 def _read(

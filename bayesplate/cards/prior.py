@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from bayesplate.cards.schema import Section, validated
 from bayesplate.cards.shelf import find
 from bayesplate.cards.values import Choice, Complaint, Number, Refusal, read_format, read_name, read_text
 from bayesplate.cards.words import plain, shown
-from bayesplate.errors import Fault
+from bayesplate.errors import Fault, InputError
 from bayesplate.quantities import Quantity
 
 ELASTIC = ("E_x", "E_y", "G_xy")
@@ -100,6 +101,94 @@ class PriorCard(Section):
         default=None, alias="poisson_xy"
     )
 
+    @classmethod
+    def from_quantities(
+        cls,
+        name: str,
+        constants: Mapping[str, Quantity],
+        *,
+        source: str | Mapping[str, str],
+        noise: Quantity | None = None,
+        poisson_xy: Quantity | None = None,
+        title: str = "",
+    ) -> PriorCard:
+        """A prior from quantities.
+
+        Parameters
+        ----------
+        name : str
+        constants : dict of Quantity
+            E_x, E_y, G_xy in Pa, or D_x, D_y, D_s in N m; each from `Quantity.from_median` or `Quantity.from_range`.
+        source : str or dict of str
+            Where the numbers come from: one text, or one per name (also of noise and poisson_xy).
+        noise : Quantity, optional
+            Relative noise of a frequency, from `Quantity.from_median`.
+        poisson_xy : Quantity, optional
+            Normal: `Quantity.from_mean(0.4, 0.08, "normal")`.
+        title : str
+
+        Returns
+        -------
+        PriorCard
+
+        Raises
+        ------
+        InputError
+            With everything that a prior card cannot hold, and its place on the card.
+        """
+        from bayesplate.cards.writing import prior_text
+
+        faults = [
+            *(Fault(f"{name} {key}", "one of E_x, E_y, G_xy, D_x, D_y, D_s", "an unknown name")
+              for key in constants if key not in (*ELASTIC, *RIGIDITY)),
+            *(Fault(f"{name} {key}", "Quantity.from_median or Quantity.from_range, a constant known to some extent",
+                    "another kind of quantity") for key, one in constants.items() if not _is_of_a_card(one)),
+        ]  # fmt: skip
+        if noise is not None and not (_is_of_a_card(noise) and noise.kind == "log-normal"):
+            faults.append(Fault(f"{name} noise", "Quantity.from_median", "another kind of quantity"))
+        if poisson_xy is not None and (poisson_xy.is_exact or poisson_xy.kind != "normal"):
+            wanted = 'Quantity.from_mean(0.4, 0.08, "normal")'
+            faults.append(Fault(f"{name} poisson_xy", wanted, "another kind of quantity"))
+        if faults:
+            raise InputError(faults)
+
+        def stated(key: str, quantity: Quantity) -> StatedPrior:
+            return StatedPrior(quantity, source if isinstance(source, str) else source.get(key, ""))
+
+        further: dict[str, Any] = {key: stated(key, one) for key, one in constants.items()}
+        if noise is not None:
+            further["stated_noise"] = stated("noise", noise.scaled(100.0))
+        if poisson_xy is not None:
+            further["stated_poisson"] = stated("poisson_xy", poisson_xy)
+        return read_prior_text(prior_text(cls.model_construct(format=1, name=name, title=title, **further)), name)
+
+    def to_card(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
+        """The prior as a card, in TOML.
+
+        Parameters
+        ----------
+        path : path, optional
+            File to write, NAME.toml; nothing is written without it.
+        force : bool
+            Replace a file that is there.
+
+        Returns
+        -------
+        str
+            The text of the card.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        from bayesplate.cards.writing import prior_text, write_card
+
+        text = prior_text(self)
+        if path is not None:
+            write_card(path, self.name, text, force=force)
+        return text
+
     @property
     def stated_constants(self) -> dict[str, StatedPrior]:
         """Name of the constant to its prior and source: all of E_x, E_y, G_xy or all of D_x, D_y, D_s."""
@@ -145,9 +234,23 @@ def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None)
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
     path = find("priors", name_or_path, beside)
-    file = plain(path.name)
-    table = read_table(read_file(path), file)
-    return validated(PriorCard, table, file, faults=[*name_faults(table, file, path.stem), *_set_faults(table, file)])
+    return _read_prior(read_file(path), plain(path.name), path.stem)
+
+
+def read_prior_text(text: str, name: str) -> PriorCard:
+    """Read a prior card from a text, as if it stood in NAME.toml; raises InputError like `load_prior`."""
+    return _read_prior(text.encode("utf-8", "surrogatepass"), f"{plain(name)}.toml", name)
+
+
+def _read_prior(data: bytes, file: str, stem: str) -> PriorCard:
+    table = read_table(data, file)
+    return validated(PriorCard, table, file, faults=[*name_faults(table, file, stem), *_set_faults(table, file)])
+
+
+def _is_of_a_card(quantity: Quantity) -> bool:
+    """Whether a prior card can state the density of a constant: log-normal without bounds, or log-uniform."""
+    is_free = quantity.lower == -math.inf and quantity.upper == math.inf
+    return not quantity.is_exact and (quantity.kind == "log-uniform" or (quantity.kind == "log-normal" and is_free))
 
 
 def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.cards import BoardCard, CoefficientCard, PriorCard, SetupSection
+from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
+from bayesplate.cards.writing import write_card
+from bayesplate.errors import Fault, InputError
 from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE, AttachedItem, DeclaredAir, Reading, Setup
+from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
-
-NO_TABLES: Mapping[str, CoefficientCard] = MappingProxyType({})
-
-_MILLI = 1e-3
-
 
 INPUTS = {
     "length_x": ("m", "length along the grain"),
@@ -39,7 +36,8 @@ INPUTS = {
 class Board:
     """A board and its setups, in SI units.
 
-    `board_from_card` makes one from a card, `made_board` from numbers.
+    `Board.from_numbers` makes one from numbers, `dataclasses.replace` and `with_priors` another one from it;
+    `bayesplate.plate.from_card.board_from_card` takes a card to SI units.
 
     Attributes
     ----------
@@ -114,6 +112,128 @@ class Board:
             self, parameters=tuple(replace(one, prior=priors.get(one.name, one.prior)) for one in self.parameters)
         )
 
+    @classmethod
+    def from_numbers(
+        cls,
+        name: str,
+        *,
+        length_x: Quantity | ArrayLike,
+        length_y: Quantity | ArrayLike,
+        thickness: Quantity | ArrayLike,
+        setups: Setup | Sequence[Setup],
+        mass: Quantity | ArrayLike | None = None,
+        density: Quantity | ArrayLike | None = None,
+        poisson_xy: Quantity | ArrayLike | None = None,
+        prior: str | PriorCard = "weakly-informative",
+        effects: Sequence[str] = (),
+        shear_xz: Quantity | ArrayLike | None = None,
+        shear_yz: Quantity | ArrayLike | None = None,
+        title: str = "",
+        source: str = "",
+    ) -> Board:
+        """A board from numbers, arrays and quantities in SI units: a number is exact, an array holds readings.
+
+        What is wrong with it is said with the place on a card, when the board is used: `bayesplate.check(board)`.
+
+        Parameters
+        ----------
+        name : str
+            Letters, digits, . _ -
+        length_x, length_y, thickness : Quantity, number or array of readings, m
+        setups : Setup or sequence of Setup
+        mass : Quantity, number or array of readings, kg
+            Or the density; exactly one of the two.
+        density : Quantity, number or array of readings, kg m^-3
+        poisson_xy : Quantity, number or array of readings
+            By default that of the prior, where it states one, else 0.4 ± 0.08.
+        prior : str or PriorCard
+            Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
+            what uses the board: `Problem.from_card(board, prior=prior)`.
+        effects : sequence of str
+            Declared effects.
+        shear_xz, shear_yz : Quantity, number or array of readings, Pa
+        title, source : str
+
+        Returns
+        -------
+        Board
+
+        Raises
+        ------
+        InputError
+            With every value that is no number, no array of numbers and no quantity.
+
+        Examples
+        --------
+        >>> import bayesplate
+        >>> free = bayesplate.Setup.from_frequencies({(1, 1): 134, (2, 0): [240, 242]}, edges="free", resolution=1)
+        >>> board = bayesplate.Board.from_numbers(
+        ...     "my-board", length_x=0.253, length_y=0.114, thickness=0.003, mass=0.041, setups=free
+        ... )
+        >>> board.inputs["thickness"].mean
+        0.003
+        """
+        card = load_prior(prior) if isinstance(prior, str) else prior
+        poisson = card.poisson_xy or DEFAULT_POISSON if poisson_xy is None else poisson_xy
+        stated = {
+            "length_x": length_x, "length_y": length_y, "thickness": thickness, "mass": mass, "density": density,
+            "poisson_xy": poisson, "shear_xz": shear_xz, "shear_yz": shear_yz,
+        }  # fmt: skip
+        quantities: dict[str, Quantity] = {}
+        faults = []
+        for key, value in stated.items():
+            try:
+                if value is not None:
+                    quantities[key] = Quantity.of(value, "normal" if key == "poisson_xy" else "log-normal")
+            except ValueError as error:
+                faults.append(Fault(f"{name} {key}", "a number, an array of readings or a Quantity, SI", str(error)))
+        if faults:
+            raise InputError(faults)
+        shear = {key: quantities.pop(key, None) for key in ("shear_xz", "shear_yz")}
+        held = (setups,) if isinstance(setups, Setup) else tuple(setups)
+        return made_board(
+            name,
+            quantities,
+            [setup.with_noise_of(card) for setup in held],
+            prior=prior if isinstance(prior, str) else prior.name,
+            effects=tuple(effects),
+            title=title,
+            source=source,
+            **shear,
+        )
+
+    def to_card(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
+        """The board as a card, in TOML.
+
+        Parameters
+        ----------
+        path : path, optional
+            File to write, NAME.toml; nothing is written without it.
+        force : bool
+            Replace a file that is there.
+
+        Returns
+        -------
+        str
+            The text of the card; reading it gives the board again.
+
+        Raises
+        ------
+        InputError
+            If a quantity has a density that no card can state, or the file cannot be written.
+        """
+        from bayesplate.plate.writing import card_text
+
+        text = card_text(self)
+        if path is not None:
+            write_card(path, self.name, text, force=force)
+        return text
+
+    @property
+    def reading_names(self) -> tuple[str, ...]:
+        """Setup and label of every reading, in the order of all results: "cantilever (1,0)"."""
+        return tuple(f"{setup.name} {label}" for setup in self.setups for label in setup.labels)
+
 
 def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup], **more: Any) -> Board:
     """A board from quantities in SI units, without a card.
@@ -137,48 +257,6 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
     return Board(name, (*stated, *covered), tuple(setups), **more)
 
 
-def board_from_card(
-    card: BoardCard, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] = NO_TABLES
-) -> Board:
-    """Take a board card to SI units.
-
-    Parameters
-    ----------
-    card : BoardCard
-    prior : PriorCard, optional
-        Its noise and Poisson ratio stand where it states them and the board card does not.
-    tables : dict of CoefficientCard
-        By setup, those that the card names: see `bayesplate.cards.load_named`.
-
-    Returns
-    -------
-    Board
-    """
-    setups = tuple(_setup(section, prior, tables.get(section.name)) for section in card.setups)
-    inputs = {
-        "length_x": card.plate.length_x_mm.scaled(_MILLI).with_places_scaled(_MILLI),
-        "length_y": card.plate.length_y_mm.scaled(_MILLI).with_places_scaled(_MILLI),
-        "thickness": card.plate.thickness_mm.scaled(_MILLI).with_places_scaled(_MILLI),
-    }
-    if card.plate.mass_g is not None:
-        inputs["mass"] = card.plate.mass_g.scaled(_MILLI)
-    elif card.plate.density_kg_m3 is not None:
-        inputs["density"] = card.plate.density_kg_m3
-    inputs["poisson_xy"] = _poisson(card, prior)
-    return made_board(
-        card.name,
-        inputs,
-        setups,
-        title=card.title,
-        source=card.source,
-        prior=card.material.prior,
-        effects=tuple(card.effects),
-        shear_xz=_optional(card.material.shear_xz_gpa, 1e9),
-        shear_yz=_optional(card.material.shear_yz_gpa, 1e9),
-        notes=_notes(card, inputs["poisson_xy"]),
-    )
-
-
 def density(values: Values) -> NDArray[np.float64]:
     """Density of the board from the values of its inputs, kg m^-3."""
     if "density" in values:
@@ -193,68 +271,3 @@ def vibrating_lengths(values: Values, setup: Setup) -> tuple[NDArray[np.float64]
         covered = sum(values[setup.input_name(e)] for e in setup.clamped if e.startswith(axis))
         sides.append(np.asarray(values[f"length_{axis}"] - covered))
     return sides[0], sides[1]
-
-
-def _optional(quantity: Quantity | None, factor: float) -> Quantity | None:
-    return None if quantity is None else quantity.scaled(factor)
-
-
-def _poisson(card: BoardCard, prior: PriorCard | None) -> Quantity:
-    if card.material.poisson_is_default and prior is not None and prior.poisson_xy is not None:
-        return prior.poisson_xy
-    return card.material.poisson_xy
-
-
-def _noise(section: SetupSection, prior: PriorCard | None) -> Quantity:
-    stated = section.noise_percent or (prior.noise_percent if prior is not None else None)
-    if stated is not None:
-        return stated.scaled(1e-2)
-    return CLAMPED_NOISE if "clamped" in section.edges.words.values() else DEFAULT_NOISE
-
-
-def _joined_with_rounding(frequency: Quantity, resolution: float | None) -> Quantity:
-    """A list of readings with their standard error joined with the rounding error; a single number stays as it is."""
-    if len(frequency.readings) < 2 or frequency.resolution or not resolution:
-        return frequency
-    return Quantity.from_readings(frequency.readings, resolution)
-
-
-def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCard | None) -> Setup:
-    edges, first = section.edges, section.first_label
-    return Setup(
-        name=section.name,
-        ends_x=(edges.x0, edges.x1),
-        ends_y=(edges.y0, edges.y1),
-        clamped={edge: length.scaled(_MILLI) for edge, length in section.clamped_mm.items()},
-        readings=tuple(
-            Reading(
-                label,
-                (label.m - first.m, label.n - first.n),
-                _joined_with_rounding(frequency, section.resolution_hz),
-                section.signs.get(label, ""),
-            )
-            for label, frequency in section.frequencies_hz.items()
-        ),
-        resolution=section.resolution_hz or 0.0,
-        unlabelled=tuple(peak.mean for peak in section.unlabelled_hz),
-        noise=_noise(section, prior),
-        first_label=first,
-        published_coefficients=table,
-        attached=tuple(
-            AttachedItem(
-                item.kind,
-                tuple((x * _MILLI, y * _MILLI) for x, y in item.at_mm),
-                _optional(item.mass_g, _MILLI),
-            )
-            for item in section.attached
-        ),
-        hammer=None if section.hammer is None else (section.hammer.at_mm[0] * _MILLI, section.hammer.at_mm[1] * _MILLI),
-        air=None if section.air is None else DeclaredAir(section.air.density_kg_m3, section.air.baffle),
-    )
-
-
-def _notes(card: BoardCard, poisson: Quantity) -> tuple[str, ...]:
-    notes = []
-    if card.material.poisson_is_default:
-        notes.append(f"the card gives no Poisson ratio: nu_xy = {poisson.mean:g} +- {poisson.sd:g} was assumed")
-    return tuple(notes)

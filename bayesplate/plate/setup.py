@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.cards import CoefficientCard
+from bayesplate.cards import CoefficientCard, PriorCard
+from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 from bayesplate.plate.parameter import Owner, Parameter, shown_name
 from bayesplate.quantities import Quantity
@@ -21,6 +22,13 @@ NO_OFFSET = Label(0, 0)
 DEFAULT_NOISE = Quantity.from_median(0.003, np.exp(0.5))
 CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 """Relative noise of a frequency: free boards settle at 0.24-0.30 %; re-clamping one board spreads it by 1-2.4 %."""
+
+
+def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
+    """The relative noise where none is stated: that of the prior, otherwise the one of such edges."""
+    if prior is not None and prior.noise_percent is not None:
+        return prior.noise_percent.scaled(1e-2)
+    return CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE
 
 
 @dataclass(frozen=True)
@@ -42,6 +50,43 @@ class Reading:
     beams: tuple[int, int]
     frequency: Quantity
     sign: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        label: str | tuple[int, int],
+        frequency: Quantity | ArrayLike,
+        sign: str = "",
+        first_label: tuple[int, int] = NO_OFFSET,
+    ) -> Reading:
+        """A reading from numbers.
+
+        Parameters
+        ----------
+        label : str or tuple of int
+            "(1,0)" or (1, 0).
+        frequency : Quantity, number or array of readings, Hz
+            A number is rounded to the resolution of its setup, an array holds repeated readings of one mode.
+        sign : str
+        first_label : tuple of int
+            The laboratory's label of the lowest beam functions.
+
+        Returns
+        -------
+        Reading
+
+        Raises
+        ------
+        InputError
+            If the label cannot be read, or the frequency is no number.
+        """
+        read = Label.parse(_label_text(label))
+        try:
+            quantity = Quantity.of(frequency)
+        except ValueError as error:
+            wanted = "a number, an array of readings or a Quantity, in Hz"
+            raise InputError(Fault(f"frequency of {read}", wanted, repr(frequency), str(error))) from None
+        return cls(read, (read.m - first_label[0], read.n - first_label[1]), quantity, sign)
 
 
 @dataclass(frozen=True)
@@ -101,6 +146,104 @@ class Setup:
     hammer: tuple[float, float] | None = None
     air: DeclaredAir | None = None
 
+    @classmethod
+    def from_frequencies(
+        cls,
+        frequencies: Mapping[str | tuple[int, int], Quantity | ArrayLike],
+        *,
+        edges: str | Mapping[str, str],
+        name: str = "setup",
+        resolution: float = 0.0,
+        noise: Quantity | None = None,
+        first_label: tuple[int, int] = NO_OFFSET,
+        clamped: Mapping[str, Quantity | ArrayLike] | None = None,
+        signs: Mapping[str | tuple[int, int], str] | None = None,
+        unlabelled: Sequence[float] = (),
+        attached: Sequence[AttachedItem] = (),
+        hammer: tuple[float, float] | None = None,
+        air: DeclaredAir | None = None,
+        published_coefficients: CoefficientCard | None = None,
+    ) -> Setup:
+        """A setup from numbers and arrays.
+
+        What is wrong with them beyond the names of edges and labels is said with the place on a card, when a board
+        with this setup is used.
+
+        Parameters
+        ----------
+        frequencies : dict of Quantity, number or array of readings, Hz
+            By label, "(1,0)" or (1, 0).
+        edges : str or dict of str
+            "clamped", "supported" or "free": one word for all four edges, or one per edge x0, x1, y0, y1.
+        name : str
+        resolution : float, Hz
+            Step to which plain numbers are rounded; 0 if they are not.
+        noise : Quantity, optional
+            Relative, log-normal: 0.005 is half a per cent. By default that of the prior or of the edges, as on a card.
+        first_label : tuple of int
+        clamped : dict of Quantity, number or array of readings, m
+            What a clamp covers, by edge.
+        signs : dict of str, optional
+            "+" or "-", by label.
+        unlabelled : sequence of float, Hz
+        attached : sequence of AttachedItem
+        hammer : tuple of float, optional, m
+        air : DeclaredAir, optional
+        published_coefficients : CoefficientCard, optional
+
+        Returns
+        -------
+        Setup
+
+        Raises
+        ------
+        InputError
+            With every label, frequency and name of an edge that cannot be read.
+        """
+        faults: list[Fault] = []
+        if not isinstance(edges, str) and set(edges) != set(EDGES):
+            faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
+        words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
+        told = {Label.parse(_label_text(label)): sign for label, sign in (signs or {}).items()}
+        readings = []
+        for label, frequency in frequencies.items():
+            try:
+                one = Reading.of(label, frequency, first_label=first_label)
+                readings.append(replace(one, sign=told.pop(one.label, "")))
+            except InputError as error:
+                faults += [replace(fault, place=f"{name} {fault.place}") for fault in error.faults]
+        faults += [Fault(f"{name} signs", "a label among the frequencies", str(label)) for label in told]
+        covered: dict[str, Quantity] = {}
+        for edge, length in (clamped or {}).items():
+            if edge not in EDGES:
+                faults.append(Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(edge)))
+            try:
+                covered[edge] = Quantity.of(length)
+            except ValueError as error:
+                faults.append(Fault(f"{name} clamped {edge}", "a length in m", repr(length), str(error)))
+        if faults:
+            raise InputError(faults)
+        return cls(
+            name=name,
+            ends_x=(cast(End, words["x0"]), cast(End, words["x1"])),
+            ends_y=(cast(End, words["y0"]), cast(End, words["y1"])),
+            readings=tuple(readings),
+            noise=assumed_noise(tuple(words.values())) if noise is None else noise,
+            clamped=covered,
+            resolution=float(resolution),
+            unlabelled=tuple(float(peak) for peak in unlabelled),
+            first_label=Label(*first_label),
+            published_coefficients=published_coefficients,
+            attached=tuple(attached),
+            hammer=hammer,
+            air=air,
+        )
+
+    def with_noise_of(self, prior: PriorCard) -> Setup:
+        """The setup with the noise that a prior card states, if it does and the setup states none of its own."""
+        words = self.ends_x + self.ends_y
+        return replace(self, noise=assumed_noise(words, prior)) if self.noise == assumed_noise(words) else self
+
     @property
     def edges(self) -> dict[str, str]:
         """Condition of each edge."""
@@ -147,3 +290,7 @@ class Setup:
     def input_name(self, edge: str) -> str:
         """Name of the clamped length of an edge among the board's inputs."""
         return shown_name(f"clamped_{edge}", self.owner)
+
+
+def _label_text(label: str | tuple[int, int]) -> str:
+    return label if isinstance(label, str) else f"({','.join(map(str, label))})"

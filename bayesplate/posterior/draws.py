@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.board import density
 from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
-from bayesplate.posterior.inference import Inference, Problem
+from bayesplate.posterior.inference import Inference, PosedProblem
 
 Floats = NDArray[np.float64]
 
@@ -102,7 +102,7 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     )
 
 
-def posterior_mean_values(problem: Problem, draws: Draws) -> dict[str, Floats]:
+def posterior_mean_values(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
     """Constants and inputs at their posterior means."""
     means = {name: np.asarray(v.mean()) for name, v in {**draws.rigidities, **draws.inputs}.items()}
     return {**problem.board.nominal(), **means}

@@ -34,8 +34,8 @@ _N_CHECKS = 256
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """A board ready to be sampled.
+class PosedProblem:
+    """A board posed as a problem of inference: its estimate, both laws, and where the posterior lies.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Problem:
         """The sampled columns."""
         return self.posterior.parameters
 
-    def under(self, law: LawName) -> Problem:
+    def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""
         return replace(self, posterior=replace_law(self.posterior, law))
 
@@ -76,14 +76,14 @@ class Inference:
 
     Attributes
     ----------
-    problem : Problem
+    problem : PosedProblem
     chains : Chains
     convergence : Convergence
     surrogate : Surrogate or None
         What the walkers walked on between two evaluations of the exact law.
     """
 
-    problem: Problem
+    problem: PosedProblem
     chains: Chains
     convergence: Convergence
     surrogate: Surrogate | None = None
@@ -94,7 +94,7 @@ def replace_law(posterior: Posterior, law: LawName) -> Posterior:
     return Posterior(posterior.board, posterior.prior, posterior.models, law, posterior.robust)
 
 
-def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: bool = False) -> Problem:
+def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: bool = False) -> PosedProblem:
     """Estimate by least squares, check that the constants are identifiable, build both laws and choose one.
 
     Parameters
@@ -109,7 +109,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
 
     Returns
     -------
-    Problem
+    PosedProblem
 
     Raises
     ------
@@ -139,7 +139,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     posterior = Posterior(board, prior, region.models, law, robust)
     require_reachable(posterior, region.centre, region.covariance)
     require_possible_noise(posterior, region.centre)
-    return Problem(board, prior, estimate, found, posterior, region.centre, region.covariance, is_forced)
+    return PosedProblem(board, prior, estimate, found, posterior, region.centre, region.covariance, is_forced)
 
 
 def _widening(board: Board) -> float:
@@ -160,7 +160,7 @@ def _identifiable_at(board: Board, region: Region, estimate: Estimate) -> Identi
 
 
 def infer(
-    problem: Problem,
+    problem: PosedProblem,
     settings: SamplerSettings,
     *,
     checkpoint: Checkpoint | None = None,
@@ -170,7 +170,7 @@ def infer(
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     settings : SamplerSettings
     checkpoint, progress
         See `bayesplate.posterior.sampling.sample`.

@@ -15,7 +15,7 @@ from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.plate.board import Values
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.posterior.draws import Draws, posterior_mean_values
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.reweighting import weighted_mean
 
 Floats = NDArray[np.float64]
@@ -52,12 +52,12 @@ class Method:
     n_subsets: int | None = None
 
 
-def point_methods(problem: Problem, system: PaperSystem, expected_sd: Mapping[str, float]) -> list[Method]:
+def point_methods(problem: PosedProblem, system: PaperSystem, expected_sd: Mapping[str, float]) -> list[Method]:
     """The methods without sampling: the paper's least squares, weighted least squares, percentile.
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     system : PaperSystem
     expected_sd : dict of float
         Relative standard deviation of the weighted estimate of each modulus.
@@ -103,13 +103,13 @@ def point_methods(problem: Problem, system: PaperSystem, expected_sd: Mapping[st
     return methods
 
 
-def posterior_method(name: str, problem: Problem, draws: Draws, weights: Floats) -> Method:
+def posterior_method(name: str, problem: PosedProblem, draws: Draws, weights: Floats) -> Method:
     """A posterior as a method, from weighted draws.
 
     Parameters
     ----------
     name : str
-    problem : Problem
+    problem : PosedProblem
     draws : Draws
     weights : (n_chains * n_draws,) array
         Sum to 1.
@@ -129,7 +129,7 @@ def posterior_method(name: str, problem: Problem, draws: Draws, weights: Floats)
     return Method(name, mean, at_means, sd=sd, interval=interval)
 
 
-def misses(problem: Problem, values: Values) -> Floats:
+def misses(problem: PosedProblem, values: Values) -> Floats:
     """ln predicted - ln measured of all readings, by full solves; not a number where the constants are no plate's."""
     if not all(float(values[name]) > 0 for name in RIGIDITIES):
         return np.full(log_measured(problem.board).size, np.nan)

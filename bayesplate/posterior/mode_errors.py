@@ -9,7 +9,7 @@ from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import Errors, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference, Problem
+from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.region import predictor
 
 _N_STARTS = 500
@@ -33,7 +33,7 @@ def median_noise(draws: Draws) -> NDArray[np.float64]:
     return np.asarray(np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0))
 
 
-def _starts(problem: Problem, draws: Draws) -> NDArray[np.float64]:
+def _starts(problem: PosedProblem, draws: Draws) -> NDArray[np.float64]:
     """Where fits may begin: the centre and, as Student's likelihood has several peaks, draws: (n_starts, n_free)."""
     theta = problem.centre[None, :]
     if problem.posterior.robust:

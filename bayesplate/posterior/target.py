@@ -12,9 +12,9 @@ from bayesplate.cards import PriorCard
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.plate.board import Board
-from bayesplate.plate.material import moduli
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.posterior.parameters import Parameters
+from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.quantities import Quantity
 
 LINEAR_SHARE = 0.25
@@ -60,9 +60,17 @@ class Posterior:
 
     def log_prior(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log prior density: (n_draws,) array."""
-        total = self.parameters.log_prior_inputs(theta) + self.parameters.log_prior_noise(theta)
-        total += self.log_prior_constants(theta)
+        factors = self.log_prior_factors(theta)
+        total = np.sum([factors[name] for name in ("inputs", "noise", "constants") if name in factors], axis=0)
         return np.where(np.isnan(total), -np.inf, total)
+
+    def log_prior_factors(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """What the prior is a product of: log densities of the constants, the noise, and the inputs if any; (n_draws,).
+
+        The inputs are the uncertain parameters of the board, those of declared effects included.
+        """
+        factors = {"constants": self.log_prior_constants(theta), "noise": self.parameters.log_prior_noise(theta)}
+        return factors | ({"inputs": self.parameters.log_prior_inputs(theta)} if self.parameters.inputs else {})
 
     def log_prior_constants(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log prior density of ln D_x, ln D_y, ln D_s given the inputs: (n_draws,) array.
@@ -75,6 +83,42 @@ class Posterior:
         by_name = values | constants._asdict()
         densities = [prior.log_density_of_log(np.log(by_name[name])) for name, prior in self.priors.items()]
         return np.where(np.isnan(constants.E_x), -np.inf, np.sum(densities, axis=0))
+
+    def prior_transform(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map the unit cube to the columns under the prior: uniform u become draws from the prior.
+
+        Inputs come first, because moduli become rigidities with the drawn thickness and nu_xy.
+
+        Parameters
+        ----------
+        u : (n_draws, n_dim) array, 0 to 1
+            One number per column, in their order; the first three are those of the constants that the prior states.
+
+        Returns
+        -------
+        (n_draws, n_dim) array
+            Where the drawn moduli are no material's, rigidities that are no material's either.
+        """
+        u = np.asarray(u, dtype=np.float64)
+        parameters = self.parameters
+        theta = np.zeros_like(u)
+        for i, one in enumerate(parameters.uncertain, start=parameters.first_input):
+            theta[:, i] = one.prior.standard_quantile(u[:, i])
+        for i, noise in enumerate(parameters.noises, start=N_RIGIDITIES):
+            theta[:, i] = np.log(noise.prior.quantile(u[:, i]))
+        drawn = {name: prior.quantile(u[:, i]) for i, (name, prior) in enumerate(self.priors.items())}
+        if set(drawn) == set(MODULI):
+            values = parameters.values(theta)
+            E_x, E_y, G_xy = (drawn[name] for name in MODULI)
+            stiffness = rigidities(E_x, E_y, G_xy, values["thickness"], values["poisson_xy"])
+            # At another Poisson ratio D_y / D_x is E_y / E_x still, so that nu_xy nu_yx is what it was.
+            without = rigidities(E_x, E_y, G_xy, values["thickness"], 0.0)
+            pairs = zip(stiffness, without, strict=True)
+            constants = [np.where(np.isnan(stiffness.D_x), other, one) for one, other in pairs]
+        else:
+            constants = [drawn[name] for name in RIGIDITIES]
+        theta[:, :N_RIGIDITIES] = np.log(np.stack(constants, axis=1))
+        return theta
 
     def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """ln f of the labelled modes: one (n_draws, n_modes) array a setup."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,22 +12,28 @@ from numpy.typing import NDArray
 from bayesplate.report.saving import save_figure
 from bayesplate.report.style import BLUE, ORANGE
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _INCHES = 1.9
 _HELD = (0.5, 0.9)
 
 
-def write_corner_plot(
-    path: Path, columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float] | None = None
-) -> None:
-    """Draw every pair of columns against each other, and write it by the ending of the path, PNG or SVG.
+def corner_figure(
+    columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float | None] | None = None
+) -> Figure:
+    """Every pair of columns against each other.
 
     Parameters
     ----------
-    path : Path
     columns : dict of array of any shape
         Draws by what stands at their axis, units included; all of one size.
     marked : dict of float, optional
         Values to mark by a line, such as the least squares, by the same words.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
     """
     import corner
     from matplotlib.figure import Figure
@@ -43,4 +50,11 @@ def write_corner_plot(
         truths=None if marked is None else [marked.get(name) for name in columns],
         truth_color=ORANGE,
     )
-    save_figure(figure, path)
+    return figure
+
+
+def write_corner_plot(
+    path: Path, columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float | None] | None = None
+) -> None:
+    """Write the figure by the ending of the path, PNG or SVG; further parameters as of `corner_figure`."""
+    save_figure(corner_figure(columns, marked), path)

@@ -134,10 +134,10 @@ def pictures(
         "diagnosis_first": first,
         "diagnosis_more": more,
         "constants": [constants_picture(summary, draws.moduli)],
-        "percentiles": _percentiles(inference, draws),
+        "percentiles": percentiles_pictures(inference, draws),
         "weak": [shares_picture(summary, problem.identifiability)],
         "board": [board_picture(board)],
-        "modes": _modes(inference, draws, summary),
+        "modes": modes_pictures(inference, draws, summary),
         "errors": [residuals_picture(summary)],
         "folded": [
             predictive_picture(summary, draws.predictive),
@@ -156,7 +156,8 @@ def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Pict
     return [before_after] if before_after else [], [signatures] if signatures else []
 
 
-def _percentiles(inference: Inference, draws: Draws) -> list[Picture]:
+def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
+    """The picture of the percentile method; none where there are too many modes, or no estimate is positive."""
     problem = inference.problem
     n_modes = sum(len(setup.readings) for setup in problem.board.setups)
     if n_modes > MOST_MODES_OF_PERCENTILES:
@@ -167,7 +168,7 @@ def _percentiles(inference: Inference, draws: Draws) -> list[Picture]:
     return [percentiles_picture(found, n_modes, draws.moduli)]
 
 
-def _modes(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
+def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
     """One picture a setup."""
     problem = inference.problem
     board = problem.board

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.report.priors import input_words
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, plain_axes, short
 from bayesplate.results.budget import input_shares
@@ -31,12 +31,12 @@ _LARGE = 0.75
 _CHARACTERS_AN_INCH = 17
 
 
-def pairs_picture(problem: Problem, draws: Draws) -> Picture:
+def pairs_picture(problem: PosedProblem, draws: Draws) -> Picture:
     """Draw the pairs.
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     draws : Draws
 
     Returns
@@ -77,7 +77,7 @@ def pairs_picture(problem: Problem, draws: Draws) -> Picture:
     return Picture("corner", "Which quantities hang together", alt, caption, figure)
 
 
-def chosen(problem: Problem, draws: Draws) -> dict[str, Floats]:
+def chosen(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
     """Moduli in GPa, the noise of each setup in %, and the inputs with the largest share in the moduli's variance."""
     columns = {f"{name}, GPa": values.ravel() * GPA for name, values in draws.moduli.items()}
     setups = problem.board.setups

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.quantities import Quantity
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, legend_below, plain_axes, short
 
@@ -69,7 +69,7 @@ class Compared:
         return "as before: nothing was learned"
 
 
-def compared(problem: Problem, draws: Draws) -> list[Compared]:
+def compared(problem: PosedProblem, draws: Draws) -> list[Compared]:
     """Everything that was given a prior and then sampled: constants, noise, uncertain inputs, effects."""
     found = []
     unit = {"E_x": ("GPa", 1e-9), "E_y": ("GPa", 1e-9), "G_xy": ("GPa", 1e-9)}
@@ -99,12 +99,12 @@ def input_words(parameter: Parameter, board: Board) -> tuple[str, float, str]:
     return f"{parameter.words or parameter.key}{where}", factor, unit
 
 
-def priors_picture(problem: Problem, draws: Draws) -> Picture:
+def priors_picture(problem: PosedProblem, draws: Draws) -> Picture:
     """Draw prior and posterior of everything sampled.
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     draws : Draws
 
     Returns

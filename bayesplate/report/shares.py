@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bayesplate.estimates.identifiability import Identifiability
 from bayesplate.report.style import BLUE, DARK, GREEN, GREY, ORANGE, SMALL, WORDS, Picture, legend_below, short, stacked
+from bayesplate.results.checking import CheckedMode, CheckReport
+from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
 from bayesplate.results.words import mode_name
 
@@ -18,12 +22,12 @@ _STYLES = {
 _ROW = 0.27
 
 
-def shares_picture(summary: Summary, found: Identifiability) -> Picture:
+def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Picture:
     """Draw the energy of each mode.
 
     Parameters
     ----------
-    summary : Summary
+    summary : Summary or CheckReport
     found : Identifiability
         Its shares belong to the summary's modes.
 
@@ -31,7 +35,7 @@ def shares_picture(summary: Summary, found: Identifiability) -> Picture:
     -------
     Picture
     """
-    modes = summary.modes
+    modes: Sequence[ModeRow | CheckedMode] = summary.modes
     several = len({mode.setup for mode in modes}) > 1
     names = [mode_name(mode.label, short(mode.setup, 14), several=several) for mode in modes]
     left = 0.62 if not several else min(1.6, 0.3 + 0.075 * max(len(name) for name in names))

@@ -20,58 +20,65 @@ from numpy.typing import NDArray
 
 Arrays = Mapping[str, NDArray[Any]]
 
-GROUPS = ("posterior", "log_likelihood", "posterior_predictive", "sample_stats", "observed_data")
+GROUPS = ("posterior", "log_prior", "log_likelihood", "posterior_predictive", "sample_stats", "observed_data")
+"""In the order of the file; all but the last hold one value per chain and draw, or in sample_stats none."""
 
 
 @dataclass(frozen=True)
 class Archive:
-    """What an archive holds.
+    """What an archive holds, as plain arrays.
 
     Attributes
     ----------
     groups : dict of dict of array
-        Variables by group and name; sampled ones (n_chains, n_draws, ...).
+        Variables by group (`GROUPS`) and name; sampled ones (n_chains, n_draws, ...). In `sample_stats` also arrays
+        without the first two axes, such as one number per parameter; in `observed_data` no others.
     coords : dict of array
-        Coordinate values by dimension, chain and draw included.
+        Labels of every dimension besides chain and draw: texts or numbers. One that was read has those of chain and
+        draw too.
     dims : dict of tuple of str
-        Dimensions of every variable by name, without chain and draw.
+        Dimensions of a variable by its name, besides chain and draw; absent or empty for one number per draw.
     attributes : dict of str
         Card, priors, versions, seed and the like.
     """
 
-    groups: dict[str, dict[str, NDArray[Any]]]
-    coords: dict[str, NDArray[Any]]
-    dims: dict[str, tuple[str, ...]]
-    attributes: dict[str, str]
+    groups: Mapping[str, Arrays]
+    coords: Mapping[str, Sequence[str] | NDArray[Any]]
+    dims: Mapping[str, Sequence[str]]
+    attributes: Mapping[str, str]
+
+    def placed(self) -> tuple[Arrays, dict[str, dict[str, tuple[tuple[str, ...], NDArray[Any]]]]]:
+        """Labels of every dimension, and each variable by group and name with its dimensions.
+
+        Raises
+        ------
+        ValueError
+            If an array does not fit its dimensions.
+        """
+        n_chains, n_draws = next(iter(self.groups["posterior"].values())).shape[:2]
+        axes = {"chain": np.arange(n_chains), "draw": np.arange(n_draws)}
+        axes |= {name: np.asarray(labels) for name, labels in self.coords.items()}
+        found = {
+            group: {
+                name: _place(name, np.asarray(value), self._further(group, name), axes, group != "observed_data")
+                for name, value in self.groups.get(group, {}).items()
+            }
+            for group in GROUPS
+        }
+        return axes, found
+
+    def _further(self, group: str, name: str) -> Sequence[str]:
+        """Dimensions besides chain and draw; a factor of the prior is one number per draw, whatever bears its name."""
+        return () if group == "log_prior" else self.dims.get(name, ())
 
 
-def write_archive(
-    path: Path,
-    *,
-    posterior: Arrays,
-    log_likelihood: Arrays,
-    posterior_predictive: Arrays,
-    observed_data: Arrays,
-    sample_stats: Arrays,
-    coords: Mapping[str, Sequence[str] | NDArray[Any]],
-    dims: Mapping[str, Sequence[str]],
-    attributes: Mapping[str, str],
-) -> None:
-    """Write the archive, completely or not at all.
+def write_archive(path: Path, archive: Archive) -> None:
+    """Write an archive, completely or not at all.
 
     Parameters
     ----------
     path : Path
-    posterior, log_likelihood, posterior_predictive, sample_stats : mapping of (n_chains, n_draws, ...) arrays
-        By variable name.  In `sample_stats` also arrays without the first two axes, such as one number a parameter.
-    observed_data : mapping of arrays
-        Without chain and draw.
-    coords : mapping
-        Labels of every dimension besides chain and draw: texts or numbers.
-    dims : mapping
-        Dimensions of each variable besides chain and draw; absent for one number a draw.
-    attributes : mapping of str
-        Written at the root of the file.
+    archive : Archive
 
     Raises
     ------
@@ -81,28 +88,43 @@ def write_archive(
     import h5netcdf
 
     path = Path(path)
-    given = (posterior, log_likelihood, posterior_predictive, sample_stats, observed_data)
-    n_chains, n_draws = next(iter(posterior.values())).shape[:2]
-    axes = {"chain": np.arange(n_chains), "draw": np.arange(n_draws)} | {
-        name: np.asarray(labels) for name, labels in coords.items()
-    }
+    axes, groups = archive.placed()
     partial = path.with_name(path.name + ".partial")
     try:
         with h5netcdf.File(partial, "w") as file:
-            for key in sorted(attributes):
-                file.attrs[key] = attributes[key]
-            for group_name, variables in zip(GROUPS, given, strict=True):
-                placed = {
-                    name: _place(name, np.asarray(value), dims.get(name, ()), axes, group_name != "observed_data")
-                    for name, value in variables.items()
-                }
-                _write_group(file.create_group(group_name), placed, axes)
+            for key in sorted(archive.attributes):
+                file.attrs[key] = archive.attributes[key]
+            for name, variables in groups.items():
+                _write_group(file.create_group(name), variables, axes)
         with partial.open("rb") as stream:
             os.fsync(stream.fileno())
         os.replace(partial, path)
     finally:
         with suppress(FileNotFoundError):
             partial.unlink()
+
+
+def to_arviz(archive: Archive) -> Any:
+    """An archive as what ArviZ works with: InferenceData in 0.23, DataTree in 1.x; no file is written.
+
+    Parameters
+    ----------
+    archive : Archive
+
+    Returns
+    -------
+    arviz.InferenceData or xarray.DataTree
+    """
+    xarray: Any = import_module("xarray")
+    arviz: Any = import_module("arviz")
+    axes, groups = archive.placed()
+    datasets = {}
+    for name, variables in groups.items():
+        used = {dim: axes[dim] for dim in axes if any(dim in dims for dims, _ in variables.values())}
+        datasets[name] = xarray.Dataset(variables, coords=used)
+    if hasattr(arviz, "InferenceData"):
+        return arviz.InferenceData(attrs=dict(archive.attributes), **datasets)
+    return xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=dict(archive.attributes)), **datasets})
 
 
 def _place(
@@ -159,10 +181,14 @@ def read_archive(path: Path) -> Archive:
         dataset = tree[group]
         groups[group] = {str(name): np.array(array.values) for name, array in dataset.data_vars.items()}
         coords |= {str(name): np.array(array.values) for name, array in dataset.coords.items()}
-        dims |= {
-            str(name): tuple(str(dim) for dim in array.dims if dim not in ("chain", "draw"))
-            for name, array in dataset.data_vars.items()
-        }
+        dims |= (
+            {}
+            if group == "log_prior"
+            else {
+                str(name): tuple(str(dim) for dim in array.dims if dim not in ("chain", "draw"))
+                for name, array in dataset.data_vars.items()
+            }
+        )
     attributes = {str(key): str(value) for key, value in tree.attrs.items() if not str(key).startswith("_")}
     if hasattr(tree, "close"):
         tree.close()  # an open file would keep the archive from being written again

@@ -12,7 +12,7 @@ from bayesplate.estimates.leave_one_out import Errors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.methods import Method
 from bayesplate.results.contract import Elastic, finite, rms
 
@@ -135,12 +135,12 @@ class Comparison:
         return f"<Comparison of {self.name}: {self.verdict.sentence}>"
 
 
-def theory_row(problem: Problem, system: PaperSystem, methods: Sequence[Method], errors: Errors) -> TheoryRow:
+def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Method], errors: Errors) -> TheoryRow:
     """What one theory of the plate makes of a board.
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     system : PaperSystem
     methods : sequence of Method
     errors : Errors

@@ -12,7 +12,7 @@ from bayesplate.frequencies.spectrum import NamedMode
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.results.contract import finite
 
 
@@ -76,12 +76,12 @@ def over(measured: float, predicted: float) -> float:
     return float(cents(np.log(measured / predicted)))
 
 
-def mode_rows(problem: Problem, draws: Draws, assessment: Assessment) -> tuple[ModeRow, ...]:
+def mode_rows(problem: PosedProblem, draws: Draws, assessment: Assessment) -> tuple[ModeRow, ...]:
     """One row per labelled mode, setup after setup.
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     draws : Draws
     assessment : Assessment
 
@@ -117,7 +117,7 @@ def mode_rows(problem: Problem, draws: Draws, assessment: Assessment) -> tuple[M
     return tuple(made)
 
 
-def rounding_intervals(problem: Problem) -> list[tuple[float, float] | None]:
+def rounding_intervals(problem: PosedProblem) -> list[tuple[float, float] | None]:
     """Ends of the rounding interval of each reading, cents over it; None where a reading is not rounded."""
     found: list[tuple[float, float] | None] = []
     for one in problem.posterior.readings:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,41 +12,68 @@ import numpy as np
 from bayesplate.cards import StatedPrior
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.results.archive import write_archive
+from bayesplate.results.archive import Archive, write_archive
 from bayesplate.results.contract import as_json
 from bayesplate.results.summary import Summary
 
 
 def write_posterior(path: Path, inference: Inference, draws: Draws, summary: Summary, card_text: str) -> None:
-    """Write the draws of a fit as an archive that ArviZ opens.
+    """Write the draws of a fit as an archive that ArviZ opens; parameters as of `posterior_archive`."""
+    write_archive(path, posterior_archive(inference, draws, attributes_of(inference, summary, card_text)))
+
+
+def attributes_of(inference: Inference, summary: Summary, card_text: str) -> dict[str, str]:
+    """What the archive of a fit says of its origin; the header and the sampler's entries are those of its summary."""
+    return {
+        "card": card_text,
+        "prior": inference.problem.prior.name,
+        "priors": json.dumps({name: _stated(one) for name, one in inference.problem.prior.stated_constants.items()}),
+        "model": json.dumps(as_json(summary.model)),
+        "sampler": json.dumps(as_json(summary.sampler)),
+        "versions": json.dumps(as_json(summary.versions)),
+        "card_sha256": summary.card_sha256,
+        "seed": str(summary.seed),
+    }
+
+
+def posterior_archive(inference: Inference, draws: Draws, attributes: Mapping[str, str]) -> Archive:
+    """The draws of a fit under the names of the archive.
 
     Parameters
     ----------
-    path : Path
     inference : Inference
     draws : Draws
-    summary : Summary
-        Its header and sampler entries become attributes.
-    card_text : str
-        The board card as it was read.
+    attributes : dict of str
+        What is said of their origin.
+
+    Returns
+    -------
+    Archive
+        Its group log_prior holds one variable per factor of the prior: constants, noise, and inputs if any is
+        uncertain.
     """
     problem, convergence = inference.problem, inference.convergence
     board = problem.board
-    setups = [setup.name for setup in board.setups]
-    readings = [f"{setup.name} {label}" for setup in board.setups for label in setup.labels]
-    write_archive(
-        path,
-        posterior={**draws.rigidities, **draws.moduli, "noise": draws.noise, **draws.inputs},
-        log_likelihood={"frequency": draws.log_likelihood},
-        posterior_predictive={"frequency": draws.predictive},
-        observed_data={"frequency": np.concatenate([setup.measured for setup in board.setups])},
-        sample_stats={
-            "lp": draws.log_posterior,
-            "tau": convergence.tau,
-            "rhat": convergence.rhat,
-            "ess": convergence.ess,
+    factors = problem.posterior.log_prior_factors(draws.flat)
+    return Archive(
+        groups={
+            "posterior": {**draws.rigidities, **draws.moduli, "noise": draws.noise, **draws.inputs},
+            "log_prior": {name: values.reshape(draws.log_posterior.shape) for name, values in factors.items()},
+            "log_likelihood": {"frequency": draws.log_likelihood},
+            "posterior_predictive": {"frequency": draws.predictive},
+            "sample_stats": {
+                "lp": draws.log_posterior,
+                "tau": convergence.tau,
+                "rhat": convergence.rhat,
+                "ess": convergence.ess,
+            },
+            "observed_data": {"frequency": np.concatenate([setup.measured for setup in board.setups])},
         },
-        coords={"setup": setups, "reading": readings, "parameter": list(problem.parameters.names)},
+        coords={
+            "setup": [setup.name for setup in board.setups],
+            "reading": board.reading_names,
+            "parameter": list(problem.parameters.names),
+        },
         dims={
             "noise": ["setup"],
             "frequency": ["reading"],
@@ -53,16 +81,7 @@ def write_posterior(path: Path, inference: Inference, draws: Draws, summary: Sum
             "rhat": ["parameter"],
             "ess": ["parameter"],
         },
-        attributes={
-            "card": card_text,
-            "prior": problem.prior.name,
-            "priors": json.dumps({name: _stated(one) for name, one in problem.prior.stated_constants.items()}),
-            "model": json.dumps(as_json(summary.model)),
-            "sampler": json.dumps(as_json(summary.sampler)),
-            "versions": json.dumps(as_json(summary.versions)),
-            "card_sha256": summary.card_sha256,
-            "seed": str(summary.seed),
-        },
+        attributes=attributes,
     )
 
 

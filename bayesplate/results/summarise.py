@@ -14,7 +14,7 @@ from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference, Problem
+from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks
@@ -40,7 +40,7 @@ HIGH_EXACT_ERROR = 0.5
 
 
 def unconverged_summary(
-    problem: Problem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
+    problem: PosedProblem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
 ) -> Unconverged:
     """The summary of a run that failed the gate."""
     return Unconverged(
@@ -121,7 +121,7 @@ def summarise(
     )
 
 
-def model_header(problem: Problem) -> ModelHeader:
+def model_header(problem: PosedProblem) -> ModelHeader:
     """What is fitted."""
     posterior = problem.posterior
     theory, effects = posterior.models[0].system.theory, tuple(problem.board.effects)
@@ -147,7 +147,7 @@ def _worst(values: NDArray[np.float64]) -> float:
     return float(np.nanmax(np.abs(values))) if values.size else float("nan")
 
 
-def _effects(problem: Problem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
+def _effects(problem: PosedProblem, draws: Draws) -> dict[str, dict[str, dict[str, Spread]]]:
     """Parameters of the declared effects, by board or setup, effect and parameter; exact ones have no spread."""
     result: dict[str, dict[str, dict[str, Spread]]] = {}
     for model in problem.posterior.models:
@@ -160,7 +160,7 @@ def _effects(problem: Problem, draws: Draws) -> dict[str, dict[str, dict[str, Sp
     return result
 
 
-def _values_of(key: str, problem: Problem, draws: Draws) -> Floats:
+def _values_of(key: str, problem: PosedProblem, draws: Draws) -> Floats:
     if key in draws.inputs:
         return draws.inputs[key]
     return np.broadcast_to(problem.board.inputs[key].mean, draws.log_posterior.shape)
@@ -177,7 +177,7 @@ def _paper_least_squares(system: PaperSystem) -> PointEstimate:
     return _point(np.stack(system.moduli(constants)), constants, system.condition_number)
 
 
-def _weighted(problem: Problem) -> PointEstimate:
+def _weighted(problem: PosedProblem) -> PointEstimate:
     estimate = problem.estimate
     values = estimate.values
     D_x, D_y, D_s = estimate.rigidities
@@ -201,7 +201,7 @@ def _percentile(system: PaperSystem) -> Percentile | None:
     return Percentile(**values, n_subsets=found.n_subsets)
 
 
-def warnings_of(problem: Problem, assessment: Assessment) -> list[str]:
+def warnings_of(problem: PosedProblem, assessment: Assessment) -> list[str]:
     """What a reader of the summary must know, one sentence each."""
     sentences = list(problem.board.notes)
     if not problem.estimate.converged:

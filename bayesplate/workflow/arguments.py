@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from numbers import Integral
 from typing import get_args
 
 import numpy as np
 
+from bayesplate.cards import PriorCard
 from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
+from bayesplate.plate.board import Board
+from bayesplate.workflow.prepare import Prepared
 
 Check = Callable[[str, object], Iterator[Fault]]
 
@@ -23,7 +27,7 @@ def require_arguments(**given: object) -> None:
     Parameters
     ----------
     **given
-        Any of card, out, seed, effects, law, robust, coefficients, write, report, force, resume, n_null, progress.
+        Any of card, prior, out, seed, effects, law, robust, coefficients, report, force, resume, n_null, progress.
 
     Raises
     ------
@@ -33,8 +37,23 @@ def require_arguments(**given: object) -> None:
     faults = [fault for name, value in given.items() for fault in _CHECKS[name](name, value)]
     if given.get("force") is True and given.get("resume") is True:
         faults.append(Fault("force and resume", "one of them", "both", "force starts anew and resume continues"))
+    if given.get("resume") is True and given.get("out", ...) is None:
+        faults.append(Fault("resume", "the folder of the run that is continued, as out", "no out"))
     if faults:
         raise InputError(faults)
+
+
+def _card(name: str, value: object) -> Iterator[Fault]:
+    if isinstance(value, Board) or isinstance(getattr(value, "prepared", None), Prepared):
+        return
+    for fault in _path(name, value):
+        yield replace(fault, wanted="a name, a path, a Board or a Problem")
+
+
+def _prior(name: str, value: object) -> Iterator[Fault]:
+    if value is not None and not isinstance(value, PriorCard):
+        for fault in _path(name, value):
+            yield replace(fault, wanted="a name, a path or a PriorCard")
 
 
 def _path(name: str, value: object) -> Iterator[Fault]:
@@ -96,13 +115,14 @@ def _shown(value: object) -> str:
 
 
 _CHECKS: dict[str, Check] = {
-    "card": _path,
+    "card": _card,
+    "prior": _prior,
     "out": _path_or_none,
     "seed": _whole(0),
     "n_null": _whole(1),
     "effects": _effects,
     "law": _word(get_args(LawName)),
     "coefficients": _word(get_args(CoefficientSource)),
-    **dict.fromkeys(("robust", "write", "report", "force", "resume"), _switch),
+    **dict.fromkeys(("robust", "report", "force", "resume"), _switch),
     "progress": _callable,
 }

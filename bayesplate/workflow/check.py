@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,26 +11,60 @@ from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_al
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, moduli
-from bayesplate.posterior.inference import Problem, pose
+from bayesplate.posterior.inference import PosedProblem
+from bayesplate.report.plots import CheckPlots
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
-from bayesplate.results.contract import Constants, Elastic
+from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.prepare import prepare
+from bayesplate.workflow.prepare import Card
+from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.shown import show_check
 
 _N_DRAWS = 4000
 
 
-def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) -> CheckReport:
-    """Say what would be fitted.
+@dataclass(frozen=True, repr=False)
+class CheckResult(CheckReport):
+    """What a check leaves: all of `CheckReport`, and the problem behind it.
+
+    Attributes
+    ----------
+    problem : Problem
+        Posed: `fit` takes it as it is.
+    """
+
+    problem: Problem = field(metadata=NOT_IN_JSON, compare=False)
+
+    @property
+    def summary(self) -> CheckReport:
+        """What the check found: the report itself."""
+        return self
+
+    @property
+    def plot(self) -> CheckPlots:
+        """The figures: `report.plot.shares()`."""
+        return CheckPlots(self.problem.posed, self)
+
+    def __repr__(self) -> str:
+        return super().__repr__().replace("<CheckReport", "<CheckResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_check(self).html(self.title or self.name)
+
+
+def check(card: Problem | Card, *, effects: Sequence[str] | None = None) -> CheckResult:
+    """Say what would be fitted, and what it can identify; nothing is sampled or written.
 
     Parameters
     ----------
-    card : str or path
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python.
     effects : sequence of str, optional
 
     Returns
     -------
-    CheckReport
+    CheckResult
 
     Raises
     ------
@@ -38,9 +72,9 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
         As `fit` would.
     """
     require_arguments(card=card, effects=effects)
-    prepared = prepare(card, effects)
-    board = prepared.board
-    problem = pose(board, prepared.prior)
+    given = as_problem(card, effects=effects)
+    problem = given.posed
+    board = problem.board
     estimate, found = problem.estimate, problem.identifiability
     D_x, D_y, D_s = estimate.rigidities
     elastic = moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"])
@@ -48,10 +82,10 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
     rows = [(setup.name, reading) for setup in board.setups for reading in setup.readings]
     residuals = cents(estimate.residuals)
     correlations = [place.correlation for model in estimate.models for place in model.places]
-    return CheckReport(
+    return CheckResult(
         name=board.name,
         title=board.title,
-        prior=board.prior,
+        prior=problem.prior.name,
         law=problem.posterior.law,
         setups=tuple(
             CheckedSetup(
@@ -80,6 +114,7 @@ def check(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None)
         invisible=INVISIBLE,
         identifiability=tuple(remarks(board, found)),
         notes=tuple(board.notes),
+        problem=given,
     )
 
 
@@ -99,7 +134,7 @@ def _effects(found: Sequence[Signature]) -> list[CheckedEffect]:
     ]
 
 
-def expected_sd(problem: Problem) -> dict[str, float]:
+def expected_sd(problem: PosedProblem) -> dict[str, float]:
     """Relative standard deviation of each modulus in the normal approximation of the posterior."""
     draws = np.random.default_rng(0).multivariate_normal(problem.centre, problem.covariance, _N_DRAWS)
     values = problem.parameters.values(draws)

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from textwrap import fill
 
 from bayesplate.results.references import Section, references
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.prepare import prepare
+from bayesplate.workflow.prepare import Card
+from bayesplate.workflow.problem import Problem, as_problem
 
 _WIDTH = 100
 
 
-def cite(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) -> tuple[Section, ...]:
+def cite(card: Problem | Card, *, effects: Sequence[str] | None = None) -> tuple[Section, ...]:
     """References of a fit, by section.
 
     Parameters
     ----------
-    card : str or path
-        Name of a shipped board card, or a path.
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python.
     effects : sequence of str, optional
         Declared effects in place of the card's.
 
@@ -33,7 +33,7 @@ def cite(card: str | os.PathLike[str], *, effects: Sequence[str] | None = None) 
         As `fit` would.
     """
     require_arguments(card=card, effects=effects)
-    prepared = prepare(card, effects)
+    prepared = as_problem(card, effects=effects).prepared
     return references(prepared.card, prepared.prior, prepared.board)
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from bayesplate.effects import EFFECTS
 from bayesplate.errors import NotConvergedError
@@ -13,17 +14,23 @@ from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws, named_draws
-from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.mode_errors import mode_errors
 from bayesplate.posterior.reweighting import effective_draws, law_weights
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.comparison import FORMAT, Comparison, better_theory, theory_row
+from bayesplate.report.plots import ComparePlots
+from bayesplate.results.archive import to_arviz
+from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, theory_row
+from bayesplate.results.contract import NOT_IN_JSON
 from bayesplate.results.folder import json_text, make_folder, require_new, write_text
+from bayesplate.results.store import posterior_archive
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.check import expected_sd
-from bayesplate.workflow.prepare import prepare
+from bayesplate.workflow.prepare import Card
+from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.shown import show_compare
 
 COMPARISON = "compare.json"
 FEWEST_DRAWS = 1000
@@ -34,8 +41,51 @@ _SHEAR = tuple(name for name, effect in EFFECTS.items() if effect.theory == "she
 Tell = Callable[[Progress], None] | None
 
 
+@dataclass(frozen=True, repr=False)
+class CompareResult(Comparison):
+    """What a comparison leaves: all of `Comparison`, and the draws behind it.
+
+    Attributes
+    ----------
+    sampled : dict of (Inference, Draws)
+        The posterior under the exact law, by theory of the plate.
+    """
+
+    sampled: Mapping[str, tuple[Inference, Draws]] = field(metadata=NOT_IN_JSON, compare=False)
+
+    @property
+    def summary(self) -> Comparison:
+        """What compare.json holds: the comparison itself."""
+        return self
+
+    @property
+    def plot(self) -> ComparePlots:
+        """The figures: `comparison.plot.corner("thin")`."""
+        return ComparePlots({theory: draws for theory, (_, draws) in self.sampled.items()})
+
+    def to_arviz(self) -> dict[str, Any]:
+        """The posterior of each theory as of `bayesplate.FitResult.to_arviz`: what `arviz.compare` takes.
+
+        Returns
+        -------
+        dict of arviz.InferenceData or xarray.DataTree
+        """
+        about = {"seed": str(self.seed), "prior": self.prior, "card_sha256": self.card_sha256}
+        return {
+            theory: to_arviz(posterior_archive(inference, draws, about | {"theory": theory}))
+            for theory, (inference, draws) in self.sampled.items()
+        }
+
+    def __repr__(self) -> str:
+        return super().__repr__().replace("<Comparison", "<CompareResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_compare(self).html(f"{self.name}: every method side by side")
+
+
 def compare(
-    card: str | os.PathLike[str],
+    card: Problem | Card,
     *,
     coefficients: CoefficientSource | None = None,
     seed: int = 1,
@@ -43,13 +93,14 @@ def compare(
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
     progress: Tell = None,
-) -> Comparison:
+) -> CompareResult:
     """Compare all methods on a board, as a thin and as a shear-flexible plate.
 
     Parameters
     ----------
-    card : str or path
-        Name of a shipped board card, or a path.
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python. Both frequency laws
+        are compared whatever the law of a problem.
     coefficients : "sensitivity", "training" or "published", optional
         Source of the coefficients of the paper's least squares and percentile method; by default the published table
         where the card names one, else the sensitivity of one solve.
@@ -67,7 +118,7 @@ def compare(
 
     Returns
     -------
-    Comparison
+    CompareResult
 
     Raises
     ------
@@ -82,22 +133,24 @@ def compare(
         card=card, coefficients=coefficients, seed=seed, effects=effects, out=out, force=force, progress=progress
     )
     files = require_new(Path(out), [COMPARISON], force=force) if out is not None else ()
-    declared = prepare(card, effects).board.effects
-    others = [name for name in declared if name not in _SHEAR]
+    given = as_problem(card, effects=effects)
+    others = [name for name in given.prepared.board.effects if name not in _SHEAR]
     asked = [others, [*others, *_SHEAR]]
-    prepared = [prepare(card, names) for names in asked]
+    prepared = [given.prepared.with_effects(names) for names in asked]
     if coefficients == "published":
         board = prepared[0].board
         for setup in board.setups:
             named_table(board.name, setup)
-    problems = [pose(one.board, one.prior, law="exact") for one in prepared]
+    problems = [pose(one.board, one.prior, law="exact", robust=given.robust) for one in prepared]
     systems = [paper_system(problem.board, problem.estimate, coefficients) for problem in problems]
-    theories = []
+    theories: list[TheoryRow] = []
+    sampled: dict[str, tuple[Inference, Draws]] = {}
     for problem, system in zip(problems, systems, strict=True):
         methods = point_methods(problem, system, expected_sd(problem))
         posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
         theories.append(theory_row(problem, system, [*methods, *posteriors], mode_errors(inference, draws)))
-    result = Comparison(
+        sampled[theories[-1].theory] = inference, draws
+    result = CompareResult(
         format=FORMAT,
         name=problems[0].board.name,
         seed=seed,
@@ -106,6 +159,7 @@ def compare(
         prior=problems[0].prior.name,
         theories=tuple(theories),
         verdict=better_theory(*theories),
+        sampled=sampled,
     )
     for path in files:
         make_folder(path.parent)
@@ -113,7 +167,9 @@ def compare(
     return result
 
 
-def _posteriors(problem: Problem, settings: SamplerSettings, progress: Tell) -> tuple[list[Method], Inference, Draws]:
+def _posteriors(
+    problem: PosedProblem, settings: SamplerSettings, progress: Tell
+) -> tuple[list[Method], Inference, Draws]:
     """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough."""
     inference, draws = _sampled(problem, settings, progress)
     methods = []
@@ -127,7 +183,7 @@ def _posteriors(problem: Problem, settings: SamplerSettings, progress: Tell) -> 
     return methods, inference, draws
 
 
-def _sampled(problem: Problem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
+def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
         reasons = "\n".join(inference.convergence.reasons)

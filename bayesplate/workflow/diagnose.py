@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +21,26 @@ from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
-from bayesplate.errors import NotConvergedError, NotIdentifiableError
+from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import DiagnosePlots
+from bayesplate.results.archive import to_arviz
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder, run_of_its_own, write_text
+from bayesplate.results.store import attributes_of, posterior_archive
+from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
-from bayesplate.workflow.fitting import Fitted, Request, fitted, opened, posed, with_board
-from bayesplate.workflow.prepare import Prepared, prepare
+from bayesplate.workflow.fitting import Fitted, fitted, opened, with_board
+from bayesplate.workflow.prepare import Card
+from bayesplate.workflow.problem import Problem, as_problem
 
 _NULL_LINE = 7
 _MOST_ASKED = 4
 _MOST_FINALISTS = 3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DiagnoseResult:
     """What a diagnosis leaves.
 
@@ -52,23 +58,39 @@ class DiagnoseResult:
     before: Fitted
     after: Fitted
 
+    @property
+    def summary(self) -> Summary:
+        """The summary of the model that the diagnosis ends with."""
+        return self.after.summary
+
+    @cached_property
+    def plot(self) -> DiagnosePlots:
+        """The figures: `found.plot.signatures()`."""
+        after = self.after
+        return DiagnosePlots(after.inference, after.draws, after.summary, self.diagnosis)
+
+    def to_arviz(self) -> Any:
+        """The draws of the model that the diagnosis ends with, as of `bayesplate.FitResult.to_arviz`."""
+        attributes = attributes_of(self.after.inference, self.summary, self.after.problem.prepared.card_text)
+        return to_arviz(posterior_archive(self.after.inference, self.after.draws, attributes))
+
     def to_json(self) -> dict[str, Any]:
         """The content of diagnosis.json."""
         return diagnosis_json(self.diagnosis)
 
     def __repr__(self) -> str:
-        return repr(self.diagnosis)
+        return repr(self.diagnosis).replace("<Diagnosis", "<DiagnoseResult", 1)
 
     def _repr_html_(self) -> str:
+        """The verdict and its tables as a notebook shows them."""
         return self.diagnosis._repr_html_()
 
 
 @run_of_its_own()
 def diagnose(
-    card: str | os.PathLike[str],
+    card: Problem | Card,
     *,
     out: str | os.PathLike[str] | None = None,
-    write: bool = True,
     report: bool = True,
     seed: int = 1,
     effects: Sequence[str] | None = None,
@@ -81,12 +103,10 @@ def diagnose(
 
     Parameters
     ----------
-    card : str or path
-        Name of a shipped board card, or a path.
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python.
     out : path, optional
-        Output folder; by default results/NAME.
-    write : bool
-        False writes nothing: no files, no checkpoints.
+        Output folder, for diagnosis.json and what `fit` writes; nothing is written without it.
     report : bool
         Whether to write report.html, its figures and tables beside the numbers.
     seed : int
@@ -107,24 +127,26 @@ def diagnose(
     Raises
     ------
     InputError, NotIdentifiableError, NotConvergedError, CheckpointError
-        As `bayesplate.workflow.fit.fit`, of the fit without further effects.
+        As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
     require_arguments(
-        card=card, out=out, write=write, report=report, seed=seed, effects=effects, force=force, resume=resume,
-        n_null=n_null, progress=progress,
+        card=card, out=out, report=report, seed=seed, effects=effects, force=force, resume=resume, n_null=n_null,
+        progress=progress,
     )  # fmt: skip
-    prepared = prepare(card, effects)
-    begun = opened(prepared, Request(seed), out, write=write, force=force, resume=resume, first=BEFORE)
+    problem = as_problem(card, effects=effects)
+    if problem.robust:
+        wanted = "a problem with normal noise, which the search for an effect assumes"
+        raise InputError(Fault("robust", wanted, "Student's distribution"))
+    begun = opened(problem, seed, out, force=force, resume=resume, first=BEFORE)
     folder = begun.folder
 
-    def run(under: Prepared, name: str) -> Fitted:
+    def run(under: Problem, name: str) -> Fitted:
         def refuse(inference: Inference) -> None:
             refuse_unconverged(inference, seed, under, begun.path if name == BEFORE else None)
 
-        problem = begun.problem if under is prepared else posed(under, begun.request)
-        return fitted(under, problem, begun.request, begun.checkpoints(name), refuse, progress)
+        return fitted(under, seed, begun.checkpoints(name), refuse, progress)
 
-    before = run(prepared, BEFORE)
+    before = run(problem, BEFORE)
     found = search(prepare_search(baseline_of(before.inference.problem)))
     verdict = decide(found)
     control = null_control(found, np.random.default_rng([seed, _NULL_LINE]), n_null)
@@ -133,7 +155,7 @@ def diagnose(
     for answer in finalists(found, verdict):
         try:
             name = "-".join((*answer.members, str(answer.index)))
-            refits[answer.index] = run(with_board(prepared, refit_board(found, answer.index)), name)
+            refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name)
         except (NotIdentifiableError, NotConvergedError) as error:
             notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
     case = _case(found, verdict, control, before, refits, tuple(notes))
@@ -167,7 +189,7 @@ def _case(
 ) -> Case:
     after = refits.get(verdict.index, before)
     is_refitted = after is not before
-    clear = is_refitted and excludes_zero(after.prepared.board, likely_forms(found, verdict.index), after.draws)
+    clear = is_refitted and excludes_zero(after.problem.prepared.board, likely_forms(found, verdict.index), after.draws)
     return Case(
         found=found,
         verdict=verdict,

@@ -1,11 +1,13 @@
-"""`fit`: a board card to a posterior, and its files."""
+"""`fit`: a board to the posterior of its constants; files where they are asked for."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.errors import NotConvergedError
@@ -13,17 +15,21 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import FitPlots
+from bayesplate.results.archive import to_arviz
 from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, json_text, run_of_its_own, write_text, writing
-from bayesplate.results.store import write_posterior
+from bayesplate.results.store import attributes_of, posterior_archive, write_posterior
 from bayesplate.results.summarise import unconverged_summary
 from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.fitting import Fitted, Request, fitted, opened
-from bayesplate.workflow.prepare import Prepared, prepare
+from bayesplate.workflow.fitting import Fitted, fitted, opened
+from bayesplate.workflow.prepare import Card
+from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.shown import show_fit
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FitResult:
     """What a fit leaves.
 
@@ -31,23 +37,49 @@ class FitResult:
     ----------
     folder : Path or None
         Where its files are; None if none were asked for.
+    problem : Problem
     summary : Summary
+        What summary.json holds: constants, modes, errors, the sampler's health.
     inference : Inference
+        Chains and the verdict of the convergence gate.
     draws : Draws
+        The thinned posterior by name.
     """
 
     folder: Path | None
+    problem: Problem
     summary: Summary
     inference: Inference
     draws: Draws
 
+    @cached_property
+    def plot(self) -> FitPlots:
+        """The figures: `result.plot.constants()`."""
+        return FitPlots(self.inference, self.draws, self.summary)
+
+    def to_arviz(self) -> Any:
+        """The draws as ArviZ works with them: InferenceData in ArviZ 0.23, DataTree in 1.x; as in posterior.nc.
+
+        Returns
+        -------
+        arviz.InferenceData or xarray.DataTree
+        """
+        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card_text)
+        return to_arviz(posterior_archive(self.inference, self.draws, attributes))
+
+    def __repr__(self) -> str:
+        return repr(self.summary).replace("<Summary", "<FitResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_fit(self.summary).html(self.problem.board.title or self.summary.name)
+
 
 @run_of_its_own()
 def fit(
-    card: str | os.PathLike[str],
+    card: Problem | Card,
     *,
     out: str | os.PathLike[str] | None = None,
-    write: bool = True,
     report: bool = True,
     seed: int = 1,
     effects: Sequence[str] | None = None,
@@ -61,12 +93,10 @@ def fit(
 
     Parameters
     ----------
-    card : str or path
-        Name of a shipped board card, or a path.
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python.
     out : path, optional
-        Output folder; by default results/NAME.
-    write : bool
-        False writes nothing: no files, no checkpoints.
+        Output folder, for summary.json, posterior.nc, the report and the checkpoints; nothing is written without it.
     report : bool
         Whether to write report.html, its figures and tables beside the numbers.
     seed : int
@@ -89,7 +119,8 @@ def fit(
     Raises
     ------
     InputError
-        If the card or the folder cannot be used; then nothing is written.
+        If the card or the folder cannot be used, or effects, law or robust are given beside a problem, which states
+        them itself; then nothing is written.
     NotIdentifiableError
         If the data leave a constant open; then nothing is written.
     NotConvergedError
@@ -98,32 +129,33 @@ def fit(
         If a run cannot be resumed.
     """
     require_arguments(
-        card=card, out=out, write=write, report=report, seed=seed, effects=effects, law=law, robust=robust,
+        card=card, out=out, report=report, seed=seed, effects=effects, law=law, robust=robust,
         force=force, resume=resume, progress=progress,
     )  # fmt: skip
-    prepared = prepare(card, effects)
-    run = opened(prepared, Request(seed, law, robust), out, write=write, force=force, resume=resume)
-    if write and report:
+    problem = as_problem(card, effects=effects, law=law, robust=robust)
+    run = opened(problem, seed, out, force=force, resume=resume)
+    if run.folder is not None and report:
         from bayesplate.report.page import load_libraries
 
         load_libraries()  # while nobody waits for the page yet
 
     def refuse(inference: Inference) -> None:
-        refuse_unconverged(inference, seed, prepared, run.path)
+        refuse_unconverged(inference, seed, problem, run.path)
 
-    result = fitted(prepared, run.problem, run.request, run.checkpoints(), refuse, progress)
+    result = fitted(problem, seed, run.checkpoints(), refuse, progress)
     if run.folder is not None:
         write_fit(run.folder.path, result)
         if report:
             write_page(run.folder.path, result)
         run.folder.close()
-    return FitResult(run.path, result.summary, result.inference, result.draws)
+    return FitResult(run.path, problem, result.summary, result.inference, result.draws)
 
 
 def write_fit(folder: Path, result: Fitted) -> None:
     """Write summary and archive of a fit into a folder that is there."""
+    text = result.problem.prepared.card_text
     with writing(folder / ARCHIVE):
-        write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, result.prepared.card_text)
+        write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, text)
     write_text(folder / SUMMARY, json_text(result.summary))
 
 
@@ -131,18 +163,17 @@ def write_page(folder: Path, result: Fitted, diagnosis: Diagnosis | None = None)
     """Write report.html, its figures and tables; with a diagnosis its verdict too."""
     from bayesplate.report.page import write_report
 
-    card = result.prepared.card
+    card = result.problem.prepared.card
     with writing(folder / PAGE):
         return write_report(folder, card, result.inference, result.draws, result.summary, diagnosis)
 
 
-def refuse_unconverged(inference: Inference, seed: int, prepared: Prepared, folder: Path | None) -> None:
+def refuse_unconverged(inference: Inference, seed: int, problem: Problem, folder: Path | None) -> None:
     """Write the diagnostics of a run that failed the gate, and say so."""
     convergence = inference.convergence
     if folder is not None:
-        summary = unconverged_summary(
-            inference.problem, inference.chains, convergence, seed, versions(), prepared.card.sha256
-        )
+        sha256 = problem.prepared.card.sha256
+        summary = unconverged_summary(inference.problem, inference.chains, convergence, seed, versions(), sha256)
         write_text(folder / SUMMARY, json_text(summary))
     raise NotConvergedError(
         "the sampler did not converge, so no constants are given:\n" + "\n".join(convergence.reasons)

@@ -1,4 +1,4 @@
-"""One fit, from a prepared board to draws and a summary, with the law that serves; what `fit` and `diagnose` share."""
+"""One fit, from a problem to draws and a summary, with the law that serves; what `fit` and `diagnose` share."""
 
 from __future__ import annotations
 
@@ -10,36 +10,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bayesplate.errors import CheckpointError
-from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.draws import Draws, named_draws
-from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.inference import Inference, PosedProblem, infer
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import OutputFolder
 from bayesplate.results.summarise import summarise
 from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
-from bayesplate.workflow.prepare import Prepared
-
-
-@dataclass(frozen=True)
-class Request:
-    """How to fit.
-
-    Attributes
-    ----------
-    seed : int
-    law : "linear", "exact" or None
-        None: the linear law where it is good enough.
-    robust : bool
-    """
-
-    seed: int = 1
-    law: LawName | None = None
-    robust: bool = False
+from bayesplate.workflow.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +30,13 @@ class Fitted:
 
     Attributes
     ----------
-    prepared : Prepared
+    problem : Problem
     inference : Inference
     draws : Draws
     summary : Summary
     """
 
-    prepared: Prepared
+    problem: Problem
     inference: Inference
     draws: Draws
     summary: Summary
@@ -66,16 +48,14 @@ class Opened:
 
     Attributes
     ----------
-    prepared : Prepared
-    request : Request
     problem : Problem
+    seed : int
     folder : OutputFolder or None
         None if nothing is to be written.
     """
 
-    prepared: Prepared
-    request: Request
     problem: Problem
+    seed: int
     folder: OutputFolder | None
 
     @property
@@ -91,36 +71,28 @@ class Opened:
 Refuse = Callable[[Inference], None]
 
 
-def with_board(prepared: Prepared, board: Board) -> Prepared:
+def with_board(problem: Problem, board: Board) -> Problem:
     """The same card with another model of the board: one more effect, or two labels exchanged."""
-    return replace(prepared, board=board)
-
-
-def posed(prepared: Prepared, request: Request) -> Problem:
-    """The problem of a prepared board; see `bayesplate.posterior.inference.pose`."""
-    return pose(prepared.board, prepared.prior, law=request.law, robust=request.robust)
+    return replace(problem, prepared=replace(problem.prepared, board=board))
 
 
 def opened(
-    prepared: Prepared,
-    request: Request,
+    problem: Problem,
+    seed: int,
     out: str | os.PathLike[str] | None,
     *,
-    write: bool = True,
     force: bool = False,
     resume: bool = False,
     first: str = "",
 ) -> Opened:
-    """Pose the problem of a prepared board and open the folder of its run; whatever is refused is refused before that.
+    """Pose a problem and open the folder of its run; whatever is refused is refused before that.
 
     Parameters
     ----------
-    prepared : Prepared
-    request : Request
+    problem : Problem
+    seed : int
     out : path or None
-        Output folder; by default results/NAME.
-    write : bool
-        False opens none.
+        Output folder; None writes nothing.
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
     first : str
@@ -139,23 +111,22 @@ def opened(
     CheckpointError
         If there is nothing to resume.
     """
-    folder = OutputFolder(Path(out) if out is not None else Path("results") / prepared.board.name) if write else None
+    folder = None if out is None else OutputFolder(Path(out))
     if folder is not None:
         folder.require_usable(force=force, resume=resume)
-    problem = posed(prepared, request)
-    SamplerSettings(seed=request.seed).walkers(problem.parameters.n_dim)
+    posed = problem.posed
+    SamplerSettings(seed=seed).walkers(posed.parameters.n_dim)
     if folder is not None:
-        if resume and not checkpoint_in(folder.checkpoint / first, prepared, problem).exists():
-            wanted = f"a saved run under the {problem.posterior.law} law"
+        if resume and not checkpoint_in(folder.checkpoint / first, problem, posed).exists():
+            wanted = f"a saved run under the {posed.posterior.law} law"
             raise CheckpointError(f"{folder.path}: wanted {wanted}, got none to resume (--force runs it anew)")
         folder.open(resume=resume)
-    return Opened(prepared, request, problem, folder)
+    return Opened(problem, seed, folder)
 
 
 def fitted(
-    prepared: Prepared,
     problem: Problem,
-    request: Request,
+    seed: int,
     checkpoints: Path | None,
     refuse: Refuse,
     progress: Callable[[Progress], None] | None = None,
@@ -164,11 +135,10 @@ def fitted(
 
     Parameters
     ----------
-    prepared : Prepared
     problem : Problem
-    request : Request
+    seed : int
     checkpoints : Path or None
-        Folder of the unfinished run's chunks, one subfolder a law; None keeps none.
+        Folder of the unfinished run's chunks, one subfolder per law; None keeps none.
     refuse : callable
         Called with an inference that failed the convergence gate; raises.
     progress : callable, optional
@@ -178,45 +148,45 @@ def fitted(
     Fitted
     """
 
-    def sampled(under: Problem) -> tuple[Inference, Draws]:
-        checkpoint = None if checkpoints is None else checkpoint_in(checkpoints, prepared, under)
-        settings = SamplerSettings(seed=request.seed)
-        inference = infer(under, settings, checkpoint=checkpoint, progress=progress)
+    def sampled(under: PosedProblem) -> tuple[Inference, Draws]:
+        checkpoint = None if checkpoints is None else checkpoint_in(checkpoints, problem, under)
+        inference = infer(under, SamplerSettings(seed=seed), checkpoint=checkpoint, progress=progress)
         if not inference.convergence.passed:
             refuse(inference)
-        return inference, named_draws(inference, request.seed)
+        return inference, named_draws(inference, seed)
 
-    inference, draws = sampled(problem)
+    inference, draws = sampled(problem.posed)
     errors = linearisation(inference, draws)
-    if request.law is None and problem.posterior.law == "linear" and not linear_is_enough(inference, draws, errors):
+    is_linear = problem.law == "linear"
+    if problem.asked_law is None and is_linear and not linear_is_enough(inference, draws, errors):
         # The choice was made on a normal approximation; the draws know better.
-        inference, draws = sampled(problem.under("exact"))
+        inference, draws = sampled(problem.posed.under("exact"))
         errors = linearisation(inference, draws)
     assessment = assess(inference, draws, errors)
-    summary = summarise(inference, draws, assessment, request.seed, versions(), prepared.card.sha256)
-    return Fitted(prepared, inference, draws, summary)
+    summary = summarise(inference, draws, assessment, seed, versions(), problem.prepared.card.sha256)
+    return Fitted(problem, inference, draws, summary)
 
 
-def checkpoint_in(folder: Path, prepared: Prepared, problem: Problem) -> Checkpoint:
-    """Where the chunks of a problem under its law are kept."""
-    return Checkpoint(folder / problem.posterior.law, fingerprint(prepared, problem))
+def checkpoint_in(folder: Path, problem: Problem, posed: PosedProblem) -> Checkpoint:
+    """Where the chunks of a problem under the law of that posing are kept."""
+    return Checkpoint(folder / posed.posterior.law, fingerprint(problem, posed))
 
 
-def fingerprint(prepared: Prepared, problem: Problem) -> str:
+def fingerprint(problem: Problem, posed: PosedProblem) -> str:
     """Hash of everything besides the sampler's settings that decides the draws."""
-    prior = {name: repr(density) for name, density in problem.prior.constants.items()}
+    prior = {name: repr(density) for name, density in posed.prior.constants.items()}
     identity = {
-        "card": prepared.card.sha256,
+        "card": problem.prepared.card.sha256,
         "prior": prior,
-        "noise": [repr(setup.noise) for setup in problem.board.setups],
-        "parameters": [repr(parameter) for parameter in problem.board.parameters],
-        "effects": list(problem.board.effects),
-        "forms": [repr(effect) for effect in problem.board.chosen],
-        "readings": [repr(setup.readings) for setup in problem.board.setups],
-        "attached": [repr(setup.attached) for setup in problem.board.setups],
-        "law": problem.posterior.law,
-        "law_alone": problem.is_forced,
-        "robust": problem.posterior.robust,
+        "noise": [repr(setup.noise) for setup in posed.board.setups],
+        "parameters": [repr(parameter) for parameter in posed.board.parameters],
+        "effects": list(posed.board.effects),
+        "forms": [repr(effect) for effect in posed.board.chosen],
+        "readings": [repr(setup.readings) for setup in posed.board.setups],
+        "attached": [repr(setup.attached) for setup in posed.board.setups],
+        "law": posed.posterior.law,
+        "law_alone": posed.is_forced,
+        "robust": posed.posterior.robust,
         "versions": versions(),
     }
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()

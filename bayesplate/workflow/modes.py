@@ -18,29 +18,53 @@ from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.region import noise_widenings
+from bayesplate.report.plots import ModesPlots
 from bayesplate.results.folder import make_folder, require_new, writing
 from bayesplate.results.sheets import ModesReport, sheet_report
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.prepare import Prepared, prepare
+from bayesplate.workflow.prepare import Card, Prepared, prepare
+from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.shown import show_modes
 
 _AT_ESTIMATE = "at the weighted least-squares estimate"
 _AT_PRIOR = "at the median of the prior"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ModesResult:
-    """What `modes` leaves: the report, the sheets behind it, and the files that were written."""
+    """What `modes` leaves.
 
-    report: ModesReport
+    Attributes
+    ----------
+    summary : ModesReport
+        Frequencies, energy shares, the paper's coefficients.
+    sheets : tuple of Sheet
+        The same with the shapes of the modes, one per setup.
+    files : tuple of Path
+        Those that were written.
+    """
+
+    summary: ModesReport
     sheets: tuple[Sheet, ...]
     files: tuple[Path, ...]
 
+    @property
+    def plot(self) -> ModesPlots:
+        """The sheets of Chladni figures: `result.plot.modes()`."""
+        return ModesPlots(self.sheets)
+
+    def __repr__(self) -> str:
+        return repr(self.summary).replace("<ModesReport", "<ModesResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The table as a notebook shows it."""
+        return show_modes(self.summary).html(self.summary.title or self.summary.name)
+
 
 def modes(
-    card: str | os.PathLike[str],
+    card: Problem | Card,
     *,
     out: str | os.PathLike[str] | None = None,
-    write: bool = True,
     effects: Sequence[str] | None = None,
     seed: int = 1,
     force: bool = False,
@@ -49,14 +73,13 @@ def modes(
 
     Parameters
     ----------
-    card : str or path
-        Name of a shipped board card, or a path. It may be without frequencies: then the modes are those of the prior's
-        median, with the range in which the prior expects each. Modes that were not measured have the range that the
-        measured ones foretell.
+    card : Problem, str, path or Board
+        A problem, the name of a shipped board card, the path of a card, or a board made in Python. A card or a board
+        may be without frequencies: then the modes are those of the prior's median, with the range in which the prior
+        expects each. Modes that were not measured have the range that the measured ones foretell.
     out : path, optional
-        Folder of modes.png and modes.svg (modes-SETUP.png where there are several setups); by default results/NAME.
-    write : bool
-        False draws nothing.
+        Folder of modes.png and modes.svg (modes-SETUP.png where there are several setups); nothing is written without
+        it.
     effects : sequence of str, optional
         Declared effects in place of the card's.
     seed : int
@@ -73,18 +96,17 @@ def modes(
     InputError
         If the card or the folder cannot be used; then nothing is written.
     """
-    require_arguments(card=card, out=out, write=write, effects=effects, seed=seed, force=force)
-    prepared = prepare(card, effects, may_lack_frequencies=True)
+    require_arguments(card=card, out=out, effects=effects, seed=seed, force=force)
+    prepared = _prepared(card, effects)
     board = prepared.board
-    folder = Path(out) if out is not None else Path("results") / board.name
     stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
     names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
-    files = require_new(folder, names, force=force) if write else ()
+    files = () if out is None else require_new(Path(out), names, force=force)
     values, precision, why = _constants(prepared)
     basis = _AT_PRIOR if precision is None else _AT_ESTIMATE
     sheets = tuple(_sheets(prepared, values, precision, np.random.default_rng(seed)))
-    if write:
-        _draw(sheets, folder, files)
+    if out is not None:
+        _draw(sheets, Path(out), files)
     report = ModesReport(
         name=board.name,
         title=board.title,
@@ -94,6 +116,13 @@ def modes(
         files=tuple(str(path) for path in files),
     )
     return ModesResult(report, sheets, files)
+
+
+def _prepared(card: Problem | Card, effects: Sequence[str] | None) -> Prepared:
+    """As for a fit, but a board that was not measured yet will do."""
+    if isinstance(card, Problem):
+        return as_problem(card, effects=effects).prepared
+    return prepare(card, effects, may_lack_frequencies=True)
 
 
 def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]:

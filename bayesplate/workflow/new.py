@@ -14,7 +14,7 @@ from bayesplate.cards.words import plain, shown
 from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
-from bayesplate.plate.board import board_from_card
+from bayesplate.plate.from_card import board_from_card
 from bayesplate.results.folder import writing
 
 _EDGES_WANTED = (

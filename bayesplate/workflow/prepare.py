@@ -1,47 +1,104 @@
-"""From the name of a card to a board in SI units, with every fault of the input reported at once."""
+"""From a card, or a board made in Python, to a board in SI units, with every fault of the input reported at once."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from bayesplate.cards import BoardCard, PriorCard, load_board, load_named, physical_faults, remarks
+from bayesplate.cards import (
+    BoardCard,
+    NamedCards,
+    PriorCard,
+    load_board,
+    load_named,
+    load_prior,
+    physical_faults,
+    read_board_text,
+    remarks,
+)
+from bayesplate.cards.shelf import find
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
-from bayesplate.errors import InputError
+from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import coefficient_faults, require_sides
 from bayesplate.estimates.plausibility import unit_faults
 from bayesplate.frequencies.labels import label_faults
-from bayesplate.plate.board import Board, board_from_card
+from bayesplate.plate.board import Board
+from bayesplate.plate.from_card import board_from_card
+from bayesplate.plate.writing import card_text
+
+Card = str | os.PathLike[str] | Board
+"""Name of a shipped card, the path of a card, or a board made in Python."""
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A card, its prior, and the board they describe."""
+    """A card, the cards that it names, and the board they describe.
+
+    Attributes
+    ----------
+    card : BoardCard
+        That of a board made in Python is read from its own text.
+    named : NamedCards
+    stated : Board
+        The board as the card states it: what to vary by `dataclasses.replace`.
+    board : Board
+        With the parameters of its declared effects, those that its sensors and its air imply included.
+    """
 
     card: BoardCard
-    prior: PriorCard
+    named: NamedCards
+    stated: Board
     board: Board
+
+    @property
+    def prior(self) -> PriorCard:
+        """The prior, which was read."""
+        assert self.named.prior is not None
+        return self.named.prior
 
     @property
     def card_text(self) -> str:
         """The card as it was read."""
         return self.card.text
 
+    def with_effects(self, effects: Sequence[str]) -> Prepared:
+        """The same cards, not read again, with other declared effects; raises InputError as `prepare`."""
+        return _prepared(self.card, self.named, effects)
+
+
+def default_folder(card: str | os.PathLike[str]) -> Path:
+    """Where the command line writes the results of a card unless it is told: results/NAME.
+
+    Raises
+    ------
+    InputError
+        If there is no shipped card of that name.
+    """
+    return Path("results") / find("boards", card).stem
+
 
 def prepare(
-    card: str | os.PathLike[str], effects: Sequence[str] | None = None, *, may_lack_frequencies: bool = False
+    card: Card,
+    effects: Sequence[str] | None = None,
+    *,
+    prior: str | os.PathLike[str] | PriorCard | None = None,
+    may_lack_frequencies: bool = False,
 ) -> Prepared:
     """Read a board card and everything it names.
 
     Parameters
     ----------
-    card : str or path
-        Name of a shipped card, or a path.
+    card : str, path or Board
+        Name of a shipped card, or a path. A board goes through its own card: what would be refused there is refused
+        here, with the same places.
     effects : sequence of str, optional
         Declared effects in place of the card's.
+    prior : str, path or PriorCard, optional
+        In place of the prior that the card names.
     may_lack_frequencies : bool
         Whether a board that was not measured yet will do.
 
@@ -57,11 +114,23 @@ def prepare(
     NotIdentifiableError
         If the sides are those of the printed table that the card names, exchanged.
     """
-    read = load_board(card, may_lack_frequencies=may_lack_frequencies)
-    named = load_named(read)
-    board = board_from_card(read, named.prior, named.tables)
-    listed = (*board.effects, *implied_effects(board)) if effects is None else effects
-    board = replace(board, effects=tuple(dict.fromkeys(listed)))
+    given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
+    if not isinstance(card, Board):
+        read = load_board(card, may_lack_frequencies=may_lack_frequencies)
+        return _prepared(read, load_named(read, given), effects)
+    read = read_board_text(card_text(card), card.name, may_lack_frequencies=may_lack_frequencies)
+    found = ((setup.name, setup.published_coefficients) for setup in card.setups)
+    prepared = _prepared(read, load_named(read, given, {name: one for name, one in found if one is not None}), effects)
+    lost = list(_lost(card, prepared.board))
+    if lost:
+        raise InputError(lost)
+    return prepared
+
+
+def _prepared(read: BoardCard, named: NamedCards, effects: Sequence[str] | None) -> Prepared:
+    stated = board_from_card(read, named.prior, named.tables)
+    listed = (*stated.effects, *implied_effects(stated)) if effects is None else effects
+    board = replace(stated, effects=tuple(dict.fromkeys(listed)))
     faults = [*physical_faults(read), *named.faults, *label_faults(board), *effect_faults(board)]
     if not faults:
         require_sides(board)
@@ -71,4 +140,16 @@ def prepare(
     if faults or named.prior is None:
         raise InputError(faults)
     told = (*board.notes, *remarks(read, board.effects), *notes(board))
-    return Prepared(read, named.prior, declare(replace(board, notes=told)))
+    return Prepared(read, named, stated, declare(replace(board, notes=told)))
+
+
+def _lost(given: Board, prepared: Board) -> Iterator[Fault]:
+    """What a board holds of its effects that its card cannot say: it must not be put aside unsaid."""
+    again = prepared.inputs
+    remedy = "a card states an effect by its name, and the effect's own prior holds: vary Problem.board, which has none"
+    for one in given.parameters:
+        if one.is_of_effect and one.name in again and one.prior != again[one.name]:
+            yield Fault(f"{given.name} {one.name}", "the prior of a declared effect", "another one", remedy)
+    if given.chosen:
+        forms = ", ".join(one.name for one in given.chosen)
+        yield Fault(f"{given.name} chosen", "effects in the form that a card gives them", f"other forms of {forms}")

@@ -13,6 +13,7 @@ from bayesplate.results.checking import CheckReport
 from bayesplate.results.command_tables import METHODS_REMARK, check_tables, forward_table, methods_table, sheet_tables
 from bayesplate.results.comparison import Comparison
 from bayesplate.results.folder import json_text
+from bayesplate.results.notebook import html
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table, constants_table, modes_table, unlabelled_table
@@ -40,6 +41,10 @@ class Shown:
     remarks: tuple[str, ...]
     warnings: tuple[str, ...]
     closing: str
+
+    def html(self, heading: str) -> str:
+        """The same for a notebook, under a heading."""
+        return html(heading, (*self.remarks, *self.warnings, self.closing), self.tables)
 
 
 def show_check(report: CheckReport) -> Shown:

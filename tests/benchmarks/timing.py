@@ -22,7 +22,7 @@ from bayesplate.modes.solve import solve, solve_classes
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.setup import Ends
 from bayesplate.posterior.convergence import autocorrelation_time, burn_in_steps
-from bayesplate.posterior.inference import Problem, infer, pose
+from bayesplate.posterior.inference import PosedProblem, infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.workflow.prepare import prepare
 
@@ -40,18 +40,18 @@ def best(run: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def posed(board: str, law: LawName | None, effects: Sequence[str] | None = None) -> Problem:
+def posed(board: str, law: LawName | None, effects: Sequence[str] | None = None) -> PosedProblem:
     """A shipped board under a law, or the law that serves, ready to be sampled."""
     prepared = prepare(board, effects)
     return pose(prepared.board, prepared.prior, law=law)
 
 
-def draws(problem: Problem, n_draws: int) -> NDArray[np.float64]:
+def draws(problem: PosedProblem, n_draws: int) -> NDArray[np.float64]:
     """Points where the sampler would ask: a normal approximation of the posterior, (n_draws, n_dim) array."""
     return np.random.default_rng(1).multivariate_normal(problem.centre, problem.covariance, n_draws)
 
 
-def likelihood(problem: Problem, n_draws: int, repeats: int = 7) -> float:
+def likelihood(problem: PosedProblem, n_draws: int, repeats: int = 7) -> float:
     """One evaluation of the log likelihood at `n_draws` points together."""
     theta = draws(problem, n_draws)
     together = max(1, 2048 // n_draws)
@@ -64,14 +64,14 @@ def likelihood(problem: Problem, n_draws: int, repeats: int = 7) -> float:
     return best(run, repeats) / together
 
 
-def law(problem: Problem, name: LawName, n_draws: int, repeats: int = 7) -> float:
+def law(problem: PosedProblem, name: LawName, n_draws: int, repeats: int = 7) -> float:
     """The frequencies of the labelled modes alone at `n_draws` points, without noise and readings."""
     values = problem.parameters.values(draws(problem, n_draws))
     (model,) = problem.posterior.models
     return best(lambda: model.log_frequencies(values, name), repeats)
 
 
-def full_solve(problem: Problem, repeats: int = 7) -> float:
+def full_solve(problem: PosedProblem, repeats: int = 7) -> float:
     """The labelled modes of one draw from the matrices of the whole plate, only as many as are needed in each class."""
     (model,) = problem.posterior.models
     values = problem.parameters.values(draws(problem, 1))
@@ -82,7 +82,7 @@ def full_solve(problem: Problem, repeats: int = 7) -> float:
     return best(lambda: solve_classes(model.plate, weights, wanted), repeats)
 
 
-def plain_emcee(problem: Problem, seed: int) -> float:
+def plain_emcee(problem: PosedProblem, seed: int) -> float:
     """Effective draws per second of emcee as it comes: stretch moves, vectorised, one ensemble; burn-in left out of
     the draws and not of the time."""
     import emcee
@@ -100,7 +100,7 @@ def plain_emcee(problem: Problem, seed: int) -> float:
     return float(kept.shape[0] * n_walkers / autocorrelation_time(kept).max() / seconds)
 
 
-def our_sampling(problem: Problem, seed: int) -> float:
+def our_sampling(problem: PosedProblem, seed: int) -> float:
     """Effective draws per second of the package, of the parameter that has fewest: surrogate, warm-up and judgements
     of convergence count as time."""
     started = time.perf_counter()
@@ -108,14 +108,14 @@ def our_sampling(problem: Problem, seed: int) -> float:
     return inference.convergence.ess_min / (time.perf_counter() - started)
 
 
-def plate_at_estimate(problem: Problem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
+def plate_at_estimate(problem: PosedProblem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
     """Edges, mesh and weights of a problem's plate."""
     (model,) = problem.posterior.models
     weights = term_weights(problem.estimate.values, model.setup).at(0)
     return model.setup.ends_x, model.setup.ends_y, mesh(weights), weights
 
 
-def assembly(problem: Problem, repeats: int = 5) -> float:
+def assembly(problem: PosedProblem, repeats: int = 5) -> float:
     """Matrices of a plate that was never assembled before in this process, its libraries imported."""
     ends_x, ends_y, (n_x, n_y), _ = plate_at_estimate(problem)
 
@@ -127,7 +127,7 @@ def assembly(problem: Problem, repeats: int = 5) -> float:
     return best(run, repeats)
 
 
-def twelve_modes(problem: Problem, repeats: int = 7) -> float:
+def twelve_modes(problem: PosedProblem, repeats: int = 7) -> float:
     """The lowest twelve modes from matrices that are there."""
     ends_x, ends_y, (n_x, n_y), weights = plate_at_estimate(problem)
     plate = thin_plate(ends_x, ends_y, n_x, n_y)

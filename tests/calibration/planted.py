@@ -25,7 +25,7 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws, named_draws
-from bayesplate.posterior.inference import Inference, Problem, infer, pose
+from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.reweighting import linear_is_enough
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
@@ -144,7 +144,7 @@ def draw_truth(effect: str, asked: Prepared, place: Place, rng: np.random.Genera
     raise RuntimeError(f"{effect}: wanted a board with clear labels, got none in {MOST_REDRAWS} draws")
 
 
-def fitted(problem: Problem, settings: Settings, rng: np.random.Generator) -> tuple[Inference, Draws, int]:
+def fitted(problem: PosedProblem, settings: Settings, rng: np.random.Generator) -> tuple[Inference, Draws, int]:
     """Draws of a problem and how many runs they took; under the exact law where the linear one turns out too rough.
 
     A run that fails the gate is started anew with other random numbers: to leave the board out would favour easy ones.

@@ -32,7 +32,7 @@ from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.plate.setup import DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.inference import Problem, infer, pose
+from bayesplate.posterior.inference import PosedProblem, infer, pose
 from bayesplate.posterior.region import predictor
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
@@ -119,7 +119,7 @@ class Truth:
     hertz: Mapping[tuple[int, int], float]
     ranks_in_class: tuple[int, ...]
 
-    def theta(self, problem: Problem) -> NDArray[np.float64]:
+    def theta(self, problem: PosedProblem) -> NDArray[np.float64]:
         """Columns of the truth: (1, n_dim) array."""
         values = {name: np.asarray(value) for name, value in self.values.items()}
         return problem.parameters.theta(values, np.array([self.noise]))[None, :]
@@ -166,7 +166,7 @@ def _frequencies(design: Design, values: Mapping[str, float]) -> tuple[dict[tupl
 
 
 @lru_cache(maxsize=2)
-def _reference(design: Design) -> Problem:
+def _reference(design: Design) -> PosedProblem:
     """The board at the medians of the prior: where the fixed linear law is made."""
     prior = load_prior(design.prior)
     inputs = {name: float(quantity.median) for name, quantity in design.inputs.items()}
@@ -176,7 +176,7 @@ def _reference(design: Design) -> Problem:
     return pose(replace(design, resolution=0.0).board(hertz), prior, law="linear")
 
 
-def make_problem(design: Design, truth: Truth, noise: Quantity = DEFAULT_NOISE) -> Problem:
+def make_problem(design: Design, truth: Truth, noise: Quantity = DEFAULT_NOISE) -> PosedProblem:
     """The inference of simulated readings, under the noise prior that the analysis believes in."""
     board = design.board(truth.hertz, noise)
     prior = load_prior(design.prior)
@@ -185,7 +185,7 @@ def make_problem(design: Design, truth: Truth, noise: Quantity = DEFAULT_NOISE) 
     return _under_the_fixed_law(_reference(design), board, prior)
 
 
-def _under_the_fixed_law(reference: Problem, board: Board, prior: PriorCard) -> Problem:
+def _under_the_fixed_law(reference: PosedProblem, board: Board, prior: PriorCard) -> PosedProblem:
     posterior = Posterior(board, prior, reference.posterior.models, "linear")
     parameters = posterior.parameters
     columns = parameters.fitted_columns
@@ -200,7 +200,7 @@ def _under_the_fixed_law(reference: Problem, board: Board, prior: PriorCard) -> 
     return replace(reference, board=board, posterior=posterior, centre=centre, covariance=covariance)
 
 
-def quantities(problem: Problem, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+def quantities(problem: PosedProblem, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """What is ranked, for many draws: (n_draws,) arrays."""
     values = problem.parameters.values(theta)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
@@ -216,13 +216,13 @@ def quantities(problem: Problem, theta: NDArray[np.float64]) -> dict[str, NDArra
     return {name: np.broadcast_to(value, len(theta)) for name, value in found.items()}
 
 
-def ranks_among(problem: Problem, truth: Truth, draws: NDArray[np.float64]) -> Ranks:
+def ranks_among(problem: PosedProblem, truth: Truth, draws: NDArray[np.float64]) -> Ranks:
     """Rank of the truth among the draws, 0 to `N_DRAWS`, for every quantity."""
     true, drawn = quantities(problem, truth.theta(problem)), quantities(problem, draws)
     return {name: int(np.sum(drawn[name] < true[name][0])) for name in true}
 
 
-def posterior_draws(problem: Problem, design: Design, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
+def posterior_draws(problem: PosedProblem, design: Design, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
     """`N_DRAWS` of thousands of draws at random, and how many runs it took.
 
     Dependence among so few of so many is lost in their own scatter. A run that fails the gate is started anew with
@@ -244,7 +244,7 @@ def posterior_draws(problem: Problem, design: Design, rng: np.random.Generator) 
     raise BayesplateError("; ".join(inference.convergence.reasons))
 
 
-def prior_draws(problem: Problem, design: Design, rng: np.random.Generator) -> NDArray[np.float64]:
+def prior_draws(problem: PosedProblem, design: Design, rng: np.random.Generator) -> NDArray[np.float64]:
     """What a sampler would give if the likelihood were forgotten."""
     rows = []
     for _ in range(N_DRAWS):

@@ -10,10 +10,9 @@ import pytest
 
 from bayesplate.diagnosis.evidence.search import Ground, prepare_search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
-from bayesplate.workflow.fitting import Request, posed
-from bayesplate.workflow.prepare import prepare
+from bayesplate.workflow.problem import Problem
 
 N_NULL = 100
 """Data sets of the null control: enough for its files and rules, fewer than a diagnosis that is to be published."""
@@ -23,12 +22,12 @@ N_NULL = 100
 class Grounded:
     """A board's problem and the ground of its search."""
 
-    problem: Problem
+    problem: PosedProblem
     ground: Ground
 
 
 def grounded(name: str) -> Grounded:
-    problem = posed(prepare(name), Request())
+    problem = Problem.from_card(name).posed
     return Grounded(problem, prepare_search(baseline_of(problem)))
 
 
@@ -56,6 +55,6 @@ def diagnosed() -> Callable[[str], DiagnoseResult]:
 
     @cache
     def run(name: str) -> DiagnoseResult:
-        return diagnose(name, write=False, n_null=N_NULL)
+        return diagnose(name, n_null=N_NULL)
 
     return run

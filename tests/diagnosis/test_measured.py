@@ -104,7 +104,7 @@ def test_the_constants_of_the_search_are_those_of_the_sampler_without_effect(nam
     The sampler also has the card's prior and the rounding interval. One of the boards has uncertain sizes: what they do
     to the moduli must be there.
     """
-    fitted = fit(name, write=False, law="linear")
+    fitted = fit(name, law="linear")
     ground = prepare_search(baseline_of(fitted.inference.problem), tried=())
     drawn = draw_constants(search(ground), np.random.default_rng(1), N_DRAWS).values
     for modulus in MODULI:

@@ -11,7 +11,8 @@ import ritz
 
 from bayesplate.cards import card_names, load_board, load_prior
 from bayesplate.estimates.plausibility import FASTEST, SLOWEST, plate_speed, prior_predictive, unit_faults
-from bayesplate.plate.board import Board, board_from_card, density, made_board
+from bayesplate.plate.board import Board, density, made_board
+from bayesplate.plate.from_card import board_from_card
 from bayesplate.plate.parameter import BOARD
 from bayesplate.quantities import Quantity
 

@@ -10,10 +10,10 @@ from bayesplate.workflow.fit import fit
 @pytest.fixture(scope="session")
 def finnish():
     """The paper's cantilever board under the default prior."""
-    return fit("finnish-spruce-cantilever", write=False, seed=1)
+    return fit("finnish-spruce-cantilever", seed=1)
 
 
 @pytest.fixture(scope="session")
 def fiemme():
     """The paper's clamped board under the default prior."""
-    return fit("fiemme-spruce-clamped", write=False, seed=1)
+    return fit("fiemme-spruce-clamped", seed=1)

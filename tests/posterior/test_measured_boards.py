@@ -52,8 +52,8 @@ def test_shear_and_the_sensor_explain_half_of_the_residuals_and_neither_does_alo
 
 @pytest.mark.parametrize("card", MOST)
 def test_a_fit_with_both_effects_converges_and_halves_the_residuals(card):
-    thin = fit(card, write=False, effects=[]).summary.error.in_sample_rms_cents
-    summary = fit(card, write=False, effects=BOTH).summary
+    thin = fit(card, effects=[]).summary.error.in_sample_rms_cents
+    summary = fit(card, effects=BOTH).summary
 
     assert summary.converged
     assert summary.error.in_sample_rms_cents <= MOST[card] * thin

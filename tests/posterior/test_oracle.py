@@ -18,7 +18,7 @@ from statistics_checks import Truth, differences, differences_from_normal
 from bayesplate.cards import StatedPrior, load_prior
 from bayesplate.plate.board import Board
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.inference import Problem, infer, pose
+from bayesplate.posterior.inference import PosedProblem, infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
@@ -87,7 +87,7 @@ def stated(board: Board, prior, model, mean, covariance):
     centre = np.r_[mean + np.sqrt(np.diagonal(covariance)), np.log(board.setups[0].noise.median)]
     wide = np.zeros((4, 4))
     wide[:3, :3], wide[3, 3] = covariance, board.setups[0].noise.log_sd ** 2
-    return Problem(board, prior, None, None, posterior, centre, wide)
+    return PosedProblem(board, prior, None, None, posterior, centre, wide)
 
 
 def sampled(problem, seed):

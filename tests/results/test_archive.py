@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bayesplate.results import archive as archive_module
-from bayesplate.results.archive import GROUPS, read_archive, write_archive
+from bayesplate.results.archive import GROUPS, Archive, read_archive, to_arviz, write_archive
 
 LABELS = ["(1,0)", "(1,1)", "(2,0)"]
 
@@ -20,11 +20,14 @@ def content():
     rng = np.random.default_rng(8)
     sampled = rng.standard_normal
     return {
-        "posterior": {"E_x": sampled((4, 50)), "tension": sampled((4, 50, 2))},
-        "log_likelihood": {"frequency": sampled((4, 50, 3))},
-        "posterior_predictive": {"frequency": sampled((4, 50, 3))},
-        "observed_data": {"frequency": np.array([52.0, 98.0, 310.0])},
-        "sample_stats": {"lp": sampled((4, 50)), "moved": sampled((4, 50)) > 0, "tau": np.array([20.0, 21.0])},
+        "groups": {
+            "posterior": {"E_x": sampled((4, 50)), "tension": sampled((4, 50, 2))},
+            "log_prior": {"tension": sampled((4, 50))},
+            "log_likelihood": {"frequency": sampled((4, 50, 3))},
+            "posterior_predictive": {"frequency": sampled((4, 50, 3))},
+            "sample_stats": {"lp": sampled((4, 50)), "moved": sampled((4, 50)) > 0, "tau": np.array([20.0, 21.0])},
+            "observed_data": {"frequency": np.array([52.0, 98.0, 310.0])},
+        },
         "coords": {"mode": LABELS, "edge": np.array(["x0", "y0"]), "parameter": ["E_x", "größe"]},
         "dims": {"frequency": ["mode"], "tension": ["edge"], "tau": ["parameter"]},
         "attributes": {"seed": "1", "card": "length_x_mm = 253  # größe\n" * 4000},
@@ -34,7 +37,7 @@ def content():
 @pytest.fixture
 def path(tmp_path):
     path = tmp_path / "posterior.nc"
-    write_archive(path, **content())
+    write_archive(path, Archive(**content()))
     return path
 
 
@@ -43,8 +46,8 @@ def test_everything_comes_back(path):
     given = content()
     assert tuple(archive.groups) == GROUPS
     for group in GROUPS:
-        assert set(archive.groups[group]) == set(given[group])
-        for name, value in given[group].items():
+        assert set(archive.groups[group]) == set(given["groups"][group])
+        for name, value in given["groups"][group].items():
             np.testing.assert_array_equal(archive.groups[group][name], value)
     assert archive.attributes == given["attributes"]
     assert archive.coords["mode"].tolist() == LABELS
@@ -59,31 +62,60 @@ def test_arviz_summarises_it(path):
 
     summary = arviz.summary(arviz.from_netcdf(str(path)), round_to=8)
     assert list(summary.index) == ["E_x", "tension[x0]", "tension[y0]"]
-    assert float(summary["mean"].iloc[0]) == pytest.approx(content()["posterior"]["E_x"].mean(), abs=1e-6)
+    assert float(summary["mean"].iloc[0]) == pytest.approx(content()["groups"]["posterior"]["E_x"].mean(), abs=1e-6)
+
+
+def test_without_a_file_arviz_gets_what_it_reads_from_one(path):
+    import arviz
+
+    read, made = arviz.from_netcdf(str(path)), to_arviz(Archive(**content()))
+    for group in GROUPS:
+        assert set(made[group].data_vars) == set(read[group].data_vars)
+        for name, variable in read[group].data_vars.items():
+            assert made[group][name].dims == variable.dims
+            np.testing.assert_array_equal(made[group][name].values, variable.values)
+        for name, labels in read[group].coords.items():
+            assert made[group].coords[name].values.tolist() == labels.values.tolist()
+    assert {key: value for key, value in read.attrs.items() if key in made.attrs} == dict(made.attrs)
+
+
+def test_where_arviz_works_with_trees_it_gets_one(monkeypatch):
+    """ArviZ 1.x has no InferenceData; the tree holds the same groups."""
+    import arviz
+    import xarray
+
+    monkeypatch.delattr(arviz, "InferenceData")
+    tree = to_arviz(Archive(**content()))
+
+    assert isinstance(tree, xarray.DataTree)
+    assert set(tree.children) == set(GROUPS)
+    assert tree["posterior"]["tension"].dims == ("chain", "draw", "edge")
+    assert tree["log_prior"]["tension"].dims == ("chain", "draw")
+    assert tree.attrs["seed"] == "1"
 
 
 def test_the_same_input_gives_the_same_bytes(path, tmp_path):
     again = tmp_path / "elsewhere.nc"
-    write_archive(again, **content())
+    write_archive(again, Archive(**content()))
     assert hashlib.sha256(again.read_bytes()).digest() == hashlib.sha256(path.read_bytes()).digest()
     changed = content()
-    changed["posterior"]["E_x"][0, 0] += 1e-12
-    write_archive(again, **changed)
+    changed["groups"]["posterior"]["E_x"][0, 0] += 1e-12
+    write_archive(again, Archive(**changed))
     assert again.read_bytes() != path.read_bytes()
 
 
 def test_an_archive_that_was_read_can_be_written_again(path):
     read_archive(path)
-    write_archive(path, **content())
+    write_archive(path, Archive(**content()))
     assert read_archive(path).groups["posterior"]["E_x"].shape == (4, 50)
 
 
 def test_a_failed_write_leaves_the_old_archive(path):
     before = path.read_bytes()
     changed = content()
-    changed["observed_data"]["frequency"] = np.zeros(4)
+    changed["groups"]["observed_data"]["frequency"] = np.zeros(4)
     with pytest.raises(ValueError, match=r"archive frequency: wanted shape \(3,\) for \('mode',\), got \(4,\)"):
-        write_archive(path, **changed)
+        write_archive(path, Archive(**changed))
     assert path.read_bytes() == before
     assert [file.name for file in path.parent.iterdir()] == [path.name]
 
@@ -92,16 +124,16 @@ def test_a_dimension_without_labels_is_refused(tmp_path):
     changed = content()
     del changed["coords"]["mode"]
     with pytest.raises(ValueError, match="wanted coords for mode"):
-        write_archive(tmp_path / "posterior.nc", **changed)
+        write_archive(tmp_path / "posterior.nc", Archive(**changed))
 
 
 def test_writing_imports_neither_arviz_nor_xarray():
     program = (
         "import sys, tempfile, pathlib, numpy as np\n"
-        "from bayesplate.results.archive import write_archive\n"
+        "from bayesplate.results.archive import Archive, write_archive\n"
         "with tempfile.TemporaryDirectory() as folder:\n"
-        "    write_archive(pathlib.Path(folder, 'a.nc'), posterior={'a': np.zeros((2, 3))}, log_likelihood={},\n"
-        "        posterior_predictive={}, observed_data={}, sample_stats={}, coords={}, dims={}, attributes={})\n"
+        "    groups = {'posterior': {'a': np.zeros((2, 3))}}\n"
+        "    write_archive(pathlib.Path(folder, 'a.nc'), Archive(groups, {}, {}, {}))\n"
         "assert not {'arviz', 'arviz_base', 'xarray'} & set(sys.modules)\n"
     )
     root = Path(archive_module.__file__).parents[2]

@@ -12,8 +12,6 @@ import pytest
 import bayesplate
 from bayesplate.errors import InputError
 from bayesplate.workflow.arguments import require_arguments
-from bayesplate.workflow.diagnose import diagnose
-from bayesplate.workflow.modes import modes
 
 BOARD = "fiemme-spruce-clamped"
 LIST = "a list of names of effects"
@@ -34,9 +32,11 @@ BAD = [
     ({"n_null": 0}, "n_null: wanted a whole number from 1 on, got 0"),
     ({"out": 3}, "out: wanted a name or a path, got 3"),
     ({"out": ""}, "out: wanted a name or a path, got an empty text"),
-    ({"card": None}, "card: wanted a name or a path, got None"),
+    ({"card": None}, "card: wanted a name, a path, a Board or a Problem, got None"),
+    ({"prior": 3}, "prior: wanted a name, a path or a PriorCard, got 3"),
+    ({"resume": True, "out": None}, "resume: wanted the folder of the run that is continued, as out, got no out"),
     ({"robust": 1}, "robust: wanted True or False, got 1"),
-    ({"write": "no"}, 'write: wanted True or False, got "no"'),
+    ({"report": "no"}, 'report: wanted True or False, got "no"'),
     ({"force": True, "resume": True}, "force and resume: wanted one of them, got both"),
     ({"coefficients": "trained"}, "(did you mean training?)"),
     ({"progress": "yes"}, "progress: wanted a function or None"),
@@ -46,12 +46,13 @@ GOOD = [
     {"law": "linear", "seed": np.int64(3), "effects": (), "out": Path("x"), "progress": print},
     {"law": "exact", "effects": ["air_loading", "grain_angle"], "card": Path("x.toml"), "n_null": 1},
     {"coefficients": "published", "force": True, "resume": False},
+    {"resume": True, "out": "results/x"},
 ]
 FUNCTIONS = {
-    "fit": (bayesplate.fit, "seed law robust effects write report force resume out progress"),
-    "diagnose": (diagnose, "seed effects write report force resume out n_null progress"),
+    "fit": (bayesplate.fit, "seed law robust effects report force resume out progress"),
+    "diagnose": (bayesplate.diagnose, "seed effects report force resume out n_null progress"),
     "compare": (bayesplate.compare, "seed effects coefficients out force progress"),
-    "modes": (modes, "seed effects write force out"),
+    "modes": (bayesplate.modes, "seed effects force out"),
     "check": (bayesplate.check, "effects"),
     "cite": (bayesplate.cite, "effects"),
 }

@@ -13,7 +13,7 @@ from runs import Run, read_json
 
 import bayesplate
 from bayesplate.cards import card_names, load_board, load_prior
-from bayesplate.plate.board import board_from_card
+from bayesplate.plate.from_card import board_from_card
 from bayesplate.posterior.inference import pose
 from bayesplate.results.contract import as_json
 from bayesplate.workflow.prepare import prepare

@@ -86,7 +86,7 @@ def test_the_sheet_is_written_once_and_replaced_only_if_forced(finnish_sheet):
 
 
 def test_shear_has_a_share_where_it_is_declared():
-    (setup,) = modes("fiemme-spruce-clamped", effects=["transverse_shear"], write=False).report.setups
+    (setup,) = modes("fiemme-spruce-clamped", effects=["transverse_shear"]).summary.setups
 
     assert setup.theory == "shear-flexible"
     assert all(0 < mode.share_percent.effects < 15 for mode in setup.modes)
@@ -94,8 +94,8 @@ def test_shear_has_a_share_where_it_is_declared():
 
 def test_a_board_not_measured_yet_is_computed_from_the_prior(unmeasured):
     """Supported all round: closed form, omega^2 = pi^4 (D_x m^4 / L_x^4 + ... ) / rho h, at the median of the prior."""
-    result = modes(unmeasured, write=False)
-    (setup,) = result.report.setups
+    result = modes(unmeasured)
+    (setup,) = result.summary.setups
     E_x, E_y, G, h, rho, nu = 11e9, 0.95e9, 0.67e9, 3e-3, 450.0, 0.4
     D_x, D_y = (E * h**3 / 12 / (1 - nu**2 * E_y / E_x) for E in (E_x, E_y))
     D_s = G * h**3 / 3
@@ -107,12 +107,12 @@ def test_a_board_not_measured_yet_is_computed_from_the_prior(unmeasured):
         assert mode.hz == pytest.approx(np.sqrt(squared) / (2 * np.pi), rel=1e-3)
         low, high = mode.likely_hz
         assert low < mode.hz < high
-    assert "median of the prior" in result.report.basis
+    assert "median of the prior" in result.summary.basis
 
 
 def test_the_band_follows_the_prior(unmeasured):
     """To first order ln f has half the shares times the prior's log sds; two thirds of a normal lie within 0.967 sd."""
-    (setup,) = modes(unmeasured, write=False).report.setups
+    (setup,) = modes(unmeasured).summary.setups
     log_sds = np.log([1.35, 1.75, 1.5])
 
     for mode in setup.modes:

@@ -45,7 +45,7 @@ def test_quiet_prints_nothing(quick_fit):
 def test_nothing_is_written_unless_asked_for(tmp_path, monkeypatch, fiemme):
     """The same draws as with files: writing and checkpoints change nothing."""
     monkeypatch.chdir(tmp_path)
-    result = bayesplate.fit("fiemme-spruce-clamped", write=False)
+    result = bayesplate.fit("fiemme-spruce-clamped")
 
     assert result.folder is None
     assert list(tmp_path.iterdir()) == []

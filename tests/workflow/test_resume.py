@@ -91,7 +91,7 @@ def test_an_interrupt_before_sampling_leaves_nothing(tmp_path, monkeypatch):
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(10)
 
-    monkeypatch.setattr("bayesplate.workflow.fitting.pose", interrupted)
+    monkeypatch.setattr("bayesplate.workflow.problem.pose", interrupted)
     run = runs.fit(tmp_path / "out", BOARD)
 
     assert run.exit_code == 130

@@ -25,7 +25,7 @@ from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.region import predictor
 
@@ -97,7 +97,7 @@ class Baseline:
         return np.asarray((shift - self.slopes @ (self.absorbing @ shift)) / self.scales)
 
 
-def baseline_of(problem: Problem) -> Baseline:
+def baseline_of(problem: PosedProblem) -> Baseline:
     """The baseline of a problem that is ready to be sampled, at the centre of its posterior under the exact law."""
     board, parameters = problem.board, problem.parameters
     columns = parameters.fitted_columns

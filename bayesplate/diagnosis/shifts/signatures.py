@@ -20,7 +20,7 @@ from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, Moduli, moduli
-from bayesplate.posterior.inference import Problem
+from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.posterior.region import predictor
 
@@ -86,12 +86,12 @@ def candidates(board: Board) -> tuple[str, ...]:
     )
 
 
-def signatures(problem: Problem, names: Sequence[str] | None = None) -> tuple[Signature, ...]:
+def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tuple[Signature, ...]:
     """Signatures of effects around the estimate of a problem.
 
     Parameters
     ----------
-    problem : Problem
+    problem : PosedProblem
     names : sequence of str, optional
         By default all candidates.
 
@@ -121,7 +121,7 @@ def signatures(problem: Problem, names: Sequence[str] | None = None) -> tuple[Si
     return tuple(result)
 
 
-def constants_predictor(problem: Problem) -> Predict:
+def constants_predictor(problem: PosedProblem) -> Predict:
     """ln f of all modes as a function of ln D_x, ln D_y, ln D_s alone, inputs as at the estimate."""
     predict_all = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
     inputs = problem.centre[problem.parameters.fitted_columns][N_RIGIDITIES:]
@@ -132,7 +132,7 @@ def constants_predictor(problem: Problem) -> Predict:
     return predict
 
 
-def frequencies_with(problem: Problem, name: str) -> tuple[Floats, dict[str, float]]:
+def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, dict[str, float]]:
     """ln f of all modes with one more effect at its nominal size, by full solves; and that size."""
     board = declare(replace(problem.board, effects=(*problem.board.effects, name)))
     at_estimate = problem.parameters.values(problem.centre[None, :])
@@ -168,7 +168,7 @@ def cosine(one: Signature, other: Signature) -> float:
     return float(one.visible @ other.visible) / norms if norms > 0 else 0.0
 
 
-def _bias(problem: Problem, true: Floats, fitted: Floats) -> dict[str, float]:
+def _bias(problem: PosedProblem, true: Floats, fitted: Floats) -> dict[str, float]:
     values = problem.parameters.values(problem.centre[None, :])
     thickness, nu_xy = values["thickness"], values["poisson_xy"]
 

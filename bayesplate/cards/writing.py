@@ -1,0 +1,146 @@
+"""Cards as text: numbers, quantities and densities in the units of their keys, so that reading gives them back."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bayesplate.cards.words import plain
+from bayesplate.errors import Fault, InputError
+from bayesplate.quantities import Kind, Quantity
+
+if TYPE_CHECKING:
+    from bayesplate.cards.prior import PriorCard
+
+_DIGITS = (12, 15, 16, 17)
+"""Twelve first: there the error of a change of units is gone, and the number is the one that somebody wrote."""
+_STEPS = (0, 1, -1, 2, -2)
+
+
+def prior_text(prior: PriorCard) -> str:
+    """The card of a prior, as TOML.
+
+    Parameters
+    ----------
+    prior : PriorCard
+
+    Returns
+    -------
+    str
+        In card format 1.
+    """
+    lines = ["format = 1", f"name = {text(prior.name)}", *([f"title = {text(prior.title)}"] if prior.title else [])]
+    for name, stated in prior.stated_constants.items():
+        unit, scale = ("gpa", 1e9) if name[0] in "EG" else ("n_m", 1.0)
+        lines += ["", f"[{name}]", *_density(stated.quantity, unit, scale), f"source = {text(stated.source)}"]
+    if prior.stated_noise is not None:
+        median, factor = density_numbers(prior.stated_noise.quantity, 1.0, Quantity.from_median)
+        source = text(prior.stated_noise.source)
+        lines += ["", "[noise_percent]", f"median = {median}", f"factor = {factor}", f"source = {source}"]
+    if prior.stated_poisson is not None:
+        stated = prior.stated_poisson
+        lines += ["", "[poisson_xy]", f"mean = {number(stated.quantity.mean)}", f"sd = {number(stated.quantity.sd)}"]
+        lines += [f"source = {text(stated.source)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _density(quantity: Quantity, unit: str, scale: float) -> Iterator[str]:
+    """The lines that state the density of a constant; `scale` is one unit of the key in SI."""
+    yield f"distribution = {text(quantity.kind)}"
+    if quantity.kind == "log-uniform":
+        yield f"lower_{unit} = {number(quantity.lower, scale)}"
+        yield f"upper_{unit} = {number(quantity.upper, scale)}"
+    else:
+        median, factor = density_numbers(quantity, scale, lambda m, f: Quantity.from_median(m * scale, f))
+        yield f"median_{unit} = {median}"
+        yield f"factor = {factor}"
+
+
+def number(value: float, scale: float = 1.0) -> str:
+    """A number in the unit of its key, which is `scale` in the unit of the value: text * scale is the value again."""
+    written = value / scale
+    found = [t for at in _near(written) for digits in _DIGITS if float(t := f"{at:.{digits}g}") * scale == value]
+    shortest = min(found, key=len, default=f"{written:.17g}")
+    return shortest if any(mark in shortest for mark in ".en") else f"{shortest}.0"
+
+
+def density_numbers(one: Quantity, scale: float, read: Callable[[float, float], Quantity]) -> tuple[str, str]:
+    """Median and factor of a log-normal density as its key has them; `read` makes the density of two such numbers."""
+    median, factor = one.median / scale, one.factor
+    rounded = [(float(f"{median:.12g}"), float(f"{factor:.12g}")), (float(f"{median:.12g}"), factor)]
+    near = (*rounded, *product(_near(median), _near(factor)))
+    best = next((pair for pair in near if pair[1] > 1 and read(*pair) == one), (median, factor))
+    return number(best[0]), number(best[1])
+
+
+def _near(value: float) -> Iterator[float]:
+    """The number and its neighbours: a change of units rounds."""
+    for steps in _STEPS:
+        at = value
+        for _ in range(abs(steps)):
+            at = math.nextafter(at, math.copysign(math.inf, steps))
+        yield at
+
+
+def quantity(one: Quantity, scale: float, place_scale: float = 1.0) -> str:
+    """A quantity in the unit of its key, in the shortest form that says all of it."""
+    if one.readings:
+        readings = array(number(value, scale) for value in one.readings)
+        further = {"resolution": number(one.resolution, scale)} if one.resolution else {}
+        places = {"at_x_mm": one.at_x, "at_y_mm": one.at_y}
+        further |= {key: array(number(at, place_scale) for at in values) for key, values in places.items() if values}
+        return table({"readings": readings, **further}) if further else readings
+    if one.is_exact:
+        return number(one.mean, scale)
+    return table({"mean": number(one.mean, scale), "sd": number(one.sd, scale)})
+
+
+def unstatable(place: str, one: Quantity, kind: Kind = "log-normal") -> list[Fault]:
+    """What a card cannot say of a quantity whose key takes a density of one kind without bounds."""
+    if one.is_exact:
+        return []
+    is_bounded = math.isfinite(one.lower) or math.isfinite(one.upper)
+    if one.kind == kind and not is_bounded:
+        return []
+    got = f"a {one.kind} one" + (" with bounds" if is_bounded else "")
+    return [Fault(place, f"a {kind} quantity without bounds, as cards state it", got)]
+
+
+def text(value: str) -> str:
+    """A basic string of TOML; JSON escapes it the same way."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def table(entries: Mapping[str, str]) -> str:
+    """An inline table."""
+    return "{ " + ", ".join(f"{key} = {value}" for key, value in entries.items()) + " }" if entries else "{}"
+
+
+def array(items: Iterator[str] | Sequence[str]) -> str:
+    """An array."""
+    return "[" + ", ".join(items) + "]"
+
+
+def write_card(path: Any, name: str, content: str, *, force: bool) -> None:
+    """Write a card to a file of its name, completely or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file has another name than the card, is there already and `force` is not given, or cannot be written.
+    """
+    path = Path(path)
+    shown = plain(str(path))
+    if path.name != f"{name}.toml":
+        raise InputError(Fault(shown, f"{name}.toml, the name of the card", plain(path.name)))
+    try:
+        with path.open("w" if force else "x", encoding="utf-8", newline="\n") as stream:
+            stream.write(content)
+    except FileExistsError:
+        raise InputError(Fault(shown, "a new file", "one that exists", "force=True replaces it")) from None
+    except OSError as error:
+        raise InputError(Fault(shown, "a place for the card", error.strerror or str(error))) from None

@@ -1,0 +1,122 @@
+"""A board card taken to SI units: the board, its setups, and what was assumed because the card does not say it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from bayesplate.cards import BoardCard, CoefficientCard, PriorCard, SetupSection
+from bayesplate.plate.board import Board, made_board
+from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup, assumed_noise
+from bayesplate.quantities import Quantity
+
+NO_TABLES: Mapping[str, CoefficientCard] = MappingProxyType({})
+
+_MILLI = 1e-3
+_PERCENT = 1e-2
+
+
+def board_from_card(
+    card: BoardCard, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] = NO_TABLES
+) -> Board:
+    """Take a board card to SI units.
+
+    Parameters
+    ----------
+    card : BoardCard
+    prior : PriorCard, optional
+        Its noise and Poisson ratio stand where it states them and the board card does not.
+    tables : dict of CoefficientCard
+        By setup, those that the card names: see `bayesplate.cards.load_named`.
+
+    Returns
+    -------
+    Board
+    """
+    setups = tuple(_setup(section, prior, tables.get(section.name)) for section in card.setups)
+    inputs = {
+        "length_x": card.plate.length_x_mm.scaled(_MILLI).with_places_scaled(_MILLI),
+        "length_y": card.plate.length_y_mm.scaled(_MILLI).with_places_scaled(_MILLI),
+        "thickness": card.plate.thickness_mm.scaled(_MILLI).with_places_scaled(_MILLI),
+    }
+    if card.plate.mass_g is not None:
+        inputs["mass"] = card.plate.mass_g.scaled(_MILLI)
+    elif card.plate.density_kg_m3 is not None:
+        inputs["density"] = card.plate.density_kg_m3
+    inputs["poisson_xy"] = _poisson(card, prior)
+    return made_board(
+        card.name,
+        inputs,
+        setups,
+        title=card.title,
+        source=card.source,
+        prior=card.material.prior,
+        effects=tuple(card.effects),
+        shear_xz=_optional(card.material.shear_xz_gpa, 1e9),
+        shear_yz=_optional(card.material.shear_yz_gpa, 1e9),
+        notes=_notes(card, inputs["poisson_xy"]),
+    )
+
+
+def _optional(quantity: Quantity | None, factor: float) -> Quantity | None:
+    return None if quantity is None else quantity.scaled(factor)
+
+
+def _poisson(card: BoardCard, prior: PriorCard | None) -> Quantity:
+    if card.material.poisson_is_default and prior is not None and prior.poisson_xy is not None:
+        return prior.poisson_xy
+    return card.material.poisson_xy
+
+
+def _noise(section: SetupSection, prior: PriorCard | None) -> Quantity:
+    if section.noise_percent is not None:
+        return section.noise_percent.scaled(_PERCENT)
+    return assumed_noise(tuple(section.edges.words.values()), prior)
+
+
+def _joined_with_rounding(frequency: Quantity, resolution: float | None) -> Quantity:
+    """A list of readings with their standard error joined with the rounding error; a single number stays as it is."""
+    if len(frequency.readings) < 2 or frequency.resolution or not resolution:
+        return frequency
+    return Quantity.from_readings(frequency.readings, resolution)
+
+
+def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCard | None) -> Setup:
+    edges, first = section.edges, section.first_label
+    return Setup(
+        name=section.name,
+        ends_x=(edges.x0, edges.x1),
+        ends_y=(edges.y0, edges.y1),
+        clamped={edge: length.scaled(_MILLI) for edge, length in section.clamped_mm.items()},
+        readings=tuple(
+            Reading(
+                label,
+                (label.m - first.m, label.n - first.n),
+                _joined_with_rounding(frequency, section.resolution_hz),
+                section.signs.get(label, ""),
+            )
+            for label, frequency in section.frequencies_hz.items()
+        ),
+        resolution=section.resolution_hz or 0.0,
+        unlabelled=tuple(peak.mean for peak in section.unlabelled_hz),
+        noise=_noise(section, prior),
+        first_label=first,
+        published_coefficients=table,
+        attached=tuple(
+            AttachedItem(
+                item.kind,
+                tuple((x * _MILLI, y * _MILLI) for x, y in item.at_mm),
+                _optional(item.mass_g, _MILLI),
+            )
+            for item in section.attached
+        ),
+        hammer=None if section.hammer is None else (section.hammer.at_mm[0] * _MILLI, section.hammer.at_mm[1] * _MILLI),
+        air=None if section.air is None else DeclaredAir(section.air.density_kg_m3, section.air.baffle),
+    )
+
+
+def _notes(card: BoardCard, poisson: Quantity) -> tuple[str, ...]:
+    notes = []
+    if card.material.poisson_is_default:
+        notes.append(f"the card gives no Poisson ratio: nu_xy = {poisson.mean:g} +- {poisson.sd:g} was assumed")
+    return tuple(notes)

@@ -1,0 +1,225 @@
+"""The figures of a result, each drawn when it is asked for, as matplotlib has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.errors import Fault, InputError
+from bayesplate.estimates.sheet import Sheet
+from bayesplate.plate.material import MODULI
+from bayesplate.plate.parameter import unit_of_people
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference, PosedProblem
+from bayesplate.results.checking import CheckReport
+from bayesplate.results.summary import Summary
+from bayesplate.results.words import GPA
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FitPlots:
+    """The figures of a fit."""
+
+    inference: Inference
+    draws: Draws
+    summary: Summary
+
+    def constants(self) -> Figure:
+        """Posterior of each modulus, least squares and percentile band beside it."""
+        from bayesplate.report.constants import constants_figure
+
+        return constants_figure(self.summary, self.draws.moduli)
+
+    def modes(self, setup: str | None = None) -> Figure:
+        """Chladni figures of the fitted modes of a setup, the first unless named, measured and predicted."""
+        from bayesplate.report.page import modes_pictures
+
+        names = [one.name for one in self.inference.problem.board.setups]
+        return modes_pictures(self.inference, self.draws, self.summary)[_place("setup", setup, names)].figure
+
+    def corner(self, names: Sequence[str] = MODULI) -> Figure:
+        """Every pair of quantities, by the package corner; least squares marked where there is one.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the units of cards.
+        """
+        from bayesplate.report.corner_plot import corner_figure
+
+        known = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
+        for name in names:
+            _place("name", name, list(known))
+        shown = {name: _factor_and_words(name, self.inference.problem) for name in names}
+        estimate = self.summary.weighted_least_squares
+        at = {name: estimate[name] if name in estimate.NAMES else None for name in names}
+        return corner_figure(
+            {words: known[name] * factor for name, (factor, words) in shown.items()},
+            {words: None if (v := at[name]) is None else v * factor for name, (factor, words) in shown.items()},
+        )
+
+    def pairs(self) -> Figure:
+        """Every pair of the constants, the noise and the inputs that matter most, as in the report."""
+        from bayesplate.report.pairs import pairs_picture
+
+        return pairs_picture(self.inference.problem, self.draws).figure
+
+    def priors(self) -> Figure:
+        """Prior and posterior of every quantity that was not known."""
+        from bayesplate.report.priors import priors_picture
+
+        return priors_picture(self.inference.problem, self.draws).figure
+
+    def residuals(self) -> Figure:
+        """How far each mode is missed, cents."""
+        from bayesplate.report.residuals import residuals_picture
+
+        return residuals_picture(self.summary).figure
+
+    def predictive(self) -> Figure:
+        """What the fitted model would expect the next measurement to read."""
+        from bayesplate.report.residuals import predictive_picture
+
+        return predictive_picture(self.summary, self.draws.predictive).figure
+
+    def shares(self) -> Figure:
+        """Energy of each mode by constant, and its leverage."""
+        from bayesplate.report.shares import shares_picture
+
+        return shares_picture(self.summary, self.inference.problem.identifiability).figure
+
+    def percentiles(self) -> Figure:
+        """The percentile method's estimates beside the posterior."""
+        from bayesplate.report.page import percentiles_pictures
+
+        found = percentiles_pictures(self.inference, self.draws)
+        if not found:
+            raise InputError(Fault("plot.percentiles", "a board of few modes", "too many, or no positive estimate"))
+        return found[0].figure
+
+    def sampler(self) -> Figure:
+        """The way of each ensemble."""
+        from bayesplate.report.health import health_picture
+
+        return health_picture(self.inference).figure
+
+    def board(self) -> Figure:
+        """The board to scale, its edges, hammer and sensors."""
+        from bayesplate.report.board import board_picture
+
+        return board_picture(self.inference.problem.board).figure
+
+    def __repr__(self) -> str:
+        return f"<figures of {self.summary.name}: {_methods(self)}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DiagnosePlots(FitPlots):
+    """The figures of a diagnosis, and those of the fit that it ends with."""
+
+    diagnosis: Diagnosis
+
+    def signatures(self) -> Figure:
+        """What each candidate effect would do to the modes."""
+        from bayesplate.report.signatures import signatures_picture
+
+        found = signatures_picture(self.diagnosis)
+        if found is None:
+            raise InputError(Fault("plot.signatures", "a diagnosis with candidates", "one without"))
+        return found.figure
+
+    def before_after(self) -> Figure:
+        """The error before and after, and what the effect does to the constants."""
+        from bayesplate.report.signatures import before_after_picture
+
+        found = before_after_picture(self.diagnosis)
+        if found is None:
+            raise InputError(Fault("plot.before_after", "a diagnosis that adds an effect", self.diagnosis.verdict))
+        return found.figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModesPlots:
+    """The sheets of Chladni figures."""
+
+    sheets: tuple[Sheet, ...]
+
+    def modes(self, setup: str | None = None) -> Figure:
+        """The sheet of a setup, the first unless named."""
+        from bayesplate.report.chladni import chladni_sheet
+
+        return chladni_sheet(self.sheets[_place("setup", setup, [one.setup for one in self.sheets])])
+
+    def __repr__(self) -> str:
+        return f"<figures: {_methods(self)}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CheckPlots:
+    """What can be drawn before anything is sampled."""
+
+    problem: PosedProblem
+    report: CheckReport
+
+    def shares(self) -> Figure:
+        """Energy of each mode by constant, and its leverage."""
+        from bayesplate.report.shares import shares_picture
+
+        return shares_picture(self.report, self.problem.identifiability).figure
+
+    def board(self) -> Figure:
+        """The board to scale, its edges, hammer and sensors."""
+        from bayesplate.report.board import board_picture
+
+        return board_picture(self.problem.board).figure
+
+    def __repr__(self) -> str:
+        return f"<figures of {self.report.name}: {_methods(self)}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComparePlots:
+    """The posteriors of a comparison by theory of the plate."""
+
+    draws: Mapping[str, Draws]
+
+    def corner(self, theory: str = "thin") -> Figure:
+        """Every pair of moduli under one theory, by the package corner."""
+        from bayesplate.report.corner_plot import corner_figure
+
+        _place("theory", theory, list(self.draws))
+        moduli: Mapping[str, NDArray[np.float64]] = self.draws[theory].moduli
+        return corner_figure({f"{name}, GPa": values * GPA for name, values in moduli.items()})
+
+    def __repr__(self) -> str:
+        return f"<figures: {_methods(self)}>"
+
+
+def _place(what: str, name: str | None, names: Sequence[str]) -> int:
+    """Where a name stands among those that there are; the first if none is given."""
+    if name is not None and name not in names:
+        raise InputError(Fault(what, f"one of {', '.join(names)}", repr(name)))
+    return 0 if name is None else list(names).index(name)
+
+
+def _factor_and_words(name: str, problem: PosedProblem) -> tuple[float, str]:
+    """Factor to the unit that people use, and what stands at the axis."""
+    if name in MODULI:
+        return GPA, f"{name}, GPa"
+    if name not in problem.board.inputs:
+        return 1.0, f"{name}, N m"
+    factor, unit = unit_of_people(problem.board.parameter(name).unit)
+    return factor, f"{name}, {unit}" if unit else name
+
+
+def _methods(plots: object) -> str:
+    """The figures that there are."""
+    return ", ".join(f".{name}()" for name in dir(plots) if not name.startswith("_") and callable(getattr(plots, name)))
