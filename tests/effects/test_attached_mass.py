@@ -208,7 +208,7 @@ def test_candidates_of_a_search():
     board, _ = board_with()
     tried = [form.effects[0].items[0].places[0] for form in AttachedMass.forms(board)]
     assert len(tried) == 12
-    assert min(x for x, _ in tried) == 0.25
+    assert min(x for x, _ in tried) == pytest.approx(0.25)
     assert max(y for _, y in tried) == 0.5
 
 

@@ -19,7 +19,7 @@ from made_boards import board_of
 from bayesplate.cards import read_board_text
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
-from bayesplate.plate.board import board_from_card
+from bayesplate.plate.from_card import board_from_card
 from bayesplate.plate.setup import AttachedItem
 from bayesplate.quantities import Quantity
 
@@ -78,7 +78,7 @@ def acting(name: str):
 
 def test_every_parameter_of_every_effect_stands_in_the_table():
     named = {
-        (name, parameter.name)
+        (name, parameter.key)
         for name in EFFECTS
         if name not in ("attached_mass", "outline_profile")
         for parameter in acting(name).parameters()
@@ -89,7 +89,7 @@ def test_every_parameter_of_every_effect_stands_in_the_table():
 
 @pytest.mark.parametrize(("name", "parameter"), PRIORS)
 def test_prior_and_unit_of_a_parameter(name, parameter):
-    (found,) = (one for one in acting(name).parameters() if one.name == parameter)
+    (found,) = (one for one in acting(name).parameters() if one.key == parameter)
     unit, kind, median, sd, bounds = PRIORS[name, parameter]
 
     assert found.unit == unit
@@ -120,8 +120,8 @@ def test_a_search_keeps_prior_and_unit(board):
     """What it tries is the effect's own parameter, not one of another width or without a unit."""
     seen = set()
     for name, each in forms(board).items():
-        for free in (free for form in each for free in form.free if (name, free.name) in PRIORS):
-            unit, *prior = PRIORS[name, free.name]
+        for free in (free for form in each for free in form.free if (name, free.key) in PRIORS):
+            unit, *prior = PRIORS[name, free.key]
             assert free.unit == unit
             assert same(free.prior, *prior), (name, told(free.prior))
             seen.add(name)

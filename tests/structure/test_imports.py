@@ -177,9 +177,9 @@ def _one_call_faults(node: ast.Call, inside: Path) -> Iterator[tuple[int, str]]:
     allows = [k.value for k in node.keywords if k.arg == "allow_pickle"]
     if any(not (isinstance(value, ast.Constant) and value.value is False) for value in allows):
         yield node.lineno, "allows pickles"
-    # the public names of the package are fetched from their homes by name; nowhere else
+    # the public names of the package are fetched from their homes by name, and the effects by the words of the cards
     is_hidden = _called(node) in {"import_module", "__import__"} and not isinstance(node.args[0], ast.Constant)
-    if is_hidden and inside != Path("__init__.py"):
+    if is_hidden and inside not in (Path("__init__.py"), Path("effects/__init__.py")):
         yield node.lineno, "imports a module of a computed name"
 
 

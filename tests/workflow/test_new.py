@@ -12,7 +12,7 @@ from bayesplate.cards import load_board
 from bayesplate.cli import main
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.labels import Label
-from bayesplate.plate.board import board_from_card
+from bayesplate.plate.from_card import board_from_card
 from bayesplate.workflow.new import new
 
 ANSWERS = ["", "550", "2,0", "200", "2.8", "125", "", "spruce", "35", "50", "111", "86", "", "", "", "", "Küche, 21 °C"]
