@@ -79,7 +79,7 @@ SUMMARY = Summary(
         mode("(2,0)", 310.0, 310.0, 2.0, rounding_cents=None, left_out_cents=None),
     ),
     unlabelled=(UnlabelledPeak("bench", 860.0, "(3,1)", 850.0, over(860.0, 850.0)),),
-    error=ErrorFigures(7.5, 12.25, 0.5, 0.125),
+    error=ErrorFigures(7.5, 12.25, 0.5, 0.125, None, None),
     sampler=SamplerHealth(4, 32, 2000, 30.5, 1.0025, 6000.0, 0.5),
     identifiability=("the modes tell E_y least well",),
     warnings=("made by hand",),

@@ -11,8 +11,8 @@ from scipy import integrate, stats
 from bayesplate.cards import load_board
 from bayesplate.diagnosis.shifts.baseline import baseline_at
 from bayesplate.estimates.least_squares import reading_scales, weighted_least_squares
-from bayesplate.plate.from_card import board_from_card
 from bayesplate.plate.densities import DEGREES_OF_FREEDOM
+from bayesplate.plate.from_card import board_from_card
 from bayesplate.plate.readings import ReadingErrors, reading_sd
 from bayesplate.quantities import Quantity
 

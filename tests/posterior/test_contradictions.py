@@ -77,7 +77,7 @@ def test_a_noise_is_refused_a_hundredth_of_the_residuals(board, share, is_refuse
 
 
 def test_a_small_noise_that_may_grow_or_coarse_rounding_explain_the_residuals(board):
-    """Six standard deviations of the logarithm reach from 1e-6 to the residuals; whole Hz hide residuals of cents."""
+    """Six standard deviations of the logarithm reach from 1e-6 to the residuals; coarse rounding hides them."""
     prior = load_prior("weakly-informative")
     residuals = weighted_least_squares(with_noise(board, 0.01, 2.0)).residuals
     limit = float(np.sqrt(np.sum(residuals**2) / 3.0)) / 100.0
@@ -87,7 +87,7 @@ def test_a_small_noise_that_may_grow_or_coarse_rounding_explain_the_residuals(bo
     with pytest.raises(NotIdentifiableError, match="declared noise"):
         pose(with_noise(board, 1e-6, reach * 0.95), prior)
     tiny = with_noise(board, 1e-6, ALMOST_EXACT)
-    rounded = replace(tiny, setups=tuple(replace(setup, resolution=50.0) for setup in tiny.setups))
+    rounded = replace(tiny, setups=tuple(replace(setup, resolution=10.0) for setup in tiny.setups))
     assert pose(rounded, prior)
 
 

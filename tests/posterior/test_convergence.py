@@ -179,10 +179,6 @@ RULES = {
         "accepts 15 % of its proposals",
         lambda: (moving(np.full((4, 8), 0.149)), moving(np.full((4, 8), 0.151))),
     ),
-    "an ensemble that accepts more than 0.7": (
-        "accepts 70 % of its proposals",
-        lambda: (moving(np.full((4, 8), 0.701)), moving(np.full((4, 8), 0.699))),
-    ),
     "a walker that accepts less than 0.01": (
         "hardly ever move",
         lambda: tuple(moving(np.where(np.arange(8) == 3, f, 0.3) * np.ones((4, 1))) for f in (0.009, 0.011)),

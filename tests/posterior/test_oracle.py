@@ -123,10 +123,12 @@ def test_the_thinned_draws_are_of_the_same_posterior(known):
     from bayesplate.posterior.draws import thin_walker_major
 
     inference, _, mean, covariance = known
-    thinned = thin_walker_major(inference.chains.draws, inference.chains.burn_in, inference.convergence.tau_max)
+    every_second = max(4.0, inference.convergence.tau_max)  # half of it is the step; walkers forget in 3 or 4 steps
+    thinned = thin_walker_major(inference.chains.draws, inference.chains.burn_in, every_second)
     flat = thinned.reshape(-1, 4)[:, :3]
     sd = np.sqrt(np.diagonal(covariance))
-    assert len(flat) < len(inference.chains.pooled) / 2
+    n_kept = inference.chains.kept.shape[1]
+    assert len(flat) <= len(inference.chains.pooled) * (n_kept // 2 + 1) / n_kept
     assert differences_from_normal(flat, THINNING_LOSS * inference.convergence.ess[:3], mean, sd) == []
 
 

@@ -7,25 +7,30 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bayesplate.results.draws import linearisation, named_draws
 
 import bayesplate.frequencies.spectrum
-import bayesplate.results.summary
+import bayesplate.posterior.assessment
 from bayesplate.estimates.identifiability import Identifiability, remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import sign_conflicts, spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.labels import Label
+from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.posterior.assessment import assess as assessed
 from bayesplate.posterior.convergence import assess
-from bayesplate.posterior.inference import Inference, linear_suffices, pose
+from bayesplate.posterior.draws import named_draws
+from bayesplate.posterior.inference import Inference, pose
+from bayesplate.posterior.reweighting import linearisation
 from bayesplate.posterior.sampling import Chains
+from bayesplate.posterior.target import linear_suffices
 from bayesplate.results.budget import input_remarks
-from bayesplate.results.summary import summarise
+from bayesplate.results.summarise import summarise
 from bayesplate.workflow.prepare import prepare
 
 LINEAR = "the linear law is off by more than a quarter of the noise"
 EXACT = "the exact law misses full solves"
 VEERING = "fits its label only to"
+NAMES = (*MODULI, *RIGIDITIES)
 
 
 @pytest.fixture(scope="module")
@@ -43,17 +48,17 @@ def summary_of(inference, errors=0.0):
     """The summary where the linear law errs by this share of the noise, in every mode and draw."""
     draws = named_draws(inference, 1)
     off = np.full_like(linearisation(inference, draws), errors * cents(np.median(draws.noise)))
-    return summarise(inference, draws, 1, {}, "", off)
+    return summarise(inference, draws, assessed(inference, draws, off), 1, {}, "")
 
 
 def told(inference, sentence, errors=0.0):
-    return any(sentence in warning for warning in summary_of(inference, errors)["warnings"])
+    return any(sentence in warning for warning in summary_of(inference, errors).warnings)
 
 
 def test_units_of_effects_reach_the_summary(inference):
-    effects = summary_of(inference)["effects"]["board"]["transverse_shear"]
+    effects = summary_of(inference).effects["board"]["transverse_shear"]
 
-    assert {name: entry["unit"] for name, entry in effects.items()} == {"G_xz": "Pa", "G_yz": "Pa"}
+    assert {name: entry.unit for name, entry in effects.items()} == {"G_xz": "Pa", "G_yz": "Pa"}
 
 
 @pytest.mark.parametrize(("share", "is_told"), [(0.249, False), (0.251, True)])
@@ -73,7 +78,7 @@ def test_the_linear_law_serves_below_a_quarter_of_the_noise(inference, share, su
 
 @pytest.mark.parametrize(("worst", "is_told"), [(0.499, False), (0.501, True)])
 def test_the_exact_law_is_warned_of_from_half_a_cent_on(inference, worst, is_told, monkeypatch):
-    monkeypatch.setattr(bayesplate.results.summary, "worst_cents", lambda _: worst)
+    monkeypatch.setattr(bayesplate.posterior.assessment, "worst_cents", lambda _: worst)
 
     assert told(inference, EXACT) is is_told
 
@@ -103,11 +108,13 @@ def test_a_mode_is_named_from_a_correlation_of_three_quarters_on(inference, corr
 
 @pytest.mark.parametrize(("effective", "is_given"), [(199.0, False), (200.0, True)])
 def test_means_of_the_other_law_need_two_hundred_effective_draws(inference, effective, is_given, monkeypatch):
-    monkeypatch.setattr(bayesplate.results.summary, "means_under", lambda *_: ({"E_x": 1e10}, effective))
+    monkeypatch.setattr(
+        bayesplate.posterior.assessment, "means_under", lambda *_: (dict.fromkeys(NAMES, 1e10), effective)
+    )
 
-    means = summary_of(inference)["exact_means"]
+    means = summary_of(inference).exact_means
 
-    assert means == {"E_x": 1e10 if is_given else None, "effective_draws": effective}
+    assert (means.E_x, means.effective_draws) == (1e10 if is_given else None, effective)
 
 
 @pytest.mark.parametrize(("share", "is_told"), [(0.49, False), (0.51, True)])
@@ -117,7 +124,7 @@ def test_an_input_is_named_that_makes_half_of_the_variance(share, is_told):
     draws = SimpleNamespace(
         moduli={"E_x": np.exp(np.sqrt(share) * a + np.sqrt(1.0 - share) * b)}, inputs={"thickness": np.exp(a)}
     )
-    said = input_remarks(draws)
+    said = input_remarks(draws, prepare("fiemme-spruce-clamped").board)
 
     assert bool(said) is is_told
     assert all("51 % of the uncertainty (variance) of E_x comes from the thickness" in one for one in said)

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ritz
-from bayesplate.posterior.likelihood import Readings
 from made_boards import setup_of
 
 from bayesplate.frequencies.spectrum import NamedMode
 from bayesplate.labels import Label
+from bayesplate.plate.readings import ReadingErrors
 from bayesplate.quantities import Quantity
 from bayesplate.results.modes import mode_rows, unlabelled_peaks
 
@@ -24,7 +24,7 @@ SETUP = setup_of(ritz.ALL_CLAMPED, HERTZ, name="bench", resolution=1.0)
 def rows():
     """Two modes, the second with its own uncertainty and so not rounded, and skewed draws of both predictions."""
     places = [SimpleNamespace(correlation=value) for value in (0.99, 0.9)]
-    posterior = SimpleNamespace(models=[SimpleNamespace(places=places)], readings=(Readings.of(SETUP),))
+    posterior = SimpleNamespace(models=[SimpleNamespace(places=places)], readings=(ReadingErrors.of(SETUP),))
     problem = SimpleNamespace(board=SimpleNamespace(setups=(SETUP,)), posterior=posterior)
     rng = np.random.default_rng(1)
     log_frequency = np.log([56.0, 101.0]) + 0.02 * rng.standard_exponential((4, 500, 2))

@@ -17,7 +17,7 @@ FREE = 'edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }'
 CANTILEVER = (FREE, 'edges = { x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }')
 SUPPORTED = (FREE, FREE.replace("free", "supported"))
 CLAMPED = (FREE, FREE.replace("free", "clamped"))
-CLAMPED_LABEL = ('"(1,1)" = 150', '"(0,0)" = 150')
+CLAMPED_LABEL = ('"(1,1)" = 150', '"(0,0)" = 900')
 PLACE = "at_mm = [200, 20]"
 NO_ITEM = ('[[setup.attached]]\nkind = "accelerometer"\nat_mm = [200, 20]\n', "")
 

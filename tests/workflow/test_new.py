@@ -40,7 +40,7 @@ def test_answers_become_a_card_that_check_takes():
     assert card.notes == "Küche, 21 °C"
     readings = {str(label): hz.mean for label, hz in card.setups[0].frequencies_hz.items()}
     assert readings == {"(1,1)": 35, "(2,0)": 50, "(0,2)": 111, "(2,1)": 86}
-    assert bayesplate.check("my-board.toml")["name"] == "my-board"
+    assert bayesplate.check("my-board.toml").name == "my-board"
 
 
 def test_every_question_can_be_skipped_and_modes_works_on_the_card():
@@ -50,7 +50,7 @@ def test_every_question_can_be_skipped_and_modes_works_on_the_card():
 
     assert result.exit_code == 0, result.output
     assert "# an example: put yours here" in Path("first.toml").read_text(encoding="utf-8")
-    assert modes("first.toml", write=False).report["basis"] == "at the median of the prior"
+    assert modes("first.toml").basis == "at the median of the prior"
 
 
 @pytest.mark.parametrize("edges", ["free", "cantilever", "clamped", "supported", "CFSF"])
