@@ -38,7 +38,7 @@ class Quantity:
     resolution : float
         Step to which the readings were rounded, in the quantity's unit.
     at_x, at_y : tuple of float
-        Places of the readings on the plate, in the unit of the place; one a reading, or empty.
+        Places of the readings on the plate, in the unit of the place; one per reading, or empty.
     """
 
     mean: float
@@ -64,7 +64,7 @@ class Quantity:
             raise ValueError(f"bounds: wanted lower < upper, got {self.lower} and {self.upper}")
         for places in (self.at_x, self.at_y):
             if places and len(places) != len(self.readings):
-                raise ValueError(f"places: wanted one a reading ({len(self.readings)}), got {len(places)}")
+                raise ValueError(f"places: wanted one per reading ({len(self.readings)}), got {len(places)}")
 
     @classmethod
     def exact(cls, value: float) -> Quantity:

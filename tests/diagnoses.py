@@ -12,8 +12,8 @@ from bayesplate.diagnosis.wording.diagnosis import (
     Errors,
     Explanation,
     Finalist,
-    Gates,
     NullControlSummary,
+    PValues,
 )
 from bayesplate.effects import EFFECTS
 from bayesplate.results.contract import Spread
@@ -56,13 +56,13 @@ def candidate(name: str, setup: str = "clamped", **changed: Any) -> EffectEntry:
             "raw_rms_cents": 45.0,
             "visible_rms_cents": 12.5,
             "visible_cents": (12.5, -12.5),
-            "below_sight": False,
+            "below_detection_limit": False,
             "bias_percent": {"E_x": 1.5, "E_y": -2.5, "G_xy": 0.5},
             "inclusion_probability": 0.25,
             "inclusion_probability_with_doubled_priors": 0.125,
             "log_bayes_factor": 1.25,
             "ockham_log_factor": -2.25,
-            "gate": 0.375,
+            "p_value": 0.375,
             "amplitude": Amplitude(parameter="tension", form="", q05=10.0, q50=120.0, q95=230.0, unit="N/m"),
             "look_alikes": (),
             "rejected_because": "less probable (0.250) than something else (0.500)",
@@ -75,7 +75,7 @@ def candidate(name: str, setup: str = "clamped", **changed: Any) -> EffectEntry:
 TENSION = candidate("membrane_tension", inclusion_probability=0.97, rejected_because=None, fate="in the verdict")
 AIR = candidate(
     "air_loading", raw_rms_cents=60.0, visible_rms_cents=2.5, inclusion_probability=0.02, amplitude=None,
-    look_alikes=("attached_mass",), rejected_because="its visible part drowns in the noise", fate="below sight",
+    look_alikes=("attached_mass",), rejected_because="its visible part drowns in the noise", fate="not detectable",
 )  # fmt: skip
 GRAIN = candidate("grain_angle", "board", visible_rms_cents=0.25, inclusion_probability=0.01)
 EXCHANGE = ExchangeEntry(
@@ -107,7 +107,7 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         declared=(),
         probability_of_none=0.02,
         probability_of_none_with_doubled_priors=0.03,
-        gate=Gates(before=0.01, after=0.5),
+        p_value=PValues(before=0.01, after=0.5),
         before=BEFORE,
         after=after or BEFORE,
         gain_null_percentile=99.0 if after else 40.0,

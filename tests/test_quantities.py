@@ -130,7 +130,7 @@ def test_scaled_bounds_keep_the_density() -> None:
         (lambda: Quantity(-1.0, 1.0), "mean: wanted a positive number for a log-normal quantity, got -1"),
         (lambda: Quantity(1.0, 1.0, "normal", 2.0, 2.0), "bounds: wanted lower < upper, got 2.0 and 2.0"),
         (lambda: Quantity.from_readings([]), "readings: wanted at least one, got none"),
-        (lambda: Quantity.from_readings([1.0, 2.0], at_x=[0.0]), "places: wanted one a reading"),
+        (lambda: Quantity.from_readings([1.0, 2.0], at_x=[0.0]), "places: wanted one per reading"),
         (lambda: Quantity.from_median(1.0, 1.0), "wanted median > 0 and factor > 1"),
         (lambda: Quantity.exact(1.0).scaled(0), "factor: wanted a positive number, got 0"),
         (lambda: Quantity(1.0, 1.0, "normal").log_sd, "log_sd: wanted the quantity of a positive thing"),

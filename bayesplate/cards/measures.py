@@ -75,7 +75,7 @@ class QuantityReader:
         count = len(read["readings"])
         wrong = [key for key in places if len(read[key]) != count]
         if wrong:
-            wanted = f"{count} places, one a reading"
+            wanted = f"{count} places, one per reading"
             raise Refusal(*(Complaint(wanted, str(len(read[key])), inside=(key,)) for key in wrong))
         return self._of(read["readings"], read)
 

@@ -27,7 +27,7 @@ class PaperSystem:
     values : dict of float
         Nominal inputs, for the moduli.
     origins : tuple of CoefficientRows
-        Where the coefficients come from, one a setup.
+        Where the coefficients come from, one per setup.
     """
 
     psi: NDArray[np.float64]

@@ -15,8 +15,8 @@ from bayesplate.frequencies.spectrum import NamedMode, doubtful_labels, sign_con
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.laplace import worst_cents
 from bayesplate.posterior.mode_errors import median_noise, mode_errors
-from bayesplate.posterior.region import worst_cents
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
 
 Floats = NDArray[np.float64]

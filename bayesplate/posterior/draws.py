@@ -126,7 +126,7 @@ def thin_walker_major(
     tau_max : float, steps
         Largest autocorrelation time.
     n_draws_max : int, optional
-        Thin further until a chain holds at most so many draws (but at least one a walker).
+        Thin further until a chain holds at most so many draws (but at least one per walker).
 
     Returns
     -------

@@ -23,8 +23,8 @@ from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
-from bayesplate.posterior.region import Region, find_region, linearisation_errors
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
@@ -125,21 +125,23 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     estimate = weighted_least_squares(board)
     found = identifiability(estimate.sensitivities, estimate.scales)
     require_identifiable(board, found)
-    region = find_region(board, estimate)
-    require_identifiable(board, _identifiable_at(board, region, estimate))
+    approximation = laplace_approximation(board, estimate)
+    require_identifiable(board, _identifiable_at(board, approximation, estimate))
     is_forced = law is not None
     if law is None:
-        draws = np.random.default_rng(0).multivariate_normal(region.centre, region.covariance, _N_CHECKS)
-        draws[:, :N_RIGIDITIES] += (_widening(board) - 1.0) * (draws - region.centre)[:, :N_RIGIDITIES]
+        draws = np.random.default_rng(0).multivariate_normal(approximation.centre, approximation.covariance, _N_CHECKS)
+        draws[:, :N_RIGIDITIES] += (_widening(board) - 1.0) * (draws - approximation.centre)[:, :N_RIGIDITIES]
         parameters, columns = Parameters(board), Parameters(board).fitted_columns
         limits = parameters.fitted_bounds
         draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
-        errors = linearisation_errors(board, region.models, draws)
+        errors = linearisation_errors(board, approximation.models, draws)
         law = "linear" if linear_suffices(board, errors, [s.noise.median for s in board.setups]) else "exact"
-    posterior = Posterior(board, prior, region.models, law, robust)
-    require_reachable(posterior, region.centre, region.covariance)
-    require_possible_noise(posterior, region.centre)
-    return PosedProblem(board, prior, estimate, found, posterior, region.centre, region.covariance, is_forced)
+    posterior = Posterior(board, prior, approximation.models, law, robust)
+    require_reachable(posterior, approximation.centre, approximation.covariance)
+    require_possible_noise(posterior, approximation.centre)
+    return PosedProblem(
+        board, prior, estimate, found, posterior, approximation.centre, approximation.covariance, is_forced
+    )
 
 
 def _widening(board: Board) -> float:
@@ -152,11 +154,11 @@ def _widening(board: Board) -> float:
     return float(np.exp(1.0 / (1.0 / log_sd**2 + 2.0 * spare)))
 
 
-def _identifiable_at(board: Board, region: Region, estimate: Estimate) -> Identifiability:
+def _identifiable_at(board: Board, approximation: LaplaceApproximation, estimate: Estimate) -> Identifiability:
     """What the readings tell where the posterior lies; modes may stand there in another order than at the estimate."""
-    values = Parameters(board).values(region.centre[None, :])
+    values = Parameters(board).values(approximation.centre[None, :])
     there = {name: np.ravel(value)[0] for name, value in values.items()}
-    return identifiability(np.concatenate([m.sensitivities(there) for m in region.models]), estimate.scales)
+    return identifiability(np.concatenate([m.sensitivities(there) for m in approximation.models]), estimate.scales)
 
 
 def infer(

@@ -10,7 +10,7 @@ from bayesplate.estimates.leave_one_out import Errors, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
-from bayesplate.posterior.region import predictor
+from bayesplate.posterior.laplace import predictor
 
 _N_STARTS = 500
 

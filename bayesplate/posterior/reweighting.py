@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.region import linearisation_errors
+from bayesplate.posterior.laplace import linearisation_errors
 from bayesplate.posterior.target import linear_suffices
 
 Floats = NDArray[np.float64]

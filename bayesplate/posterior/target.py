@@ -121,7 +121,7 @@ class Posterior:
         return theta
 
     def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """ln f of the labelled modes: one (n_draws, n_modes) array a setup."""
+        """ln f of the labelled modes: one (n_draws, n_modes) array per setup."""
         values = self.parameters.values(theta)
         return [model.log_frequencies(values, self.law) for model in self.models]
 
@@ -149,7 +149,7 @@ def linear_suffices(board: Board, errors: NDArray[np.float64], noise: Sequence[f
     board : Board
     errors : (n_draws, n_modes) array, cents
     noise : sequence of float
-        Relative, one a setup.
+        Relative, one per setup.
     """
     limit = LINEAR_SHARE * cents(
         np.concatenate([np.full(len(s.readings), n) for s, n in zip(board.setups, noise, strict=True)])

@@ -222,12 +222,12 @@ def model_rows(summary: Summary) -> list[tuple[str, str]]:
 
 
 def sampler_rows(summary: Summary) -> list[tuple[str, str]]:
-    """How the sampler fared, beside what the gate asks for."""
-    one, gate = summary.sampler, Gate()
+    """How the sampler fared, beside what convergence asks for."""
+    one, limits = summary.sampler, Gate()
     return [
         ("ensembles, walkers, steps", f"{one.ensembles}, {one.walkers}, {one.steps}"),
-        (f"largest R-hat (at most {gate.rhat_max:g})", number(one.rhat_max, 4)),
-        (f"smallest effective size (at least {gate.ess_min:g})", number(one.ess_min, 0)),
+        (f"largest R-hat (at most {limits.rhat_max:g})", number(one.rhat_max, 4)),
+        (f"smallest effective size (at least {limits.ess_min:g})", number(one.ess_min, 0)),
         ("largest autocorrelation time, steps", number(one.tau_max, 1)),
         ("accepted proposals", percent(one.acceptance)),
     ]

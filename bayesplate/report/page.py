@@ -84,7 +84,7 @@ def write_report(
         Made if it is not there; what it holds of an earlier report is replaced.
     card : BoardCard
     inference : Inference
-        Of a run that passed the gate.
+        Of a run that has converged.
     draws : Draws
     summary : Summary
     diagnosis : Diagnosis, optional

@@ -81,7 +81,7 @@ def percentiles_picture(
     legend_below(figure, _handles(panels[0]), 2)
     kept = ", ".join(f"{int(n)} of {name}" for n, name in zip(percentile.kept.sum(axis=0), MODULI, strict=True))
     alt = (
-        f"{percentile.n_subsets} least-squares estimates of each constant, one a subset of the modes, of which the "
+        f"{percentile.n_subsets} least-squares estimates of each constant, one per subset of the modes, of which the "
         f"trimming keeps {kept}; their mean and spread as a band, and the posterior below."
     )
     caption = (

@@ -118,7 +118,7 @@ def _rounding(modes: Sequence[ModeRow]) -> tuple[NDArray[np.float64], NDArray[np
 
 
 def _rows(modes: Sequence[ModeRow]) -> tuple[Any, Axes]:
-    """A panel with a row a mode, the first on top; a long list of setups has their names beside the labels."""
+    """A panel with a row per mode, the first on top; a long list of setups has their names beside the labels."""
     setups = list(dict.fromkeys(mode.setup for mode in modes))
     several = len(setups) > 1
     names = [mode_name(mode.label, mode.setup, several=several) for mode in modes]

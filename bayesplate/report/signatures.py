@@ -44,7 +44,7 @@ def signatures_picture(diagnosis: Diagnosis) -> Picture | None:
     panel.barh(rows - 0.18, raw, height=0.32, color=SKY, hatch="///", edgecolor="white", lw=0, label="in all")
     panel.barh(rows + 0.18, visible, height=0.32, color=BLUE, label="visible, after the constants are fitted again")
     for row, one in zip(rows, shown, strict=True):
-        if one.below_sight:
+        if one.below_detection_limit:
             panel.text(visible[row], row + 0.18, " lost in noise", fontsize=SMALL - 1, va="center", color=DARK)
     panel.set(ylim=(len(shown) - 0.5, -0.5))
     panel.set_yticks(rows, [name[:30] for name in names], fontsize=SMALL, parse_math=False)

@@ -26,7 +26,7 @@ def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
 
 
 def input_remarks(draws: Draws, board: Board) -> list[str]:
-    """One sentence an input that makes more than half of the uncertainty of a modulus."""
+    """One sentence per input that makes more than half of the uncertainty of a modulus."""
     shares = input_shares(draws)
     sentences = []
     for name in draws.inputs:

@@ -54,7 +54,7 @@ class CheckedEffect:
         Value of each parameter.
     raw_rms_cents, visible_rms_cents : float
         Shift of the modes in all, and what a fit of the constants leaves of it.
-    below_sight : bool
+    below_detection_limit : bool
         Whether that is lost in the noise.
     bias_percent : Elastic of float
         What ignoring the effect does to each modulus.
@@ -66,7 +66,7 @@ class CheckedEffect:
     size: Mapping[str, float]
     raw_rms_cents: float
     visible_rms_cents: float
-    below_sight: bool
+    below_detection_limit: bool
     bias_percent: Elastic[float]
     look_alikes: tuple[str, ...]
 

@@ -55,7 +55,7 @@ def _effects_table(report: CheckReport) -> Table:
         (
             one.effect,
             f"{one.raw_rms_cents:.1f}",
-            f"{one.visible_rms_cents:.1f}" + (" *" if one.below_sight else "  "),
+            f"{one.visible_rms_cents:.1f}" + (" *" if one.below_detection_limit else "  "),
             "/".join(f"{bias:+.1f}" for _, bias in one.bias_percent.items()),
             "\n".join(one.look_alikes) or MISSING,
         )

@@ -126,7 +126,7 @@ def _effects(found: Sequence[Signature]) -> list[CheckedEffect]:
             size=dict(one.size),
             raw_rms_cents=one.raw_rms,
             visible_rms_cents=one.visible_rms,
-            below_sight=one.is_below_sight,
+            below_detection_limit=one.is_below_detection_limit,
             bias_percent=Elastic(**one.bias_percent),
             look_alikes=alike[one.effect],
         )

@@ -17,7 +17,7 @@ from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
-from bayesplate.posterior.region import noise_widenings
+from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
 from bayesplate.results.folder import make_folder, require_new, writing
 from bayesplate.results.sheets import ModesReport, sheet_report

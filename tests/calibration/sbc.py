@@ -33,7 +33,7 @@ from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.plate.setup import DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import PosedProblem, infer, pose
-from bayesplate.posterior.region import predictor
+from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity

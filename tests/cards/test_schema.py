@@ -54,7 +54,7 @@ PARTS = [
     ("{ mean = 253, sd = 1, std = 2 }", ".std", "one of mean, sd", UNKNOWN + " (did you mean sd?)"),
     ("{ readings = [253], resolution = -1 }", ".resolution", "a number from 0 to 100000 mm", "-1"),
     ("{ readings = [253], resolutoin = 1 }", ".resolutoin", "one of readings, resolution, at_y_mm", UNKNOWN),
-    ("{ readings = [253, 254], at_y_mm = [0] }", ".at_y_mm", "2 places, one a reading", "1"),
+    ("{ readings = [253, 254], at_y_mm = [0] }", ".at_y_mm", "2 places, one per reading", "1"),
     ("{ readings = [253], at_x_mm = [0] }", ".at_x_mm", "one of readings, resolution, at_y_mm", UNKNOWN),
 ]
 REST = [

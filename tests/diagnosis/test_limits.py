@@ -18,8 +18,8 @@ from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.diagnosis.evidence.terms import Terms
 from bayesplate.diagnosis.shifts.signatures import Signature, look_alikes, signatures
 from bayesplate.diagnosis.wording.entries import effect_entry
+from bayesplate.posterior.inference import pose
 from bayesplate.quantities import Quantity
-from bayesplate.workflow.fitting import Request, posed
 from bayesplate.workflow.prepare import prepare
 
 NOISE = 0.005
@@ -57,7 +57,7 @@ def test_the_gate_lets_through_what_chance_gives_in_one_of_twenty_cases(base, in
         return found_of(base, {A: direction}, probability, scale * misfit)
 
     for wanted, word in ((0.049, "unexplained"), (0.051, "none needed" if index == 0 else "named")):
-        scale = brentq(lambda s, w=wanted: with_misfit(s).passes(index) - w, 1e-3, 10.0, xtol=1e-10)
+        scale = brentq(lambda s, w=wanted: with_misfit(s).p_value(index) - w, 1e-3, 10.0, xtol=1e-10)
         assert decide(with_misfit(scale)).word == word
 
 
@@ -107,7 +107,8 @@ def test_the_bias_of_an_ignored_effect_has_the_sign_of_what_it_hides(base):
 
 def test_the_bias_in_a_check_is_that_of_the_papers_cantilever():
     """A clamp of k_R L / D = 25: near the -11.6 % of E_x and -4.9 % of G_xy that an independent solver finds for 30."""
-    (clamp,) = signatures(posed(prepare("finnish-spruce-cantilever"), Request()), ["clamp_rotation"])
+    prepared = prepare("finnish-spruce-cantilever")
+    (clamp,) = signatures(pose(prepared.board, prepared.prior), ["clamp_rotation"])
 
     assert clamp.bias_percent["E_x"] == pytest.approx(-11.6 * 30 / 25, rel=0.1)
     assert clamp.bias_percent["G_xy"] == pytest.approx(-4.9 * 30 / 25, rel=0.2)

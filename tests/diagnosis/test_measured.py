@@ -42,7 +42,7 @@ def test_the_simulated_cantilever_names_transverse_shear(diagnosed):
     assert before.in_sample_rms_cents > rounding * np.sqrt(1.0 + spread)
     assert after.nested_leave_one_out_rms_cents < 0.5 * before.nested_leave_one_out_rms_cents
     assert told.claim is True
-    assert told.gate.before < 0.05 < told.gate.after
+    assert told.p_value.before < 0.05 < told.p_value.after
 
 
 def test_the_simulated_clamped_plate_names_shear_or_a_group_with_it(diagnosed):
@@ -68,7 +68,7 @@ def test_a_poisson_ratio_that_the_readings_drive_to_its_bound_is_not_named(simul
     cell = int(np.argmax(one.fine.z[:, 0] * (one.fine.weights > 0)))
     found = search(simulated.ground, one.fine.shift[cell])
     index = next(i for i, h in enumerate(simulated.ground.hypotheses) if h.members == ("poisson_ratio",))
-    assert at_limit(found, index) or found.passes(index) < 0.05
+    assert at_limit(found, index) or found.p_value(index) < 0.05
     assert decide(found).effects != ("poisson_ratio",)
 
 

@@ -16,7 +16,7 @@ from bayesplate.effects.air_loading import BAFFLES, DEFAULT_DENSITY, UNKNOWN_BAF
 from bayesplate.modes.air import air_mass
 from bayesplate.modes.line import line
 from bayesplate.plate.setup import DeclaredAir
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 
 OPEN = {"air_loading.density": 1.2, "air_loading.baffle": 0.0}

@@ -12,7 +12,7 @@ from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 
 from bayesplate.effects.density_gradient import DensityGradient
 from bayesplate.effects.part import Part
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 
 GRADIENT = "density_gradient.gradient"
 

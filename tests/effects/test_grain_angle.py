@@ -14,7 +14,7 @@ from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 
 ANGLE = "grain_angle.angle"
 EXACT = [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]

@@ -18,7 +18,7 @@ from bayesplate.effects.outline_profile import OutlineProfile
 from bayesplate.effects.stations import Stations
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.plate.parameter import BOARD
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 
 BENT = ((0.0, 0.3, 0.6, 1.0), (0.97, 1.02, 1.01, 1.0))

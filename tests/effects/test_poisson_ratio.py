@@ -16,7 +16,7 @@ from bayesplate.effects.poisson_ratio import FREE_POISSON, PoissonRatio
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
 from bayesplate.plate.material import moduli
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 
 

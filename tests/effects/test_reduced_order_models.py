@@ -9,7 +9,7 @@ from effect_plates import posed
 from bayesplate.frequencies.laws import cents, log_frequency
 from bayesplate.modes.solve import solve_class
 from bayesplate.plate.setup import AttachedItem
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 
 N_FRESH = 6
 ACCEPTED_CENTS = 0.5

@@ -17,7 +17,7 @@ from bayesplate.effects.part import Part
 from bayesplate.effects.stations import Stations
 from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.frequencies.system import System
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 
 CORNERS = ((0.0, 0.0, 1.0, 1.0), (0.0, 1.0, 0.0, 1.0))

@@ -12,7 +12,7 @@ from bayesplate.estimates.refit import design, deviance_misfit, most_likely, nor
 from bayesplate.plate.densities import DEGREES_OF_FREEDOM
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.inference import pose
-from bayesplate.posterior.region import predictor
+from bayesplate.posterior.laplace import predictor
 from bayesplate.workflow.prepare import prepare
 
 N_MODES = 7

@@ -22,8 +22,8 @@ from bayesplate.plate.material import MODULI, moduli
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import infer, pose
+from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.mode_errors import mode_errors
-from bayesplate.posterior.region import predictor
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare

@@ -12,6 +12,7 @@ from bayesplate.cards import StatedPrior, load_prior
 from bayesplate.cards.shelf import shelf_folder
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.posterior.contradictions import require_possible_noise
 from bayesplate.posterior.inference import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -87,8 +88,11 @@ def test_a_small_noise_that_may_grow_or_coarse_rounding_explain_the_residuals(bo
     with pytest.raises(NotIdentifiableError, match="declared noise"):
         pose(with_noise(board, 1e-6, reach * 0.95), prior)
     tiny = with_noise(board, 1e-6, ALMOST_EXACT)
-    rounded = replace(tiny, setups=tuple(replace(setup, resolution=10.0) for setup in tiny.setups))
-    assert pose(rounded, prior)
+    rounded = replace(tiny, setups=tuple(replace(setup, resolution=50.0) for setup in tiny.setups))
+    posed = pose(board, prior)
+    require_possible_noise(replace(posed.posterior, board=rounded), posed.centre)
+    with pytest.raises(NotIdentifiableError, match="declared noise"):
+        require_possible_noise(replace(posed.posterior, board=tiny), posed.centre)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import pytest
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.inference import pose
-from bayesplate.posterior.region import worst_cents
+from bayesplate.posterior.laplace import worst_cents
 from bayesplate.workflow.fit import fit
 from bayesplate.workflow.prepare import prepare
 

@@ -11,7 +11,7 @@ from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents, log_frequency
 from bayesplate.modes.solve import solve_class
 from bayesplate.posterior.inference import pose
-from bayesplate.posterior.region import linearisation_errors, noise_widenings, worst_cents
+from bayesplate.posterior.laplace import linearisation_errors, noise_widenings, worst_cents
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 

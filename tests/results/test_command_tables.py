@@ -35,7 +35,7 @@ REPORT = CheckReport(
     condition_number=3.0,
     modes=(CheckedMode("bench", "(1,0)", 52.0, 20.5, 0.62, (100.0, -0.2, 0.4), 0.99),),
     in_sample_rms_cents=20.5,
-    signatures=(EFFECT, replace(EFFECT, effect="grain_angle", below_sight=False, look_alikes=())),
+    signatures=(EFFECT, replace(EFFECT, effect="grain_angle", below_detection_limit=False, look_alikes=())),
     invisible="what cannot be seen",
     identifiability=("weak",),
     notes=("noted",),

@@ -143,8 +143,8 @@ def findings(found: Found, planted: PlantedBoard, rng: np.random.Generator) -> R
         "set": [[list(answer.members), _rounded(answer.support)] for answer in near],
         "none": _rounded(found.none),
         "inclusion": {name: _rounded(found.inclusion(name)) for name in found.ground.candidates},
-        "gate": {"bare": _rounded(found.passes(0)), "best": _rounded(found.passes(best.index)) if best else None},
-        "below_sight": [name for name in found.ground.candidates if found.ground.is_below_sight(name)],
+        "gate": {"bare": _rounded(found.p_value(0)), "best": _rounded(found.p_value(best.index)) if best else None},
+        "below_sight": [name for name in found.ground.candidates if found.ground.is_below_detection_limit(name)],
         "amplitudes": recovered(found, verdict, planted) if verdict.word == "named" else {},
         "constants": _constants(found, verdict, planted.truth.constants, rng),
     }

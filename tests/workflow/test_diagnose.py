@@ -224,8 +224,8 @@ def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypa
     assert missing == {"leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score"}
     assert found["before"] == found["after"]
     assert found["gain_null_percentile"] is None
-    assert found["gate"] == {"before": None, "after": None}
-    assert [one["below_sight"] for one in found["candidates"][:2]] == [True, True]
+    assert found["p_value"] == {"before": None, "after": None}
+    assert [one["below_detection_limit"] for one in found["candidates"][:2]] == [True, True]
     assert found["recommendation"].startswith("Measure ")
 
 

@@ -50,7 +50,7 @@ def test_every_question_can_be_skipped_and_modes_works_on_the_card():
 
     assert result.exit_code == 0, result.output
     assert "# an example: put yours here" in Path("first.toml").read_text(encoding="utf-8")
-    assert modes("first.toml").basis == "at the median of the prior"
+    assert modes("first.toml").summary.basis == "at the median of the prior"
 
 
 @pytest.mark.parametrize("edges", ["free", "cantilever", "clamped", "supported", "CFSF"])

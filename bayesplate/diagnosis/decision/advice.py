@@ -151,8 +151,8 @@ def _judged(sentence: str, board: Board, values: Values, asked: Sequence[Form]) 
         moved = -absorbing @ raw
         again = _solved(with_form, _moved(there, moved))[0] - bare
         visible.append((again - slopes @ (absorbing @ again)) / scales)
-    sight = 2.0 / np.sqrt(scales.size)
-    rms = [float(np.sqrt(np.mean(one**2))) / sight for one in visible]
+    limit = 2.0 / np.sqrt(scales.size)
+    rms = [float(np.sqrt(np.mean(one**2))) / limit for one in visible]
     likeness = [abs(_cosine(one, other)) for one, other in combinations(visible, 2)]
     return Option(sentence, max(likeness, default=0.0), min(rms, default=0.0))
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.folds import NEEDED
-from bayesplate.diagnosis.evidence.gate import PASSES
+from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.effects.words import effect_names
@@ -114,14 +114,14 @@ def decide(found: Found) -> Verdict:
         return Verdict("undetectable", (), 0, best, NOTHING_LEFT)
     if found.none >= NEEDED or best is None:
         return _without(found, best)
-    passed = found.passes(best.index)
+    passed = found.p_value(best.index)
     if passed < PASSES:
         return Verdict(
             "unexplained",
             (),
             0,
             best,
-            f"with {effect_names(best.members)} the misfit is still too large (gate {passed:.3f})",
+            f"with {effect_names(best.members)} the misfit is still too large (p = {passed:.3f})",
         )
     limit = at_limit(found, best.index)
     if limit:
@@ -142,14 +142,14 @@ def decide(found: Found) -> Verdict:
 
 def _without(found: Found, best: Answer | None) -> Verdict:
     """No effect is probable enough: the bare model passes, cannot be questioned, or fails without a reason."""
-    passed = found.passes(0)
+    passed = found.p_value(0)
     if passed < PASSES:
-        reason = f"the misfit is too large for the noise (gate {passed:.3f}), but no effect is probable enough"
+        reason = f"the misfit is too large for the noise (p = {passed:.3f}), but no effect is probable enough"
         return Verdict("unexplained", (), 0, best, reason)
-    hidden = all(found.ground.is_below_sight(name) for name in found.ground.candidates)
+    hidden = all(found.ground.is_below_detection_limit(name) for name in found.ground.candidates)
     if found.ground.candidates and hidden:
         return Verdict("undetectable", (), 0, best, "every effect is below what these readings could show")
-    return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave (gate {passed:.3f})")
+    return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave (p = {passed:.3f})")
 
 
 def at_limit(found: Found, index: int) -> str:

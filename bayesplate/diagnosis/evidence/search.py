@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.gate import gate
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, hypotheses, log_evidences, probabilities
+from bayesplate.diagnosis.evidence.predictive import predictive_p_value
 from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import Form, forms
@@ -77,7 +77,7 @@ class Ground:
         seen = self.baseline.whitened(self.candidates[name].visible)
         return float(np.sqrt(np.mean(seen**2) * self.baseline.n_modes)) / 2.0
 
-    def is_below_sight(self, name: str) -> bool:
+    def is_below_detection_limit(self, name: str) -> bool:
         """Whether this experiment could not see a candidate even if it were there."""
         return self.visibility(name) < 1.0
 
@@ -115,9 +115,9 @@ class Found:
         present = [name in one.members for one in self.ground.hypotheses]
         return float(self.probability[present].sum())
 
-    def passes(self, index: int) -> float:
-        """The gate of a hypothesis."""
-        return float(gate(self.ground.hypotheses[index], self.ground.whole, self.residual[None, :])[0])
+    def p_value(self, index: int) -> float:
+        """The prior predictive p-value of a hypothesis."""
+        return float(predictive_p_value(self.ground.hypotheses[index], self.ground.whole, self.residual[None, :])[0])
 
 
 def prepare_search(baseline: Baseline, solve: Solve | None = None, tried: Sequence[str] | None = None) -> Ground:
@@ -144,7 +144,7 @@ def prepare_search(baseline: Baseline, solve: Solve | None = None, tried: Sequen
     ground = Ground(baseline, candidates, ())
     fine = {name: one.fine for name, one in candidates.items()}
     coarse = {name: one.coarse for name, one in candidates.items()}
-    paired = [name for name in candidates if not ground.is_below_sight(name)]
+    paired = [name for name in candidates if not ground.is_below_detection_limit(name)]
     return Ground(baseline, candidates, hypotheses(baseline, fine, coarse, paired))
 
 

@@ -78,7 +78,7 @@ class Fold:
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Normal terms of a table in a fold: one a level of noise and a cell, cells running fastest.
+    """Normal terms of a table in a fold: one per level of noise and cell, cells running fastest.
 
     Attributes
     ----------

@@ -26,8 +26,8 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
-from bayesplate.posterior.region import predictor
 
 Floats = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Values
 from bayesplate.plate.material import RIGIDITIES
+from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
-from bayesplate.posterior.region import exact_models
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class FormLaw:
     models : tuple of SetupModel
         With the exact law.
     following : tuple of tuple of Following
-        For each setup, one a block where the effect breaks the symmetry; empty where it does not.
+        For each setup, one per block where the effect breaks the symmetry; empty where it does not.
     """
 
     form: Form

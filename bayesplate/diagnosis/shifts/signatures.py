@@ -21,8 +21,8 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, Moduli, moduli
 from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.parameters import N_RIGIDITIES
-from bayesplate.posterior.region import predictor
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Signature:
         What remains after the constants have been fitted again without the effect.
     bias_percent : dict of float
         What ignoring the effect does to E_x, E_y, G_xy.
-    sight_cents : float
+    detection_limit_cents : float
         Rms below which a visible part drowns in the noise: 2 noise / sqrt(n).
     """
 
@@ -59,7 +59,7 @@ class Signature:
     raw: Floats
     visible: Floats
     bias_percent: Mapping[str, float]
-    sight_cents: float
+    detection_limit_cents: float
 
     @property
     def raw_rms(self) -> float:
@@ -72,9 +72,9 @@ class Signature:
         return float(np.sqrt(np.mean(self.visible**2)))
 
     @property
-    def is_below_sight(self) -> bool:
+    def is_below_detection_limit(self) -> bool:
         """Whether this experiment could not see the effect even if it were there."""
-        return bool(self.visible_rms < self.sight_cents)
+        return bool(self.visible_rms < self.detection_limit_cents)
 
 
 def candidates(board: Board) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
                 raw=cents(shifted - base),
                 visible=cents(shifted - predict(fitted[None, :])[0]),
                 bias_percent=_bias(problem, start, fitted),
-                sight_cents=2.0 * noise / np.sqrt(base.size),
+                detection_limit_cents=2.0 * noise / np.sqrt(base.size),
             )
         )
     return tuple(result)

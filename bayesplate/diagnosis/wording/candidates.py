@@ -9,7 +9,7 @@ from typing import Literal
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.results.contract import NOT_IN_JSON
 
-Fate = Literal["in the verdict", "below sight", "not needed", "not established", "does not fit", "less probable"]
+Fate = Literal["in the verdict", "not detectable", "not needed", "not established", "does not fit", "less probable"]
 """What became of a candidate, in two words."""
 
 
@@ -48,14 +48,14 @@ class EffectEntry:
         there is no frequency, or nothing is left because there are as many constants as modes.
     visible_cents : tuple of (float or None)
         The same mode by mode.
-    below_sight : bool
+    below_detection_limit : bool
         Whether these readings could not show it even if it were there.
     bias_percent : dict of float
         What ignoring it does to each modulus.
     inclusion_probability, inclusion_probability_with_doubled_priors : float
     log_bayes_factor, ockham_log_factor : float
         Against no effect, and the part of it that the width of the prior costs.
-    gate : float or None
+    p_value : float or None
     amplitude : Amplitude or None
         None if its size is fixed.
     look_alikes : tuple of str
@@ -70,13 +70,13 @@ class EffectEntry:
     raw_rms_cents: float | None
     visible_rms_cents: float | None
     visible_cents: tuple[float | None, ...]
-    below_sight: bool
+    below_detection_limit: bool
     bias_percent: Mapping[str, float]
     inclusion_probability: float
     inclusion_probability_with_doubled_priors: float
     log_bayes_factor: float
     ockham_log_factor: float
-    gate: float | None
+    p_value: float | None
     amplitude: Amplitude | None
     look_alikes: tuple[str, ...]
     rejected_because: str | None

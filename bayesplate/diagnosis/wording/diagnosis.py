@@ -39,7 +39,7 @@ class Errors:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gates:
+class PValues:
     """Prior predictive probability of a misfit as large as that of each model; None where no misfit is possible."""
 
     before: float | None
@@ -131,7 +131,7 @@ class Diagnosis:
     declared : tuple of str
         Effects that were part of the model from the beginning.
     probability_of_none, probability_of_none_with_doubled_priors : float
-    gate : Gates
+    p_value : PValues
     before, after : Errors
         The same where nothing was added.
     gain_null_percentile : float or None
@@ -164,7 +164,7 @@ class Diagnosis:
     declared: tuple[str, ...]
     probability_of_none: float
     probability_of_none_with_doubled_priors: float
-    gate: Gates
+    p_value: PValues
     before: Errors
     after: Errors
     gain_null_percentile: float | None

@@ -49,13 +49,13 @@ def effect_entry(
         raw_rms_cents=finite(rms(cents(one.raw))),
         visible_rms_cents=finite(rms(visible)),
         visible_cents=tuple(finite(float(value)) for value in visible),
-        below_sight=ground.is_below_sight(one.name),
+        below_detection_limit=ground.is_below_detection_limit(one.name),
         bias_percent=_bias(found, one),
         inclusion_probability=found.inclusion(one.name),
         inclusion_probability_with_doubled_priors=doubled,
         log_bayes_factor=gained,
         ockham_log_factor=gained - best_fit,
-        gate=gate_of(found, index),
+        p_value=p_value_of(found, index),
         amplitude=_amplitude(found, index, one),
         look_alikes=tuple(
             other
@@ -91,9 +91,9 @@ def exchange_entries(found: Found, verdict: Verdict) -> tuple[ExchangeEntry, ...
     return tuple(entries)
 
 
-def gate_of(found: Found, index: int) -> float | None:
-    """The gate of a hypothesis; None where the constants meet every reading, so that there is no misfit to judge."""
-    return found.passes(index) if found.ground.n_directions else None
+def p_value_of(found: Found, index: int) -> float | None:
+    """The prior predictive p-value of a hypothesis; None where constants meet every reading and nothing is left."""
+    return found.p_value(index) if found.ground.n_directions else None
 
 
 def _where(one: Candidate) -> str:
@@ -148,8 +148,8 @@ def _fate(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str) -
     """What became of a candidate, and why it was rejected."""
     if name in verdict.effects:
         return "in the verdict", None
-    if found.ground.is_below_sight(name):
-        return "below sight", "its visible part is below what these readings could show"
+    if found.ground.is_below_detection_limit(name):
+        return "not detectable", "its visible part is below what these readings could show"
     if found.none >= NEEDED:
         fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
         return fate, f"{fate}: nothing lacking has a probability of {found.none:.2f}"

@@ -19,10 +19,10 @@ from bayesplate.diagnosis.wording.diagnosis import (
     Errors,
     Explanation,
     Finalist,
-    Gates,
     NullControlSummary,
+    PValues,
 )
-from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, gate_of, rms
+from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of, rms
 from bayesplate.effects import EFFECTS
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI
@@ -77,7 +77,7 @@ class Case:
 
     @property
     def claim(self) -> bool:
-        """Whether "error reduced" may be said: beyond chance selection, size clear of zero, gate passed."""
+        """Whether "error reduced" may be said: beyond chance selection, size clear of zero, p-value large enough."""
         to_beat = self.control.ratio_to_beat
         if self.verdict.index == 0 or self.folded is None or to_beat is None:
             return False
@@ -114,7 +114,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
         declared=found.ground.baseline.board.effects,
         probability_of_none=found.none,
         probability_of_none_with_doubled_priors=doubled[""],
-        gate=Gates(before=gate_of(found, 0), after=gate_of(found, verdict.index)),
+        p_value=PValues(before=p_value_of(found, 0), after=p_value_of(found, verdict.index)),
         before=_errors(case, case.before),
         after=_errors(case, case.after),
         gain_null_percentile=control.percentile_of_gain(observed) if found.ground.n_directions else None,

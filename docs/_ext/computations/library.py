@@ -14,9 +14,9 @@ from bayesplate import errors
 from bayesplate.cards.shelf import card_names
 from bayesplate.diagnosis.decision.verdict import AT_LIMIT, CLEARLY, WITHIN
 from bayesplate.diagnosis.evidence.folds import NEEDED
-from bayesplate.diagnosis.evidence.gate import PASSES
 from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, TWO
 from bayesplate.diagnosis.evidence.null_control import CLAIM_QUANTILE, N_SETS
+from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
@@ -157,7 +157,7 @@ def verdict_limits(folder: Path) -> str:
         ("named: more probable than the next by a factor of", f"{CLEARLY:g}"),
         ("group: within a factor of the best", f"{WITHIN:g}"),
         ("a pair counts if it beats its better member by a factor of", f"{CLEARLY:g}"),
-        ("gate: probability of so large a misfit, at least", f"{PASSES:g}"),
+        ("prior predictive p-value, at least", f"{PASSES:g}"),
         ("limit of a range: prior probability beyond the size, below", f"{AT_LIMIT:g}"),
         ("look-alikes: cosine of the visible parts above", f"{LOOK_ALIKE:g}"),
         ("prior probability of no effect, one, two", f"{NONE:g}, {ONE:g}, {TWO:g}"),

@@ -39,26 +39,26 @@ def visible_parts(folder: Path, card: str) -> str:
         panel.plot([one.visible_rms, one.raw_rms], [place, place], color=GREY, lw=1.5, zorder=1)
         panel.plot(one.raw_rms, place, "o", mfc="white", mec="black", ms=7)
         panel.plot(one.visible_rms, place, "o", color=BLUE, ms=6)
-    sight = ordered[0].sight_cents
-    panel.axvline(sight, color=VERMILLION, ls=":", lw=1.4)
+    limit = ordered[0].detection_limit_cents
+    panel.axvline(limit, color=VERMILLION, ls=":", lw=1.4)
     panel.set_xscale("log")
     ticks = [t for t in (1, 3, 10, 30, 100) if t < 1.5 * ordered[-1].raw_rms]
     panel.set_xticks(ticks, [str(t) for t in ticks])
     panel.set_xticks([], minor=True)
     panel.set_yticks(range(len(ordered)), [plain(one.effect) for one in ordered])
-    panel.set_xlabel("cents, rms: shift ○ and visible part ●; dotted: sight", fontsize=9)
+    panel.set_xlabel("cents, rms: shift ○ and visible part ●; dotted: detection limit", fontsize=9)
     alt = "for each effect the shift of the frequencies and its visible part, which is several times smaller"
     rows = [
         (
             plain(one.effect),
             f"{one.raw_rms:.1f}",
-            f"{one.visible_rms:.1f}" + (" ·" if one.is_below_sight else ""),
+            f"{one.visible_rms:.1f}" + (" ·" if one.is_below_detection_limit else ""),
             " / ".join(signed(one.bias_percent[name]) for name in MODULI),
         )
         for one in reversed(ordered)
     ]
-    below = sum(one.is_below_sight for one in found)
-    said = f"\nA dot (·) marks an effect below sight, here under {sight:.1f} cents: {below} of {len(found)}.\n"
+    below = sum(one.is_below_detection_limit for one in found)
+    said = f"\nA dot (·): below the detection limit, here {limit:.1f} cents: {below} of {len(found)}.\n"
     text = table(("effect, usual size", "shift, cents", "visible, cents", "bias of $E_x$ / $E_y$ / $G_{xy}$, %"), rows)
     return figure(drawn, folder, f"visible-{card}", alt) + "\n" + text + said
 
@@ -144,10 +144,16 @@ def designs(folder: Path) -> str:
             (
                 DESIGN_WORDS[design],
                 f"{n_modes - 3}",
-                f"{sum(one.is_below_sight for one in found)} of {len(found)}",
+                f"{sum(one.is_below_detection_limit for one in found)} of {len(found)}",
                 f"{alike}",
                 f"{soft.visible_rms:.1f} of {soft.raw_rms:.1f}",
             )
         )
-    columns = ("design", "directions left", "effects below sight", "pairs above 0.95", "soft clamp, visible cents")
+    columns = (
+        "design",
+        "directions left",
+        "effects below the detection limit",
+        "pairs above 0.95",
+        "soft clamp, visible cents",
+    )
     return figure(drawn, folder, "designs", alt) + "\n" + table(columns, rows)

@@ -9,9 +9,9 @@ import pytest
 from made_searches import bare, baseline, candidate, ground_of
 
 from bayesplate.diagnosis.decision.verdict import alternatives, answers, at_limit, decide
-from bayesplate.diagnosis.evidence.gate import PASSES
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.tables import nothing, together
 from bayesplate.quantities import Quantity
@@ -74,10 +74,10 @@ def test_the_bound_for_none_is_a_tenth(base):
 
 def test_unexplained_if_the_winner_fails_the_gate(base):
     found = found_with(base, {("a",): 1.0}, residual=large(base))
-    assert found.passes(1) < PASSES
+    assert found.p_value(1) < PASSES
     verdict = decide(found)
     assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
-    assert "gate" in verdict.reason
+    assert "p = " in verdict.reason
 
 
 def test_named_from_three_times_the_next_on(base):

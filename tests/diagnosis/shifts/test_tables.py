@@ -109,7 +109,7 @@ def test_the_cells_hold_the_prior(finnish):
 def test_two_effects_add_on_the_cantilever(finnish):
     """At nominal sizes, against the joint full solve: to a tenth of the noise there."""
     ground, base = finnish.ground, finnish.ground.baseline
-    paired = [name for name in ground.candidates if not ground.is_below_sight(name)]
+    paired = [name for name in ground.candidates if not ground.is_below_detection_limit(name)]
     assert len(paired) >= 2
     for names in combinations(paired, 2):
         laws = [ground.candidates[name].laws[0] for name in names]

@@ -130,15 +130,15 @@ def test_the_winner_that_fails_the_gate_is_told_so():
     found = replace(found, residual=0.3 * found.ground.baseline.log_frequency * np.array([1, -1, 1, 1, -1, -1]))
     told = entries(found)
     assert told[SHEAR].fate == "does not fit"
-    assert told[SHEAR].rejected_because.startswith("with transverse shear the misfit is still too large (gate ")
+    assert told[SHEAR].rejected_because.startswith("with transverse shear the misfit is still too large (p = ")
     assert told[AIR].fate == "less probable"
 
 
 def test_below_sight_comes_first():
     told = entries(made({(): 0.5, (SHEAR,): 0.5}, size=1e-4, residual=np.zeros(6)))
-    assert {told[name].fate for name in NAMES} == {"below sight"}
+    assert {told[name].fate for name in NAMES} == {"not detectable"}
     assert told[AIR].rejected_because == "its visible part is below what these readings could show"
-    assert all(told[name].below_sight for name in NAMES)
+    assert all(told[name].below_detection_limit for name in NAMES)
 
 
 def test_an_entry_by_hand():
@@ -218,7 +218,7 @@ def test_a_named_effect_that_was_refitted():
     assert told.after.nested_leave_one_out_rms_cents == pytest.approx(0.25 * nested_cents)
     assert told.before.hits_90 == 1.0
     assert told.elastic_shift["E_x"].shift_in_sd == pytest.approx(2.5)
-    assert told.gate.before < 0.05 < told.gate.after
+    assert told.p_value.before < 0.05 < told.p_value.after
     assert told.null_control.nested_ratio == pytest.approx(0.25)
     assert told.gain_null_percentile == 100.0  # ln (0.79 / 0.01) + ln (0.1 / 0.5) is beyond the last of the null sets
     (finalist,) = told.finalists
@@ -263,13 +263,14 @@ def test_three_modes_leave_nothing_to_judge_by():
     assert told.reason == NOTHING_LEFT
     content = diagnosis_json(told)
     for place, name in (
-        ("before", "nested_leave_one_out_rms_cents"), ("before", "log_score"), ("gate", "before"), ("gate", "after"),
+        ("before", "nested_leave_one_out_rms_cents"), ("before", "log_score"),
+        ("p_value", "before"), ("p_value", "after"),
         ("null_control", "nested_ratio"), ("null_control", "nested_ratio_to_beat"),
     ):  # fmt: skip
         assert content[place][name] is None
     assert content["gain_null_percentile"] is None
     assert [one["look_alikes"] for one in content["candidates"]] == [[]] * 4
-    assert all(one["below_sight"] and one["gate"] is None for one in content["candidates"][:3])
+    assert all(one["below_detection_limit"] and one["p_value"] is None for one in content["candidates"][:3])
     assert [one["visible_rms_cents"] for one in content["candidates"]] == [None] * 4
     assert content["candidates"][0]["visible_cents"] == [None] * 3
     assert content["candidates"][0]["raw_rms_cents"] > 0.0
@@ -289,6 +290,6 @@ def test_four_and_five_modes_are_judged(n_modes):
     assert found.ground.n_directions == n_modes - 3
     assert told.reason != NOTHING_LEFT
     assert told.verdict == "none needed"
-    assert 0.0 < told.gate.before <= 1.0
+    assert 0.0 < told.p_value.before <= 1.0
     assert 0.0 <= told.gain_null_percentile <= 100.0
     assert (told.before.log_score is None) is (n_modes < 5)

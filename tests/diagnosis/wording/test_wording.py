@@ -23,7 +23,7 @@ from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
     "format", "name", "seed", "card_sha256", "verdict", "claim", "effects", "refitted", "reason", "sentences",
-    "declared", "probability_of_none", "probability_of_none_with_doubled_priors", "gate", "before", "after",
+    "declared", "probability_of_none", "probability_of_none_with_doubled_priors", "p_value", "before", "after",
     "gain_null_percentile", "null_control", "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates",
     "recommendation", "notes",
 ]  # fmt: skip
@@ -31,9 +31,9 @@ ERRORS = [
     "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
 ]  # fmt: skip
 EFFECT = [
-    "name", "setup", "raw_rms_cents", "visible_rms_cents", "visible_cents", "below_sight", "bias_percent",
+    "name", "setup", "raw_rms_cents", "visible_rms_cents", "visible_cents", "below_detection_limit", "bias_percent",
     "inclusion_probability", "inclusion_probability_with_doubled_priors", "log_bayes_factor", "ockham_log_factor",
-    "gate", "amplitude", "look_alikes", "rejected_because",
+    "p_value", "amplitude", "look_alikes", "rejected_because",
 ]  # fmt: skip
 EXCHANGED = [
     "name", "setup", "labels", "raw_rms_cents", "visible_rms_cents", "bias_percent", "inclusion_probability",
@@ -50,7 +50,7 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert list(content["before"]) == list(content["after"]) == ERRORS
     assert [list(one) for one in content["candidates"]] == [EFFECT, EFFECT, EFFECT, EXCHANGED]
     assert list(content["candidates"][0]["amplitude"]) == ["parameter", "form", "q05", "q50", "q95", "unit"]
-    assert list(content["gate"]) == ["before", "after"]
+    assert list(content["p_value"]) == ["before", "after"]
     assert list(content["null_control"]) == ["n_sets", "flagged_percent", "nested_ratio", "nested_ratio_to_beat"]
     assert list(content["elastic_shift"]["E_x"]) == ["before", "after", "shift_in_sd"]
     spread = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
@@ -148,7 +148,7 @@ def test_candidates_stand_in_the_order_of_their_probability():
     assert by_name["air loading"]["looks like"] == "attached mass"
     assert by_name["air loading"]["size (90 %)"] == by_name["relabelling (1,0) and (0,1)"]["shift"] == "–"
     assert narrow.rows[0][-2:] == ("tension 10 to 230 N/m", "in the verdict")
-    assert [row[-1] for row in narrow.rows] == ["in the verdict", "less probable", "below sight", "less probable"]
+    assert [row[-1] for row in narrow.rows] == ["in the verdict", "less probable", "not detectable", "less probable"]
     assert candidates_table(DIAGNOSES["undetectable"]) is None
 
 

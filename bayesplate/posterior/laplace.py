@@ -26,7 +26,7 @@ _INSIDE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class LaplaceApproximation:
     """A normal approximation of the posterior, and models made at its centre.
 
     Attributes
@@ -43,7 +43,7 @@ class Region:
     models: tuple[SetupModel, ...]
 
 
-def find_region(board: Board, estimate: Estimate) -> Region:
+def laplace_approximation(board: Board, estimate: Estimate) -> LaplaceApproximation:
     """Locate the posterior of a board.
 
     The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
@@ -58,7 +58,7 @@ def find_region(board: Board, estimate: Estimate) -> Region:
 
     Returns
     -------
-    Region
+    LaplaceApproximation
     """
     parameters = Parameters(board)
     widenings = noise_widenings(board, estimate)
@@ -79,7 +79,7 @@ def find_region(board: Board, estimate: Estimate) -> Region:
         models = tuple(setup_model(model.system, values, model.plate) for model in models)
         covariance = _covariance(board, models, "linear", scales, centre)
         models = exact_models(board, models, centre, covariance)
-    return Region(centre, covariance, models)
+    return LaplaceApproximation(centre, covariance, models)
 
 
 def noise_widenings(board: Board, estimate: Estimate) -> Floats:

@@ -1,4 +1,4 @@
-"""The gate: could this residual be noise, of the size that the noise prior allows?"""
+"""The prior predictive p-value: could this residual be noise, of the size that the noise prior allows?"""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 PASSES = 0.05
 
 
-def gate(hypothesis: Hypothesis, fold: Fold, residuals: Floats) -> Floats:
+def predictive_p_value(hypothesis: Hypothesis, fold: Fold, residuals: Floats) -> Floats:
     """Prior-predictive probability of a misfit at least as large as that of the best size of a hypothesis.
 
     P(chi^2 with n - 3 degrees of freedom > T), averaged over the noise prior, where T is the smallest weighted sum of
