@@ -52,9 +52,14 @@ def free(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
 
 
 @pytest.fixture
-def quick_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., runs.Run]:
-    """`bayesplate fit` with a gate that passes at once, and without a report."""
+def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sampler whose first judgement passes."""
     monkeypatch.setattr(SETTINGS, partial(SamplerSettings, gate=LOOSE_GATE))
+
+
+@pytest.fixture
+def quick_fit(tmp_path: Path, quickly: None) -> Callable[..., runs.Run]:
+    """`bayesplate fit` with a gate that passes at once, and without a report."""
 
     def run(*arguments: str) -> runs.Run:
         return runs.fit(tmp_path / "out", *arguments, "--no-report")
