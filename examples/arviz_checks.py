@@ -39,8 +39,9 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
     Returns
     -------
     dict
-        rhat_max, ess_min: of the constants by ArviZ, and `own` by the package, of the sampled columns; prior,
-        likelihood: sensitivity of each constant to either; pareto_k: by reading; effective_parameters.
+        rhat_max, ess_min: of the constants by ArviZ, and `own` by the package, of the sampled columns; likelihood,
+        constants, noise: sensitivity of each constant to the likelihood, and to the prior of either; pareto_k: by
+        reading; effective_parameters.
     """
     result = bayesplate.fit(card, seed=seed)
     data = result.to_arviz()
@@ -55,8 +56,8 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
         "pareto_k": dict(zip(result.problem.labels, (float(k) for k in loo.pareto_k), strict=True)),
         "effective_parameters": float(getattr(loo, "p_loo", None) or loo.p),
     }
-    for component in ("prior", "likelihood"):
-        numbers[component] = sensitivity(data, component)
+    for factor in ("likelihood", "constants", "noise"):
+        numbers[factor] = sensitivity(data, factor)
     if figure is not None:
         figure_of(numbers["pareto_k"]).savefig(figure, dpi=150)
     return numbers
@@ -69,13 +70,15 @@ def left_out(data: Any) -> Any:
         return arviz.loo(data, pointwise=True)
 
 
-def sensitivity(data: Any, component: str) -> dict[str, float]:
-    """How far each constant moves with a power of the prior, or of the likelihood."""
+def sensitivity(data: Any, factor: str) -> dict[str, float]:
+    """How far the distribution of each constant changes with a power of the likelihood, or of a factor of the prior."""
+    names = list(CONSTANTS)
+    component, factors = ("likelihood", None) if factor == "likelihood" else ("prior", [factor])
     if hasattr(arviz, "InferenceData"):
-        found = arviz.psens(data, component=component, var_names=list(CONSTANTS))
-        return {name: float(found[name]) for name in CONSTANTS}
-    table = arviz.psense_summary(data, var_names=list(CONSTANTS))  # ArviZ 1.x
-    return {name: float(table.loc[name, component]) for name in CONSTANTS}
+        found = arviz.psens(data, component=component, component_var_names=factors, var_names=names)
+        return {name: float(found[name]) for name in names}
+    table = arviz.psense_summary(data, var_names=names, prior_var_names=factors)  # ArviZ 1.x
+    return {name: float(table.loc[name, component]) for name in names}
 
 
 def figure_of(pareto_k: dict[str, float]) -> Any:
@@ -97,7 +100,7 @@ if __name__ == "__main__":
     print(f"R-hat {found['rhat_max']:.4f} by ArviZ, {own['rhat_max']:.4f} by the package")
     print(f"effective draws {found['ess_min']:.0f} by ArviZ (thinned), {own['ess_min']:.0f} by the package")
     for constant in CONSTANTS:
-        print(f"{constant:5s} sensitivity to the prior {found['prior'][constant]:.3f}, "
-              f"to the likelihood {found['likelihood'][constant]:.3f}")  # fmt: skip
+        told = ", ".join(f"{factor} {found[factor][constant]:.3f}" for factor in ("likelihood", "constants", "noise"))
+        print(f"{constant:5s} sensitivity to the likelihood and to the priors: {told}")
     for label, k in found["pareto_k"].items():
         print(f"{label} Pareto k {k:.2f}" + (" (weights do not serve)" if k > UNRELIABLE else ""))
