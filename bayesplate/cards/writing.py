@@ -16,8 +16,9 @@ from bayesplate.quantities import Kind, Quantity
 if TYPE_CHECKING:
     from bayesplate.cards.prior import PriorCard
 
-_DIGITS = (12, 15, 16, 17)
-"""Twelve first: there the error of a change of units is gone, and the number is the one that somebody wrote."""
+_DIGITS = 12
+"""Where they say a number but for the rounding of a change of units, they are the ones that somebody wrote."""
+_ROUNDING = 2e-15
 _STEPS = (0, 1, -1, 2, -2)
 
 
@@ -63,18 +64,27 @@ def _density(quantity: Quantity, unit: str, scale: float) -> Iterator[str]:
 def number(value: float, scale: float = 1.0) -> str:
     """A number in the unit of its key, which is `scale` in the unit of the value: text * scale is the value again."""
     written = value / scale
-    found = [t for at in _near(written) for digits in _DIGITS if float(t := f"{at:.{digits}g}") * scale == value]
-    shortest = min(found, key=len, default=f"{written:.17g}")
-    return shortest if any(mark in shortest for mark in ".en") else f"{shortest}.0"
+    short = f"{written:.{_DIGITS}g}"
+    if not math.isclose(float(short) * scale, value, rel_tol=_ROUNDING, abs_tol=0.0):
+        short = next((text for at in _near(written) if float(text := repr(at)) * scale == value), repr(written))
+    return short if any(mark in short for mark in ".en") else f"{short}.0"
 
 
 def density_numbers(one: Quantity, scale: float, read: Callable[[float, float], Quantity]) -> tuple[str, str]:
     """Median and factor of a log-normal density as its key has them; `read` makes the density of two such numbers."""
     median, factor = one.median / scale, one.factor
-    rounded = [(float(f"{median:.12g}"), float(f"{factor:.12g}")), (float(f"{median:.12g}"), factor)]
-    near = (*rounded, *product(_near(median), _near(factor)))
+    short = (float(f"{median:.{_DIGITS}g}"), float(f"{factor:.{_DIGITS}g}"))
+    if short[1] > 1 and _is_alike(read(*short), one):
+        return number(short[0]), number(short[1])
+    near = ((short[0], factor), *product(_near(median), _near(factor)))
     best = next((pair for pair in near if pair[1] > 1 and read(*pair) == one), (median, factor))
     return number(best[0]), number(best[1])
+
+
+def _is_alike(found: Quantity, one: Quantity) -> bool:
+    """Whether two densities are the same to the rounding of a change of units."""
+    pairs = ((found.mean, one.mean), (found.sd, one.sd))
+    return all(math.isclose(a, b, rel_tol=_ROUNDING, abs_tol=0.0) for a, b in pairs)
 
 
 def _near(value: float) -> Iterator[float]:

@@ -22,6 +22,7 @@ NO_OFFSET = Label(0, 0)
 DEFAULT_NOISE = Quantity.from_median(0.003, np.exp(0.5))
 CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 """Relative noise of a frequency: free boards settle at 0.24-0.30 %; re-clamping one board spreads it by 1-2.4 %."""
+NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
 
 
 def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
@@ -221,6 +222,12 @@ class Setup:
                 covered[edge] = Quantity.of(length)
             except ValueError as error:
                 faults.append(Fault(f"{name} clamped {edge}", "a length in m", repr(length), str(error)))
+        if not (noise is None or (isinstance(noise, Quantity) and not noise.is_exact)):
+            faults.append(Fault(f"{name} noise", NOISE_WANTED, repr(noise)))
+        numbers = np.asarray([resolution, *unlabelled])
+        if numbers.dtype.kind not in "iuf":
+            got = repr([resolution, *unlabelled])
+            faults.append(Fault(f"{name} resolution and unlabelled", "numbers, in Hz", got))
         if faults:
             raise InputError(faults)
         return cls(

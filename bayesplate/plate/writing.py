@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from bayesplate.cards.writing import array, density_numbers, number, quantity, table, text, unstatable
-from bayesplate.errors import InputError
+from bayesplate.errors import Fault, InputError
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.setup import AttachedItem, Setup
+from bayesplate.plate.setup import NOISE_WANTED, AttachedItem, Setup
 from bayesplate.quantities import Kind, Quantity
 
 _MILLI = 1e-3
@@ -42,6 +42,8 @@ def card_text(board: Board) -> str:
     """
     inputs = {one.name: one.prior for one in board.parameters if one.owner == BOARD and not one.is_of_effect}
     faults = [fault for place, one, kind in _uncertain(board) for fault in unstatable(place, one, kind)]
+    exact = (setup.name for setup in board.setups if setup.noise.is_exact)
+    faults += [Fault(f"{name} noise", NOISE_WANTED, "an exact number") for name in exact]
     if faults:
         raise InputError(faults)
     lines = ["format = 1", f"name = {text(board.name)}"]

@@ -66,12 +66,21 @@ class PublicNames(SphinxDirective):
         """One entry a name."""
         lines = []
         for name in bayesplate.__all__:
-            kind = "class" if isinstance(getattr(bayesplate, name), type) else "function"
-            lines += [f".. auto{kind}:: bayesplate.{name}", ""]
+            lines += [*_entry(name, getattr(bayesplate, name)), ""]
         fence = ["```{eval-rst}", *lines, "```"]
         place = nodes.Element()
         self.state.nested_parse(StringList(fence, "public names"), self.content_offset, place)
         return place.children
+
+
+def _entry(name: str, item: object) -> list[str]:
+    """The directive of a name; of a class with what belongs to it."""
+    if not isinstance(item, type):
+        # a folder that can be called is documented as the command it hands the call to
+        return [f".. autofunction:: bayesplate.{'workflow.modes.modes' if name == 'modes' else name}", "   :no-index:"]
+    if issubclass(item, Exception):
+        return [f".. autoexception:: bayesplate.{name}"]
+    return [f".. autoclass:: bayesplate.{name}", "   :members:", "   :inherited-members: BaseModel"]
 
 
 def _write_pages(app: Any) -> None:

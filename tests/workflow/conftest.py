@@ -52,13 +52,13 @@ def free(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
 
 
 @pytest.fixture
-def loose_gate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A gate that passes at once."""
+def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sampler whose first judgement passes."""
     monkeypatch.setattr(SETTINGS, partial(SamplerSettings, gate=LOOSE_GATE))
 
 
 @pytest.fixture
-def quick_fit(tmp_path: Path, loose_gate: None) -> Callable[..., runs.Run]:
+def quick_fit(tmp_path: Path, quickly: None) -> Callable[..., runs.Run]:
     """`bayesplate fit` with a gate that passes at once, and without a report."""
 
     def run(*arguments: str) -> runs.Run:

@@ -10,6 +10,8 @@ from click.testing import CliRunner
 
 import bayesplate
 from bayesplate.cli import main
+from bayesplate.results.contract import as_json
+from bayesplate.workflow.prepare import default_folder
 
 
 @pytest.mark.parametrize(
@@ -49,7 +51,7 @@ def test_nothing_is_written_unless_asked_for(tmp_path, monkeypatch, fiemme):
 
     assert result.folder is None
     assert list(tmp_path.iterdir()) == []
-    assert result.summary == fiemme.summary
+    assert as_json(result.summary) == as_json(fiemme.summary)
 
 
 def test_the_default_folder_is_results_and_the_name_of_the_board(quick_fit, monkeypatch, tmp_path, own_card):
@@ -82,3 +84,15 @@ def test_no_network_is_used(quick_fit, monkeypatch):
         socket.create_connection(("localhost", 1))
 
     assert quick_fit("fiemme-spruce-clamped", "--quiet").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("card", "folder"),
+    [
+        ("fiemme-spruce-clamped", "fiemme-spruce-clamped"),
+        ("cards/my.board.toml", "my.board"),
+        ("./half-top.txt", "half-top"),
+    ],
+)
+def test_the_command_line_writes_below_results_under_the_name_of_the_board(card, folder):
+    assert default_folder(card) == Path("results", folder)

@@ -1,0 +1,106 @@
+"""ArviZ on a fit: what its diagnostics say of the draws, the prior and each reading.
+
+`result.to_arviz()` holds the draws as ArviZ works with them, without a file. It computes its own R-hat and effective
+sizes, says how much a constant moves when the prior or the likelihood is raised to a power a little above or below one,
+and leaves one reading out by weighing the draws. Where a Pareto k exceeds 0.7 the draws cannot stand for a posterior
+that has not seen that reading; with six readings this is common, and it is why the package refits for its own errors.
+
+    python examples/arviz_checks.py pareto.png
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import bayesplate
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", FutureWarning)  # ArviZ 0.23 tells of its version 1
+    import arviz
+
+CARD = "fiemme-spruce-clamped"
+CONSTANTS = ("E_x", "E_y", "G_xy")
+UNRELIABLE = 0.7
+
+
+def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str, Any]:
+    """Fit a board and let ArviZ judge.
+
+    Parameters
+    ----------
+    figure : Path, optional
+        Where to write the figure of the Pareto k, by its ending as PNG or SVG.
+    card : str
+    seed : int
+
+    Returns
+    -------
+    dict
+        rhat_max, ess_min: of the constants by ArviZ, and `own` by the package, of the sampled columns; likelihood,
+        constants, noise: sensitivity of each constant to the likelihood, and to the prior of either; pareto_k: by
+        reading; effective_parameters.
+    """
+    result = bayesplate.fit(card, seed=seed)
+    data = result.to_arviz()
+    names = list(CONSTANTS)
+    table = arviz.summary(data, var_names=names, round_to=8)
+    loo = left_out(data)
+    own = result.summary.sampler
+    numbers = {
+        "rhat_max": float(table["r_hat"].max()),
+        "ess_min": float(table["ess_bulk"].min()),
+        "own": {"rhat_max": own.rhat_max, "ess_min": own.ess_min},
+        "pareto_k": dict(zip(result.problem.labels, (float(k) for k in loo.pareto_k), strict=True)),
+        "effective_parameters": float(getattr(loo, "p_loo", None) or loo.p),
+    }
+    for factor in ("likelihood", "constants", "noise"):
+        numbers[factor] = sensitivity(data, factor)
+    if figure is not None:
+        figure_of(numbers["pareto_k"]).savefig(figure, dpi=150)
+    return numbers
+
+
+def left_out(data: Any) -> Any:
+    """Leave-one-out by weights; what ArviZ warns of is what the example shows."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return arviz.loo(data, pointwise=True)
+
+
+def sensitivity(data: Any, factor: str) -> dict[str, float]:
+    """How far the distribution of each constant changes with a power of the likelihood, or of a factor of the prior."""
+    names = list(CONSTANTS)
+    component, factors = ("likelihood", None) if factor == "likelihood" else ("prior", [factor])
+    if hasattr(arviz, "InferenceData"):
+        found = arviz.psens(data, component=component, component_var_names=factors, var_names=names)
+        return {name: float(found[name]) for name in names}
+    table = arviz.psense_summary(data, var_names=names, prior_var_names=factors)  # ArviZ 1.x
+    return {name: float(table.loc[name, component]) for name in names}
+
+
+def figure_of(pareto_k: dict[str, float]) -> Any:
+    """Pareto k of each reading."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.0, 3.0), layout="constrained")
+    panel = figure.subplots()
+    panel.barh(list(pareto_k), list(pareto_k.values()), color="#0072B2")
+    panel.axvline(UNRELIABLE, color="#D55E00", lw=1.5)
+    panel.set(xlabel="Pareto k of the reading left out; beyond the line weights do not serve", xlim=(0.0, 1.2))
+    panel.invert_yaxis()
+    return figure
+
+
+if __name__ == "__main__":
+    found = run(Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    own = found["own"]
+    print(f"R-hat {found['rhat_max']:.4f} by ArviZ, {own['rhat_max']:.4f} by the package")
+    print(f"effective draws {found['ess_min']:.0f} by ArviZ (thinned), {own['ess_min']:.0f} by the package")
+    for constant in CONSTANTS:
+        told = ", ".join(f"{factor} {found[factor][constant]:.3f}" for factor in ("likelihood", "constants", "noise"))
+        print(f"{constant:5s} sensitivity to the likelihood and to the priors: {told}")
+    for label, k in found["pareto_k"].items():
+        print(f"{label} Pareto k {k:.2f}" + (" (weights do not serve)" if k > UNRELIABLE else ""))

@@ -1,0 +1,149 @@
+"""What the functions return: short and long representations, figures, and the draws as ArviZ works with them."""
+
+from __future__ import annotations
+
+import inspect
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import bayesplate
+from bayesplate.results.archive import read_archive
+from bayesplate.results.contract import as_json
+
+BOARD = "fiemme-spruce-clamped"
+
+
+@pytest.fixture(scope="module")
+def results(fiemme):
+    """One result of every function that needs no sampling of its own, by its function."""
+    return {"fit": fiemme, "check": bayesplate.check(fiemme.problem), "modes": bayesplate.modes(fiemme.problem)}
+
+
+class Cells(HTMLParser):
+    """The cells of every table of a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.open: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attributes):
+        self.open.append(tag)
+        if tag == "td":
+            self.found.append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] == "td":
+            self.found[-1] += data
+
+
+@pytest.mark.parametrize(
+    ("name", "short", "cell"),
+    [("fit", "<FitResult of fiemme-spruce-clamped: E_x = 10.43 ± ", "E_x, along grain"),
+     ("check", "<CheckResult of fiemme-spruce-clamped: 6 modes, E_x ± ", "E_x, along grain"),
+     ("modes", "<ModesResult of fiemme-spruce-clamped: clamped: 12 from ", "(0,0)")],
+)  # fmt: skip
+def test_a_result_shows_itself(results, name, short, cell):
+    result = results[name]
+    page = result._repr_html_()
+
+    assert repr(result).startswith(short)
+    assert len(repr(result).splitlines()) == 1
+    assert page.startswith(f"<h3>{result.problem.board.title if name == 'fit' else result.summary.title}</h3>")
+    cells = Cells(page)
+    assert cell in cells.found
+    assert cells.open == []
+
+
+def test_the_summary_of_a_check_is_the_report_and_its_problem_can_be_fitted(results):
+    checked = results["check"]
+
+    assert isinstance(checked.summary, bayesplate.CheckReport)
+    assert "problem" not in as_json(checked)
+    assert checked.problem is results["fit"].problem
+
+
+def figures(plots):
+    """Name and method of every figure that needs no argument."""
+    names = (name for name in dir(plots) if not name.startswith("_") and callable(getattr(plots, name)))
+    return {name: getattr(plots, name) for name in names}
+
+
+@pytest.mark.parametrize("name", ["fit", "check", "modes"])
+def test_every_figure_is_drawn(results, name):
+    plots = results[name].plot
+    found = figures(plots)
+
+    assert len(found) >= {"fit": 11, "check": 2, "modes": 1}[name]
+    for title, draw in found.items():
+        figure = draw()
+        assert isinstance(figure, Figure), title
+        assert figure.axes, title
+        assert inspect.getdoc(draw), title
+        assert f".{title}()" in repr(plots)
+
+
+def test_a_figure_of_what_is_not_there_is_refused(results):
+    with pytest.raises(bayesplate.InputError, match="setup: wanted one of clamped, got 'free'"):
+        results["fit"].plot.modes("free")
+    with pytest.raises(bayesplate.InputError, match="name: wanted one of E_x, E_y, G_xy, D_x, D_y, D_s, got 'E_z'"):
+        results["fit"].plot.corner(["E_x", "E_z"])
+
+
+def test_a_corner_plot_has_a_panel_for_every_pair_and_marks_least_squares(results):
+    result = results["fit"]
+    figure = result.plot.corner(["E_x", "D_y"])
+    panels = np.reshape(figure.axes, (2, 2))
+
+    assert [panels[1, 0].get_xlabel(), panels[1, 0].get_ylabel()] == ["E_x, GPa", "D_y, N m"]
+    marked = panels[0, 0].lines[-1].get_xdata()[0]
+    assert marked == pytest.approx(result.summary.weighted_least_squares.E_x / 1e9)
+
+
+def test_arviz_gets_what_posterior_nc_holds(fiemme):
+    written, made = read_archive(fiemme.folder / "posterior.nc"), fiemme.to_arviz()
+
+    for group, variables in written.groups.items():
+        assert set(made[group].data_vars) == set(variables)
+        for name, values in variables.items():
+            np.testing.assert_array_equal(made[group][name].values, values)
+    assert dict(made.attrs) == dict(written.attributes)
+
+
+def test_the_factors_of_the_prior_multiply_to_it(fiemme):
+    """A board with exact inputs has two of them, one with uncertain ones three."""
+    theta = fiemme.draws.theta
+    group = fiemme.to_arviz().log_prior
+
+    assert set(group.data_vars) == {"constants", "noise"}
+    total = group["constants"].values + group["noise"].values
+    np.testing.assert_allclose(total.ravel(), fiemme.problem.log_prior(fiemme.draws.flat), rtol=1e-12)
+    uncertain = bayesplate.Problem.from_card("spruce-free-2R")
+    at = uncertain.prior_transform(np.full((3, uncertain.n_dim), 0.4))
+    factors = uncertain.posed.posterior.log_prior_factors(at)
+    assert set(factors) == {"constants", "noise", "inputs"}
+    np.testing.assert_allclose(sum(factors.values()), uncertain.log_prior(at), rtol=1e-12)
+    assert group["constants"].values.shape == theta.shape[:2]
+
+
+def test_prior_sensitivity_runs_on_the_group_and_not_without_it(fiemme):
+    import arviz
+
+    def sensitivity(data):
+        if hasattr(arviz, "psens"):
+            by_name = arviz.psens(data, var_names=["E_x", "G_xy"], component="prior", component_var_names=["constants"])
+            return float(by_name["G_xy"])
+        return float(arviz.psense_summary(data, var_names=["G_xy"])["prior"].iloc[0])
+
+    made = fiemme.to_arviz()
+    assert 0.0 < sensitivity(made) < 1.0
+    del made.log_prior
+    with pytest.raises((ValueError, AttributeError, TypeError, KeyError)):
+        sensitivity(made)
