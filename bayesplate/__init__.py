@@ -6,6 +6,7 @@
     check(card)      what a card can identify, without sampling
     modes(card)      the lowest modes and their Chladni figures
     cite(card)       references of exactly what a fit uses
+    new(path)        a first card, to be completed
 
 `card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
 densities and the frequencies that other samplers ask for. Nothing is written unless `out=` names a folder.
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
     from bayesplate.workflow.fit import FitResult, fit
     from bayesplate.workflow.modes import ModesResult, modes
+    from bayesplate.workflow.new import new
     from bayesplate.workflow.problem import Problem
 
 __all__ = [
@@ -93,6 +95,7 @@ __all__ = [
     "diagnose",
     "fit",
     "modes",
+    "new",
 ]
 
 _HOMES = {
@@ -127,6 +130,7 @@ _HOMES = {
     "compare": "bayesplate.workflow.compare",
     "diagnose": "bayesplate.workflow.diagnose",
     "fit": "bayesplate.workflow.fit",
+    "new": "bayesplate.workflow.new",
 }
 """Where each name is defined. `modes` is the folder of that name, which can be called: see `bayesplate.modes`."""
 

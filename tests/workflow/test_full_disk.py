@@ -34,7 +34,7 @@ def full_at(monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["chunk-0001.npz", "posterior.nc", "summary.json", "report.html", "sampler.png"])
-@pytest.mark.usefixtures("loose_gate")
+@pytest.mark.usefixtures("quickly")
 def test_a_fit_keeps_what_it_sampled(name, full_at, tmp_path):
     full_at(name)
     run = runs.fit(tmp_path / "out", BOARD)
