@@ -46,7 +46,7 @@ class Cells(HTMLParser):
 
 @pytest.mark.parametrize(
     ("name", "short", "cell"),
-    [("fit", "<FitResult of fiemme-spruce-clamped: E_x = 10.43 ± ", "E_x, along grain"),
+    [("fit", "<FitResult of fiemme-spruce-clamped: E_x = 10.", "E_x, along grain"),
      ("check", "<CheckResult of fiemme-spruce-clamped: 6 modes, E_x ± ", "E_x, along grain"),
      ("modes", "<ModesResult of fiemme-spruce-clamped: clamped: 12 from ", "(0,0)")],
 )  # fmt: skip
