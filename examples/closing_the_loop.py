@@ -7,7 +7,7 @@ to find it. The other boards are measured, and what their readings cannot tell i
 
     python examples/closing_the_loop.py --out closing-the-loop
 
-prints one table and writes it as CSV. About a minute on two cores.
+prints one table and writes it as CSV.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class ErrorFigures:
     in_sample_rms_cents : float
         Of the residuals of `Summary.modes`: readings over posterior mean predictions.
     leave_one_out_rms_cents : float or None
-        Of readings that a least-squares refit has not seen; None where too few are left.
+        Of each reading by the most likely constants of the others; None where too few are left.
     linearisation_rms_cents : float or None
         Linear less exact law over the posterior.
     exact_law_worst_cents : float

@@ -46,15 +46,16 @@ class Cells(HTMLParser):
 
 @pytest.mark.parametrize(
     ("name", "short", "cell"),
-    [("fit", "<FitResult of fiemme-spruce-clamped: E_x = 10.", "E_x, along grain"),
+    [("fit", "<FitResult of fiemme-spruce-clamped: E_x = {mean:.2f} ± {sd:.2f} GPa, ", "E_x, along grain"),
      ("check", "<CheckResult of fiemme-spruce-clamped: 6 modes, E_x ± ", "E_x, along grain"),
      ("modes", "<ModesResult of fiemme-spruce-clamped: clamped: 12 from ", "(0,0)")],
 )  # fmt: skip
 def test_a_result_shows_itself(results, name, short, cell):
     result = results[name]
     page = result._repr_html_()
+    E_x = results["fit"].summary.elastic.E_x
 
-    assert repr(result).startswith(short)
+    assert repr(result).startswith(short.format(mean=E_x.mean / 1e9, sd=E_x.sd / 1e9))
     assert len(repr(result).splitlines()) == 1
     assert page.startswith(f"<h3>{result.problem.board.title if name == 'fit' else result.summary.title}</h3>")
     cells = Cells(page)
