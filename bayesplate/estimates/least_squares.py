@@ -101,10 +101,17 @@ def weighted_least_squares(board: Board) -> Estimate:
             break
         step = np.linalg.lstsq(sensitivities / scales[:, None], residuals / scales, rcond=1e-8)[0]
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+        while not _is_material(log_next + step, inputs) and np.abs(step).max() > _CONVERGED:
+            step *= 0.5
         log_next = log_next + step
         size = float(np.abs(step).max())
         settled, previous = has_settled(size, previous), size
     return Estimate(rigidities, values, models, sensitivities, residuals, scales, settled)
+
+
+def _is_material(log_rigidities: NDArray[np.float64], inputs: Values) -> bool:
+    """Whether nu_xy nu_yx is below 1: beyond it a plate has no frequencies."""
+    return bool(inputs["poisson_xy"] ** 2 * np.exp(log_rigidities[1] - log_rigidities[0]) < 1.0)
 
 
 def has_settled(step: float, previous: float) -> bool:

@@ -1,21 +1,26 @@
-"""What a board's prior foretells of its frequencies, and whether all that were read are in another unit."""
+"""What a board's prior foretells of its frequencies, and the one mistake that makes all of them wrong together."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from bayesplate.cards import PriorCard
-from bayesplate.errors import Fault
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured, starting_rigidities
-from bayesplate.frequencies.prior_bands import prior_draws
+from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import term_weights
+from bayesplate.labels import Label
+from bayesplate.modes.line import N_BEAMS
 from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board, density
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.setup import Reading
 
 Floats = NDArray[np.float64]
 
@@ -25,16 +30,81 @@ FASTEST = 15_000.0
 SLOWEST = 50.0
 """The same from below, in the stiffer direction: foams have some hundreds."""
 
-SUSPECTS = {
-    2.0 * np.pi: "in rad/s? in Hz they are that over 2 pi = 6.28",
-    1e-3: "in kHz? 1 kHz is 1000 Hz",
-    1e-2: "are length_x_mm and length_y_mm in cm? 1 cm is 10 mm",
-    1e2: "are length_x_mm and length_y_mm ten times too large?",
-    1e-1: "is thickness_mm ten times too large, or are all three lengths in cm?",
-    1e1: "is thickness_mm ten times too small, or are all three lengths ten times too large?",
-    1e-3**0.5: "are the constants of the prior in MPa? 1 GPa is 1000 MPa",
-}
-"""Ratio of measured to expected that one mistake of units gives all frequencies, and the question to ask."""
+
+@dataclass(frozen=True)
+class Suspect:
+    """One mistake that makes all readings wrong together, and the question to ask.
+
+    Attributes
+    ----------
+    question : str
+    frequency : float
+        What the frequencies on the card are, over what they would be in Hz.
+    wrong : tuple of (str, float)
+        Inputs of the board, and what the card says of each over what it would be.
+    exchanged : tuple of str
+        Two inputs, or two rigidities, that stand for each other.
+    is_transposed : bool
+        Whether all labels (m,n) are written as (n,m).
+    """
+
+    question: str
+    frequency: float = 1.0
+    wrong: tuple[tuple[str, float], ...] = ()
+    exchanged: tuple[str, ...] = ()
+    is_transposed: bool = False
+
+    @property
+    def is_of_a_unit(self) -> bool:
+        """Whether it is one of units or of decimal places."""
+        return self.frequency != 1.0 or bool(self.wrong)
+
+    @property
+    def speed(self) -> float:
+        """The speed of sound that the card implies, over what it would be: of the side's square over the thickness."""
+        wrong = dict(self.wrong)
+        return float(self.frequency * wrong.get("length_x", 1.0) ** 2 / wrong.get("thickness", 1.0))
+
+    def mended(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Inputs and rigidities as they would be: dict of array."""
+        stated = {name: value for name, value in values.items() if name not in RIGIDITIES or "E_x" not in values}
+        found = with_rigidities(stated | {name: values[name] / factor for name, factor in self.wrong})
+        coupling = found["poisson_xy"] * found["D_y"]
+        found |= dict(zip(self.exchanged, [found[name] for name in reversed(self.exchanged)], strict=True))
+        return found | {"poisson_xy": coupling / found["D_y"]}
+
+    def beams(self, reading: Reading, first: Label) -> tuple[int, int]:
+        """Orders of the beam functions that a label would name; negative where there is no such mode."""
+        label = reading.label
+        return (label.n - first.m, label.m - first.n) if self.is_transposed else reading.beams
+
+
+_SIDES = ("length_x", "length_y")
+SUSPECTS = (
+    Suspect("in rad/s? in Hz they are that over 2 pi = 6.28", frequency=2.0 * np.pi),
+    Suspect("in kHz? 1 kHz is 1000 Hz", frequency=1e-3),
+    Suspect("are length_x_mm and length_y_mm in cm? 1 cm is 10 mm", wrong=tuple((side, 0.1) for side in _SIDES)),
+    Suspect("are length_x_mm and length_y_mm ten times too large?", wrong=tuple((side, 10.0) for side in _SIDES)),
+    Suspect("is thickness_mm ten times too large?", wrong=(("thickness", 10.0),)),
+    Suspect("is thickness_mm ten times too small?", wrong=(("thickness", 0.1),)),
+    Suspect("are all three lengths in cm?", wrong=tuple((size, 0.1) for size in (*_SIDES, "thickness"))),
+    Suspect("are all three lengths ten times too large?", wrong=tuple((size, 10.0) for size in (*_SIDES, "thickness"))),
+    Suspect("are the constants of the prior in MPa? 1 GPa is 1000 MPa", frequency=1e-3**0.5),
+    Suspect("are length_x_mm and length_y_mm exchanged: is x along the grain?", exchanged=_SIDES),
+    Suspect("is y along the grain? x should be", exchanged=("D_x", "D_y")),
+    Suspect("are all labels (m,n) written as (n,m)?", is_transposed=True),
+)
+"""What makes all frequencies wrong by one mistake, and lengths and constants that one mistake exchanges."""
+
+_AS_STATED = Suspect("")
+MOST_ORTHOTROPIC = 100.0
+"""E_x over E_y that no plate reaches: 10 to 20 in spruce, up to 70 in balsa."""
+
+LIGHTEST_WOOD = 90.0
+"""Density in kg m^-3 below which only foams and honeycombs lie."""
+
+_STIFFER_ACROSS = 1.5
+_USUAL = (0.001, 0.999)
 
 _SLACK = 0.1
 """Relative error of a Rayleigh quotient, of the noise, and of what an effect that is not modelled does, in all."""
@@ -42,6 +112,9 @@ _SLACK = 0.1
 _IMPROBABLE, _PROBABLE = 1e-4, 1e-2
 _AS_NEAR = 6.0  # a factor 20 of the density
 _N_DRAWS = 4000
+_FEWEST_POSSIBLE = 0.05
+"""Share of the draws that must be of a material: elsewhere those few say nothing of the others."""
+
 _COARSE_MESH = 12
 _WITHIN = (0.025, 0.975)
 
@@ -78,7 +151,9 @@ class PriorPredictive:
         return float(off @ np.linalg.solve(covariance, off))
 
 
-def prior_predictive(board: Board, prior: PriorCard, rng: np.random.Generator) -> PriorPredictive:
+def prior_predictive(
+    board: Board, prior: PriorCard, rng: np.random.Generator, suspects: Sequence[Suspect] = (_AS_STATED,)
+) -> list[PriorPredictive | None]:
     """Frequencies of a board's labelled modes under its prior, from Rayleigh quotients of beam-function products.
 
     A few per cent off each frequency, of the bare thin plate; inputs that are uncertain are drawn too.
@@ -88,27 +163,43 @@ def prior_predictive(board: Board, prior: PriorCard, rng: np.random.Generator) -
     board : Board
     prior : PriorCard
     rng : numpy.random.Generator
+    suspects : sequence of Suspect
+        Mistakes to be mended first; by default none, which is the board as it is stated.
 
     Returns
     -------
-    PriorPredictive
+    list of PriorPredictive or None
+        One per suspect; None where a label would name no mode, or no draw is a material.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
-    columns = []
-    for setup in board.setups:
-        products = product_coefficients(thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH))
-        weights = term_weights(values, setup).stiffness
-        columns += [weights @ products[:, i, j] for i, j in (reading.beams for reading in setup.readings)]
+    products = [product_coefficients(thin_plate(s.ends_x, s.ends_y, _COARSE_MESH, _COARSE_MESH)) for s in board.setups]
+    return [_predicted(board, products, values, suspect) for suspect in suspects]
+
+
+def _predicted(
+    board: Board, products: Sequence[Floats], values: Mapping[str, Floats], suspect: Suspect
+) -> PriorPredictive | None:
+    mended, columns = suspect.mended(values), []
+    for setup, coefficients in zip(board.setups, products, strict=True):
+        weights = term_weights(mended, setup).stiffness
+        for reading in setup.readings:
+            i, j = suspect.beams(reading, setup.first_label)
+            if min(i, j) < 0 or max(i, j) >= N_BEAMS:
+                return None
+            columns.append(weights @ coefficients[:, i, j])
     squared = np.column_stack(columns)
     possible = np.all(np.isfinite(squared) & (squared > 0), axis=1)
-    return PriorPredictive(0.5 * np.log(squared[possible]) - np.log(2.0 * np.pi))
+    if possible.mean() < _FEWEST_POSSIBLE:
+        return None
+    hertz = 0.5 * np.log(squared[possible]) - np.log(2.0 * np.pi)
+    return PriorPredictive(hertz + np.log(suspect.frequency))
 
 
-def unit_faults(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Fault]:
-    """Whether all readings are off by the one factor that a mistake of units makes, and the question to ask.
+def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) -> None:
+    """Ask about the one mistake that makes all readings wrong together, where there is one.
 
-    Asked where the readings are out of the prior's reach, or would need a material that carries sound faster or slower
-    than any does, and a suspect's factor mends it.
+    Asked where the readings are out of the prior's reach, or would need a material that there is not, and mending one
+    of `SUSPECTS` brings them within it.
 
     Parameters
     ----------
@@ -116,31 +207,75 @@ def unit_faults(board: Board, prior: PriorCard, rng: np.random.Generator) -> lis
     prior : PriorCard
     rng : numpy.random.Generator
 
-    Returns
-    -------
-    list of Fault
-        One or none.
+    Raises
+    ------
+    InputError
+        If a unit is the likeliest mistake.
+    NotIdentifiableError
+        If the likeliest mistake is that two sides, constants or orders stand for each other.
     """
     if not all(setup.readings for setup in board.setups):  # refused later, or still to be measured
+        return
+    speed, ratio = plate_speed(board), _ratio(board)
+    is_material = bool(board.nominal()["poisson_xy"] ** 2 * ratio < 1.0)
+    fault = _contradiction(board, prior, speed, rng) if is_material else _no_material(board, ratio)
+    if fault is None:
+        return
+    likeliest = _likeliest(
+        board,
+        prior,
+        [one for one in SUSPECTS if SLOWEST < speed / one.speed < FASTEST and (is_material or not one.is_of_a_unit)],
+        rng,
+    )
+    remedies = (*(one.question for one in likeliest), fault.remedy)
+    asked = replace(fault, remedy="; ".join(filter(None, remedies)))
+    if any(one.is_of_a_unit for one in likeliest):
+        raise InputError(asked)
+    if likeliest or not is_material:
+        raise NotIdentifiableError(str(asked))
+
+
+def _likeliest(board: Board, prior: PriorCard, suspects: Sequence[Suspect], rng: np.random.Generator) -> list[Suspect]:
+    """The suspects that bring the readings within the prior's reach, all that are hardly farther off than the best."""
+    measured = log_measured(board)
+    mended = prior_predictive(board, prior, rng, suspects)
+    distances = [np.inf if found is None else found.distance(measured) for found in mended]
+    nearest = min(distances, default=np.inf)
+    if chdtrc(measured.size, nearest) < _PROBABLE:
         return []
-    predicted, measured, speed = prior_predictive(board, prior, rng), log_measured(board), plate_speed(board)
-    distances = {f: predicted.distance(measured - np.log(f)) for f in SUSPECTS if SLOWEST < speed / f < FASTEST}
-    if not distances or chdtrc(measured.size, min(distances.values())) < _PROBABLE:
-        return []
-    nearest = min(distances.values())
-    questions = "; ".join(text for f, text in SUSPECTS.items() if distances.get(f, np.inf) < nearest + _AS_NEAR)
+    return [one for one, distance in zip(suspects, distances, strict=True) if distance < nearest + _AS_NEAR]
+
+
+def _ratio(board: Board) -> float:
+    """E_y over E_x that the readings imply, 0.01 to 100; a rough one."""
+    D_x, D_y, _ = starting_rigidities(board)
+    return float(D_y / D_x)
+
+
+def _no_material(board: Board, ratio: float) -> Fault:
+    """That no material has such constants: a larger ratio than nu_xy allows."""
+    wanted = (
+        f"a plate of a material: nu_xy nu_yx is below 1, so E_y below {board.nominal()['poisson_xy'] ** -2:.3g} E_x"
+    )
+    return Fault(f"{board.name}.toml", wanted, f"frequencies with E_y about {ratio:.3g} E_x", "or a smaller poisson_xy")
+
+
+def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.Generator) -> Fault | None:
+    """That the readings want sound faster or slower than any material carries it, or are out of the prior's reach."""
     place = f"{board.name}.toml frequencies_hz"
     if not SLOWEST < speed < FASTEST:
-        wanted = f"frequencies of a material that carries sound at {SLOWEST:g} to {FASTEST:g} m/s"
-        return [Fault(place, wanted, f"{speed:.3g} m/s", f"{questions}; or x and y are exchanged")]
-    if chdtrc(measured.size, predicted.distance(measured)) > _IMPROBABLE:
-        return []
-    low, high = np.exp(np.quantile(predicted.draws[:, 0], _WITHIN))
-    first = next(reading for setup in board.setups for reading in setup.readings)
-    off = np.exp(np.median(measured - predicted.median))
-    wanted = f"frequencies that the prior '{prior.name}' foretells, {first.label} at {low:.3g} to {high:.3g} Hz"
-    got = f"{first.frequency.mean:.4g} Hz, and all of them about {off:.2g} times the expected"
-    return [Fault(place, wanted, got, f"{questions}; or another prior, if no unit is wrong")]
+        wanted = f"those of a material that carries sound at {SLOWEST:g} to {FASTEST:g} m/s"
+        return Fault(place, wanted, f"{speed:.3g} m/s")
+    measured = log_measured(board)
+    (predicted,) = prior_predictive(board, prior, rng)
+    if predicted is None or chdtrc(measured.size, predicted.distance(measured)) > _IMPROBABLE:
+        return None
+    readings = [reading for setup in board.setups for reading in setup.readings]
+    worst = int(np.argmax(np.abs(measured - predicted.median) / np.hypot(predicted.spread, _SLACK)))
+    low, high = np.exp(np.quantile(predicted.draws[:, worst], _WITHIN))
+    wanted = f"those that the prior '{prior.name}' foretells, {readings[worst].label} at {low:.3g} to {high:.3g} Hz"
+    got = f"{readings[worst].frequency.mean:.4g} Hz"
+    return Fault(place, wanted, got, "or another prior, if nothing is wrong")
 
 
 def plate_speed(board: Board) -> float:
@@ -148,3 +283,47 @@ def plate_speed(board: Board) -> float:
     values = board.nominal()
     D_x, D_y, _ = starting_rigidities(board)
     return float(np.sqrt(12.0 * max(D_x, D_y) / (density(values) * values["thickness"] ** 3)))
+
+
+def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
+    """What is unusual about a board's density and about the constants that its readings imply, a sentence each.
+
+    Parameters
+    ----------
+    board : Board
+    prior : PriorCard
+    rigidities : (3,) array, N m
+        D_x, D_y, D_s, as by least squares.
+
+    Returns
+    -------
+    tuple of str
+    """
+    values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
+    elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    by_name = values | elastic._asdict()
+    found, outside = [], []
+    for name, one in prior.constants.items():
+        low, high = (float(one.quantile(np.array(share))) for share in _USUAL)
+        if not low <= by_name[name] <= high:
+            unit, factor = ("GPa", 1e9) if name in MODULI else ("N m", 1.0)
+            expected = f"{low / factor:.3g} to {high / factor:.3g}"
+            outside.append(f"{name} comes out as {by_name[name] / factor:.3g} {unit}, expected were {expected}")
+    if outside:
+        found.append(
+            f"out of reach of the prior '{prior.name}': {'; '.join(outside)}; are sizes, labels and prior right?"
+        )
+    ratio = float(elastic.E_x / elastic.E_y)
+    if ratio > MOST_ORTHOTROPIC:
+        found.append(
+            f"E_x comes out {ratio:.3g} times as large as E_y, more than in any wood: are length_x_mm and length_y_mm, "
+            "or all labels, exchanged?"
+        )
+    elif ratio < 1.0 / _STIFFER_ACROSS:
+        found.append(f"E_y comes out {1.0 / ratio:.3g} times as large as E_x: is x along the grain?")
+    rho = float(density(values))
+    if rho < LIGHTEST_WOOD:
+        found.append(
+            f"the density comes out as {rho:.3g} kg/m3, lighter than balsa: are the mass and the three lengths right?"
+        )
+    return tuple(found)

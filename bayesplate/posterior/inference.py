@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,14 @@ from bayesplate.estimates.identifiability import (
     require_labels,
 )
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
+from bayesplate.estimates.plausibility import unusual
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
+from bayesplate.posterior.mistakes import slip_remarks
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
@@ -64,6 +67,12 @@ class PosedProblem:
     def parameters(self) -> Parameters:
         """The sampled columns."""
         return self.posterior.parameters
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What is unusual about the constants and the readings, before anything is sampled: a sentence each."""
+        constants = unusual(self.board, self.prior, self.estimate.rigidities)
+        return (*constants, *slip_remarks(self.posterior, self.centre))
 
     def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""
@@ -125,7 +134,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     estimate = weighted_least_squares(board)
     found = identifiability(estimate.sensitivities, estimate.scales)
     require_identifiable(board, found)
-    approximation = laplace_approximation(board, estimate)
+    approximation = laplace_approximation(board, estimate, robust)
     require_identifiable(board, _identifiable_at(board, approximation, estimate))
     is_forced = law is not None
     if law is None:

@@ -14,8 +14,10 @@ from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, setup_model, with_exact
 from bayesplate.plate.board import Board, Values
+from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.robust import highest_student, student_weights
 
 Floats = NDArray[np.float64]
 
@@ -43,18 +45,20 @@ class LaplaceApproximation:
     models: tuple[SetupModel, ...]
 
 
-def laplace_approximation(board: Board, estimate: Estimate) -> LaplaceApproximation:
+def laplace_approximation(board: Board, estimate: Estimate, robust: bool = False) -> LaplaceApproximation:
     """Locate the posterior of a board.
 
     The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
     far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, and the models
-    are made anew at the point it finds.
+    are made anew at the point it finds. Under Student's errors a reading far off weighs little.
 
     Parameters
     ----------
     board : Board
     estimate : Estimate
         At the nominal inputs.
+    robust : bool
+        Student's distribution for the noise.
 
     Returns
     -------
@@ -66,6 +70,14 @@ def laplace_approximation(board: Board, estimate: Estimate) -> LaplaceApproximat
     centre = parameters.theta(estimate.values, noise)
     models = estimate.models
     scales = reading_sd(board.setups, noise)
+    if robust:
+        rigidities, noise = highest_student(board, estimate)
+        values = dict(estimate.values) | dict(zip(RIGIDITIES, rigidities, strict=True))
+        centre = parameters.theta(values, noise)
+        models = tuple(setup_model(model.system, values, model.plate) for model in models)
+        scales = reading_sd(board.setups, noise)
+        residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
+        scales = scales / np.sqrt(student_weights(residuals / scales))
     covariance = _covariance(board, models, "linear", scales, centre)
     models = exact_models(board, models, centre, covariance)
     if parameters.inputs:

@@ -203,7 +203,7 @@ def _percentile(system: PaperSystem) -> Percentile | None:
 
 def warnings_of(problem: PosedProblem, assessment: Assessment) -> list[str]:
     """What a reader of the summary must know, one sentence each."""
-    sentences = list(problem.board.notes)
+    sentences = [*problem.doubts, *problem.board.notes]
     if not problem.estimate.converged:
         sentences.append("the least-squares steps did not settle: two modes near one frequency may swap their labels")
     sentences += assessment.doubts

@@ -113,7 +113,7 @@ def check(card: Problem | Card, *, effects: Sequence[str] | None = None) -> Chec
         signatures=tuple(_effects(signatures(problem))),
         invisible=INVISIBLE,
         identifiability=tuple(remarks(board, found)),
-        notes=tuple(board.notes),
+        notes=(*problem.doubts, *board.notes),
         problem=given,
     )
 

@@ -24,7 +24,7 @@ from bayesplate.cards.shelf import find
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import coefficient_faults, require_sides
-from bayesplate.estimates.plausibility import unit_faults
+from bayesplate.estimates.plausibility import require_plausible
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board
 from bayesplate.plate.from_card import board_from_card
@@ -112,7 +112,7 @@ def prepare(
         Every schema fault at once; if there is none, every physical fault at once; if there is none, what all
         frequencies together say of their unit.
     NotIdentifiableError
-        If the sides are those of the printed table that the card names, exchanged.
+        If the sides or the orders of the labels seem to be exchanged.
     """
     given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
     if not isinstance(card, Board):
@@ -135,10 +135,9 @@ def _prepared(read: BoardCard, named: NamedCards, effects: Sequence[str] | None)
     if not faults:
         require_sides(board)
     faults += coefficient_faults(board)
-    if named.prior is not None and not faults:
-        faults = unit_faults(board, named.prior, np.random.default_rng(0))
     if faults or named.prior is None:
         raise InputError(faults)
+    require_plausible(board, named.prior, np.random.default_rng(0))
     told = (*board.notes, *remarks(read, board.effects), *notes(board))
     return Prepared(read, named, stated, declare(replace(board, notes=told)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import made_boards
@@ -9,8 +10,20 @@ import numpy as np
 import pytest
 import ritz
 
-from bayesplate.cards import card_names, load_board, load_prior
-from bayesplate.estimates.plausibility import FASTEST, SLOWEST, plate_speed, prior_predictive, unit_faults
+from bayesplate.cards import PriorCard, card_names, load_board, load_prior
+from bayesplate.errors import InputError, NotIdentifiableError
+from bayesplate.estimates.plausibility import (
+    FASTEST,
+    LIGHTEST_WOOD,
+    MOST_ORTHOTROPIC,
+    SLOWEST,
+    PriorPredictive,
+    plate_speed,
+    prior_predictive,
+    require_plausible,
+    unusual,
+)
+from bayesplate.labels import Label
 from bayesplate.plate.board import Board, density, made_board
 from bayesplate.plate.from_card import board_from_card
 from bayesplate.plate.parameter import BOARD
@@ -47,7 +60,18 @@ def measured_as(board: Board, factor: float, names: tuple[str, ...]) -> Board:
 
 
 def asked(board: Board, prior: str) -> str:
-    return " ".join(str(fault) for fault in unit_faults(board, load_prior(prior), np.random.default_rng(0)))
+    """The question; empty where none is asked."""
+    try:
+        require_plausible(board, load_prior(prior), np.random.default_rng(0))
+    except (InputError, NotIdentifiableError) as error:
+        return str(error)
+    return ""
+
+
+def foretold(board: Board, prior: PriorCard, rng: np.random.Generator) -> PriorPredictive:
+    (found,) = prior_predictive(board, prior, rng)
+    assert found is not None
+    return found
 
 
 @pytest.mark.parametrize("name", card_names("boards"))
@@ -68,7 +92,7 @@ def test_shipped_boards_are_asked_nothing_and_units_are_asked_about(name, prior)
 def test_a_prior_that_knows_the_wood_also_asks_about_a_factor_of_ten(name):
     board = board_of(name, "spruce")
 
-    assert "or are all three lengths in cm?" in asked(measured_as(board, 0.1, (*SIDES, "thickness")), "spruce")
+    assert "are all three lengths in cm?" in asked(measured_as(board, 0.1, (*SIDES, "thickness")), "spruce")
     assert "is thickness_mm ten times too large" in asked(measured_as(board, 10.0, ("thickness",)), "spruce")
 
 
@@ -105,7 +129,7 @@ def test_the_prior_predictive_is_that_of_the_prior():
     prior, board = load_prior("spruce"), board_of("spruce-free-2R", "spruce")
     exact = {name: Quantity.exact(quantity.mean) for name, quantity in board.inputs.items()}
     board = board.with_priors(exact)
-    found = prior_predictive(board, prior, np.random.default_rng(1))
+    found = foretold(board, prior, np.random.default_rng(1))
     labels = [reading.beams for reading in board.setups[0].readings]
     sizes = {name: quantity.mean for name, quantity in exact.items()}
     plate = ritz.Plate.from_moduli(
@@ -126,10 +150,89 @@ def test_the_prior_predictive_is_that_of_the_prior():
 def test_the_distance_is_chi_squared_where_the_prior_holds():
     """Mean n of boards drawn from it, within three standard errors (the slack widens three directions a little)."""
     prior, board = load_prior("spruce"), board_of("spruce-free-2R", "spruce")
-    found = prior_predictive(board, prior, np.random.default_rng(1))
+    found = foretold(board, prior, np.random.default_rng(1))
     rng = np.random.default_rng(2)
-    drawn = prior_predictive(board, prior, rng).draws[:400]
+    drawn = foretold(board, prior, rng).draws[:400]
     distances = [found.distance(row + 0.1 * rng.standard_normal(row.size)) for row in drawn]
     n = drawn.shape[1]
 
     assert np.mean(distances) == pytest.approx(n, abs=3 * np.sqrt(2 * n / 400) + 0.1)
+
+
+def of_spruce(E_x: float = 11e9, E_y: float = 0.95e9, **sizes: float) -> tuple[ritz.Plate, Board]:
+    """A free guitar half-top of known constants by an independent solver, its mass known and its density not."""
+    size = {"L_x": 0.55, "L_y": 0.2, "h": 2.8e-3} | sizes
+    plate = ritz.Plate.from_moduli(E_x, E_y, 0.67e9, 0.4, rho=406.0, edges=ritz.ALL_FREE, **size)
+    setup = made_boards.setup_of(ritz.ALL_FREE, ritz.simulate(plate, made_boards.FREE_LABELS))
+    mass = Quantity.exact(plate.rho * plate.h * plate.L_x * plate.L_y)
+    return plate, made_boards.board_of(plate, [setup], mass=mass)
+
+
+def transposed(board: Board) -> Board:
+    """The same with every label (m,n) written as (n,m)."""
+    setups = tuple(
+        replace(
+            s, readings=tuple(replace(r, label=Label(r.label.n, r.label.m), beams=r.beams[::-1]) for r in s.readings)
+        )
+        for s in board.setups
+    )
+    return replace(board, setups=setups)
+
+
+def with_sizes(board: Board, **metres: float) -> Board:
+    return board.with_priors({name: Quantity.exact(value) for name, value in metres.items()})
+
+
+ORIENTATIONS = {
+    "lengths": (lambda b: with_sizes(b, length_x=0.2, length_y=0.55), "are length_x_mm and length_y_mm exchanged"),
+    "labels": (transposed, "are all labels (m,n) written as (n,m)?"),
+    "grain": (lambda b: transposed(with_sizes(b, length_x=0.2, length_y=0.55)), "is y along the grain? x should be"),
+}
+
+
+@pytest.mark.parametrize("case", ORIENTATIONS)
+def test_exchanged_lengths_labels_or_grain_are_asked_about(case):
+    change, question = ORIENTATIONS[case]
+    _, board = of_spruce()
+
+    assert asked(board, "spruce") == asked(board, "weakly-informative") == ""
+    with pytest.raises(NotIdentifiableError, match=re.escape(question)):
+        require_plausible(change(board), load_prior("spruce"), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("case", ["lengths", "grain"])
+def test_a_plate_of_no_material_is_refused_under_any_prior_and_no_unit_is_blamed(case):
+    """nu_xy nu_yx above 1: such a plate has no frequencies, so there is nothing to be fitted."""
+    _, board = of_spruce()
+    told = asked(ORIENTATIONS[case][0](board), "weakly-informative")
+
+    assert "nu_xy nu_yx is below 1, so E_y below 6.25 E_x" in told
+    assert ORIENTATIONS[case][1] in told
+    assert " cm" not in told
+    assert "ten times" not in told
+
+
+@pytest.mark.parametrize(("factor", "question"), [(10.0, "is thickness_mm ten times too large?"),
+                                                  (0.1, "is thickness_mm ten times too small?")])  # fmt: skip
+def test_a_thickness_off_by_ten_is_asked_about_where_the_mass_is_known(factor, question):
+    """Its density is then off too, so that the frequencies are by 10^1.5 and not by 10."""
+    _, board = of_spruce()
+
+    assert question in asked(with_sizes(board, thickness=2.8e-3 * factor), "spruce")
+
+
+def test_what_is_unusual_is_told_and_what_is_usual_is_not():
+    prior = load_prior("spruce")
+
+    def told(plate, board):
+        return " ".join(unusual(board, prior, np.array([plate.D_x, plate.D_y, plate.D_s])))
+
+    assert told(*of_spruce()) == ""
+    assert "E_x comes out as 40 GPa, expected were" in told(*of_spruce(E_x=40e9))
+    assert "times as large as E_y, more than in any wood" in told(*of_spruce(E_y=11e9 / (1.02 * MOST_ORTHOTROPIC)))
+    assert "times as large as E_y" not in told(*of_spruce(E_y=11e9 / (0.98 * MOST_ORTHOTROPIC)))
+    plate, board = of_spruce(E_y=22e9)
+    assert "E_y comes out 2 times as large as E_x: is x along the grain?" in told(plate, board)
+    for share, is_told in ((0.98, True), (1.02, False)):
+        mass = share * LIGHTEST_WOOD * plate.L_x * plate.L_y * plate.h
+        assert ("lighter than balsa" in told(plate, board.with_priors({"mass": Quantity.exact(mass)}))) is is_told

@@ -1,4 +1,4 @@
-"""A card whose frequencies or lengths are in another unit, or whose sides are exchanged, is asked about."""
+"""A card whose frequencies or lengths are in another unit, or whose sides or grain are exchanged, is asked about."""
 
 from __future__ import annotations
 

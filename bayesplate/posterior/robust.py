@@ -1,0 +1,69 @@
+"""Where Student's likelihood is highest: at constants that most readings agree on, whatever one of them says.
+
+Under normal errors one wrong reading pulls the constants after it. Under Student's they have a second peak, where the
+noise is small and that reading lies far off; a sampler that starts at the first one does not find it. Both are sought
+to first order, from the constants of all readings and from those of all but one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.least_squares import Estimate
+from bayesplate.plate.board import Board
+from bayesplate.plate.densities import STUDENT
+from bayesplate.plate.readings import reading_sd
+
+Floats = NDArray[np.float64]
+
+_NOISE_SDS = np.linspace(-1.0, 10.0, 23)
+_N_STEPS = 60
+
+
+def highest_student(board: Board, estimate: Estimate) -> tuple[Floats, Floats]:
+    """Rigidities and noise where the readings are most probable under Student's errors, to first order.
+
+    Parameters
+    ----------
+    board : Board
+    estimate : Estimate
+        By weighted least squares of all readings.
+
+    Returns
+    -------
+    rigidities : (3,) array, N m
+    noise : (n_setups,) array
+        Relative.
+    """
+    residuals, slopes = estimate.residuals, estimate.sensitivities
+    noises = np.stack([setup.noise.median * np.exp(setup.noise.log_sd * _NOISE_SDS) for setup in board.setups], axis=1)
+    scales = np.stack([reading_sd(board.setups, noise) for noise in noises])[:, None, :]
+    kept = np.concatenate([np.ones((1, residuals.size)), 1.0 - np.eye(residuals.size)])
+    steps = _weighted(kept / scales**2, slopes, residuals)
+    for _ in range(_N_STEPS):
+        steps = _weighted(student_weights((residuals - steps @ slopes.T) / scales) / scales**2, slopes, residuals)
+    z = (residuals - steps @ slopes.T) / scales
+    information = _information(student_weights(z) / scales**2, slopes)
+    log_density = np.sum(STUDENT.log(z) - np.log(scales), axis=-1) - 0.5 * np.linalg.slogdet(information)[1]
+    log_density -= 0.5 * _NOISE_SDS[:, None] ** 2
+    level, start = np.unravel_index(np.argmax(log_density), log_density.shape)
+    return estimate.rigidities * np.exp(steps[level, start]), noises[level]
+
+
+def student_weights(z: Floats) -> Floats:
+    """Weight of each reading in the sum of squares that peaks where Student's density does: 0 to 1.25."""
+    return np.asarray(STUDENT.slope(z) / np.where(z == 0.0, 1.0, z) + STUDENT.curvature * (z == 0.0))
+
+
+def _weighted(weights: Floats, slopes: Floats, residuals: Floats) -> Floats:
+    """Steps of weighted least squares: (..., 3) array."""
+    wanted = np.einsum("...i,ij,i->...j", weights, slopes, residuals)
+    return np.asarray(np.linalg.solve(_information(weights, slopes), wanted[..., None])[..., 0])
+
+
+def _information(weights: Floats, slopes: Floats) -> Floats:
+    """Information of the readings on ln D_x, ln D_y, ln D_s: (..., 3, 3) array; a little more, so that none is open."""
+    found = np.einsum("ij,...i,ik->...jk", slopes, weights, slopes)
+    trace = np.trace(found, axis1=-2, axis2=-1)[..., None, None]
+    return np.asarray(found + 1e-9 * trace * np.eye(slopes.shape[1]))
