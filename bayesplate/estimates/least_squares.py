@@ -22,7 +22,7 @@ from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
 from bayesplate.plate.setup import Setup
 
-_MOST_STEPS = 40
+MOST_STEPS = 40
 _LONGEST_STEP = 0.7
 _CONVERGED = 1e-9
 _SMALL = 1e-5
@@ -71,13 +71,15 @@ def log_measured(board: Board) -> NDArray[np.float64]:
     return np.log(np.concatenate([setup.measured for setup in board.setups]))
 
 
-def weighted_least_squares(board: Board) -> Estimate:
+def weighted_least_squares(board: Board, most_steps: int = MOST_STEPS) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
 
     Parameters
     ----------
     board : Board
         Every setup with at least one reading.
+    most_steps : int
+        After which they end, settled or not.
 
     Returns
     -------
@@ -90,7 +92,7 @@ def weighted_least_squares(board: Board) -> Estimate:
     log_next = np.log(starting_rigidities(board))
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
-    for _ in range(_MOST_STEPS):
+    for _ in range(most_steps):
         rigidities = np.exp(log_next)
         values = inputs | dict(zip(RIGIDITIES, rigidities, strict=True))
         models = tuple(setup_model(system, values) for system in systems)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
+from bayesplate.estimates.marginal import log_probability
 from bayesplate.estimates.refit import N_CONSTANTS, most_likely, normal_misfit, sensitivities
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
@@ -203,18 +204,11 @@ class Readings:
     def _by_noise(self, fit: _Fit, left_out: tuple[int, ...]) -> Floats:
         """ln of the same at each noise level, times its prior: (n_levels,) array."""
         kept = np.setdiff1d(np.arange(self.target.size), left_out)
-        constants, inputs = fit.slopes[kept, :N_CONSTANTS], fit.slopes[kept, N_CONSTANTS:]
+        inputs = fit.slopes[kept, N_CONSTANTS:]
         # measured from the middle of the inputs' priors, so that their own departure counts
         residuals = fit.residuals[kept] + inputs @ fit.inputs
-        covariance = self._variances[:, kept, None] * np.eye(kept.size) + inputs @ inputs.T
-        weighted = np.linalg.solve(covariance, np.column_stack([constants, residuals])[None])
-        information = constants.T @ weighted[..., :N_CONSTANTS]
-        seen = constants.T @ weighted[..., N_CONSTANTS:]
-        explained = (np.swapaxes(seen, 1, 2) @ np.linalg.solve(information, seen))[:, 0, 0]
-        squares = weighted[..., N_CONSTANTS] @ residuals - explained
-        volumes = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(information)[1]
-        n_spare = kept.size - N_CONSTANTS
-        return np.asarray(-0.5 * (squares + volumes + n_spare * np.log(2.0 * np.pi) + _NOISE_SDS**2))
+        found = log_probability(residuals, fit.slopes[kept, :N_CONSTANTS], self._variances[:, kept], inputs)
+        return found - 0.5 * _NOISE_SDS**2
 
 
 def slip_remarks(posterior: Posterior, centre: Floats) -> tuple[str, ...]:
