@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
 from bayesplate.report.style import PAPER, POSTERIOR, SMALL, WEIGHTED, WORDS, Picture, legend_below, plain_axes, stacked
+from bayesplate.report.symbols import in_figure
 from bayesplate.results.summary import Percentile, Summary
 from bayesplate.results.words import GPA, STIFFNESS, interval, plus_minus
 
@@ -69,7 +70,7 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
 
 def modulus_title(name: str) -> str:
     """What stands above the panel of a modulus."""
-    return f"{name}: {STIFFNESS[name]}"
+    return f"{in_figure(name)}: {STIFFNESS[name]}"
 
 
 def _draw(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64]) -> None:
