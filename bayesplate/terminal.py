@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bayesplate.columns import laid_out
 from bayesplate.errors import BayesplateError, Fault, UnwritableError
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ INTERNAL = 70
 def print_shown(shown: Shown) -> None:
     """Tables, remarks, warnings and the closing words on the standard output."""
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
     # Laid out apart from the output: rich itself would end the program where a reader like `head` has closed the pipe.
@@ -35,12 +35,7 @@ def print_shown(shown: Shown) -> None:
         file=printed, width=output.width, force_terminal=output.is_terminal, soft_wrap=False, highlight=False
     )
     for table in shown.tables:
-        laid_out = Table(title=Text(table.title), title_justify="left", title_style="bold")
-        for i, column in enumerate(table.columns):
-            laid_out.add_column(Text(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
-        for row in table.rows:
-            laid_out.add_row(*(Text(cell) for cell in row))
-        console.print(laid_out)
+        console.print(laid_out(table, output.width))
     for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
         console.print(Text(sentence))
     console.print(Text(shown.closing))

@@ -4,6 +4,7 @@
 sizes, says how much a constant moves when the prior or the likelihood is raised to a power a little above or below one,
 and leaves one reading out by weighing the draws. Where a Pareto k exceeds 0.7 the draws cannot stand for a posterior
 that has not seen that reading; with six readings this is common, and it is why the package refits for its own errors.
+Beside the weights stands what a refit without the reading gives, where the other readings determine the constants.
 
     python examples/arviz_checks.py pareto.png
 """
@@ -12,8 +13,11 @@ from __future__ import annotations
 
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import bayesplate
 
@@ -40,8 +44,10 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
     -------
     dict
         rhat_max, ess_min: of the constants by ArviZ, and `own` by the package, of the sampled columns; likelihood,
-        constants, noise: sensitivity of each constant to the likelihood, and to the prior of either; pareto_k: by
-        reading; effective_parameters.
+        constants, noise: sensitivity of each constant to the likelihood, and to the prior of either; by reading:
+        pareto_k, leverage, weighed and refitted (ln density of the reading given the others, by ArviZ's weights and by
+        refits; None where the others leave a constant open), left_out_cents (the package's own error); and
+        effective_parameters.
     """
     result = bayesplate.fit(card, seed=seed)
     data = result.to_arviz()
@@ -49,11 +55,16 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
     table = arviz.summary(data, var_names=names, round_to=8)
     loo = left_out(data)
     own = result.summary.sampler
+    labels, modes = result.problem.labels, result.summary.modes
     numbers = {
         "rhat_max": float(table["r_hat"].max()),
         "ess_min": float(table["ess_bulk"].min()),
         "own": {"rhat_max": own.rhat_max, "ess_min": own.ess_min},
-        "pareto_k": dict(zip(result.problem.labels, (float(k) for k in loo.pareto_k), strict=True)),
+        "pareto_k": dict(zip(labels, (float(k) for k in loo.pareto_k), strict=True)),
+        "leverage": {label: mode.leverage for label, mode in zip(labels, modes, strict=True)},
+        "weighed": dict(zip(labels, (float(one) for one in loo.loo_i), strict=True)),
+        "refitted": {label: refitted(result.problem, i, seed) for i, label in enumerate(labels)},
+        "left_out_cents": {label: mode.left_out_cents for label, mode in zip(labels, modes, strict=True)},
         "effective_parameters": float(getattr(loo, "p_loo", None) or loo.p),
     }
     for factor in ("likelihood", "constants", "noise"):
@@ -68,6 +79,19 @@ def left_out(data: Any) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return arviz.loo(data, pointwise=True)
+
+
+def refitted(problem: bayesplate.Problem, index: int, seed: int) -> float | None:
+    """ln density of a reading of a board with one setup, under the posterior of all others; None if that is open."""
+    (setup,) = problem.board.setups
+    others = setup.readings[:index] + setup.readings[index + 1 :]
+    try:
+        without = bayesplate.fit(replace(problem.board, setups=(replace(setup, readings=others),)), seed=seed)
+    except bayesplate.NotIdentifiableError:
+        return None
+    theta = without.draws.flat
+    density = problem.log_likelihood(theta) - without.problem.log_likelihood(theta)
+    return float(np.logaddexp.reduce(density) - np.log(len(density)))
 
 
 def sensitivity(data: Any, factor: str) -> dict[str, float]:
@@ -103,4 +127,8 @@ if __name__ == "__main__":
         told = ", ".join(f"{factor} {found[factor][constant]:.3f}" for factor in ("likelihood", "constants", "noise"))
         print(f"{constant:5s} sensitivity to the likelihood and to the priors: {told}")
     for label, k in found["pareto_k"].items():
-        print(f"{label} Pareto k {k:.2f}" + (" (weights do not serve)" if k > UNRELIABLE else ""))
+        refit = found["refitted"][label]
+        print(
+            f"{label} Pareto k {k:.2f}, ln density by weights {found['weighed'][label]:.2f}, by a refit "
+            + ("not to be had: the others leave a constant open" if refit is None else f"{refit:.2f}")
+        )

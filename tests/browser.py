@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import select
 import shutil
 import subprocess
@@ -80,6 +81,15 @@ class Page:
         """The whole page as a PNG."""
         answer = self.ask("Page.captureScreenshot", format="png", captureBeyondViewport=True)
         path.write_bytes(b64decode(answer["data"]))
+
+    def prefer(self, scheme: str) -> None:
+        """Let the reader prefer a light or a dark page."""
+        self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
+    def printed(self, width: float, height: float) -> int:
+        """On how many sheets of paper the page comes out; inches."""
+        answer = self.ask("Page.printToPDF", paperWidth=width, paperHeight=height, preferCSSPageSize=False)
+        return len(re.findall(rb"/Type\s*/Page\b(?!s)", b64decode(answer["data"])))
 
 
 class Browser:

@@ -13,11 +13,17 @@ from runs import files_in
 
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.terminal import print_shown
 from bayesplate.workflow.shown import show_fit
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGE = (ROOT / "docs" / "how_to" / "use_from_python.md").read_text(encoding="utf-8")
+PAGE, ARVIZ = (
+    (ROOT / "docs" / "how_to" / name).read_text(encoding="utf-8")
+    for name in ("use_from_python.md", "check_with_arviz.md")
+)
+LONGEST = 90
+"""Lines of the README that are not empty: a screen and a half."""
 USED = {"results/finnish-spruce-cantilever/summary.json": b"{}", "results/my-board/summary.json": b"{}"}
 
 
@@ -38,17 +44,33 @@ def used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_the_readme_runs_writes_nothing_and_prints_the_tables_of_make_fit(used, capsys):
-    found = run_all(README)
-    summary = found["result"].summary
-    shown = show_fit(summary)
-    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in README.splitlines() if "│" in line]
-    wanted = [list(row) for table in shown.tables for row in table.rows]
+def test_the_readme_runs_writes_nothing_and_prints_what_a_terminal_of_80_columns_does(used, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    summary = run_all(README)["result"].summary
+    (block,) = re.findall(r"```\n(Elastic constants.*?)```", README, re.DOTALL)
 
     assert capsys.readouterr().out.split() == [str(summary.elastic.E_x.mean), str(summary.elastic.E_x.sd)]
     assert files_in(used) == USED
-    assert rows == wanted
-    assert all(" ".join(text.split()) in " ".join(README.split()) for text in (*shown.remarks, shown.closing))
+    print_shown(show_fit(summary))
+    assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == block.splitlines()
+
+
+def test_the_readme_is_short_and_its_links_lead_somewhere():
+    lines = [line for line in README.splitlines() if line.strip() and not line.startswith(("```", "<!--"))]
+    links = re.findall(r"\]\(([^)#]+)\)", README)
+
+    assert len(lines) <= LONGEST
+    assert len(links) > 5
+    assert [link for link in links if not (ROOT / link).exists()] == []
+    assert "    make fit " in README
+    assert "    make test " in README
+
+
+def test_the_page_on_arviz_runs(used):
+    found = run_all(ARVIZ)
+
+    assert (len(found["setup"].readings), len(found["others"])) == (6, 5)
+    assert files_in(used) == USED
 
 
 def test_the_page_on_python_runs(used, monkeypatch, capsys):

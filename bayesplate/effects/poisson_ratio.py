@@ -47,7 +47,7 @@ class PoissonRatio(Effect):
         """Only a ratio that the card gives as exact can be set free."""
         stated = board.inputs["poisson_xy"]
         if not stated.is_exact and stated != FREE_POISSON:
-            return f"poisson_xy is already uncertain ({stated.mean:g} +- {stated.sd:g}) and so part of every fit"
+            return f"poisson_xy is already uncertain ({stated.mean:g} ± {stated.sd:g}) and so part of every fit"
         return ""
 
     def parameters(self) -> tuple[Parameter, ...]:

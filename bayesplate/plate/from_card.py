@@ -118,5 +118,5 @@ def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCar
 def _notes(card: BoardCard, poisson: Quantity) -> tuple[str, ...]:
     notes = []
     if card.material.poisson_is_default:
-        notes.append(f"the card gives no Poisson ratio: nu_xy = {poisson.mean:g} +- {poisson.sd:g} was assumed")
+        notes.append(f"the card gives no Poisson ratio: nu_xy = {poisson.mean:g} ± {poisson.sd:g} was assumed")
     return tuple(notes)

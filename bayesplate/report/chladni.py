@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.report.style import drawable
+from bayesplate.report.symbols import in_figure
 from bayesplate.results.words import STIFFNESS
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> No
     for column, one in enumerate(sheet.combined):
         panel = _panel(figure, wide, _left(wide, column, len(sheet.combined)), top - _BETWEEN + _GAP / 2, sheet)
         _draw_mixture(panel, one)
-        _caption(panel, one.name, f"{STIFFNESS[one.modulus]}, {one.modulus}")
+        _caption(panel, one.name, f"{STIFFNESS[one.modulus]}, {in_figure(one.modulus)}")
 
 
 def _left(plan: Layout, column: int, in_row: int) -> float:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
 from bayesplate.report.style import PAPER, POSTERIOR, SMALL, WEIGHTED, WORDS, Picture, legend_below, plain_axes, stacked
+from bayesplate.report.symbols import in_figure
 from bayesplate.results.summary import Percentile, Summary
-from bayesplate.results.words import GPA, STIFFNESS
+from bayesplate.results.words import GPA, STIFFNESS, interval, plus_minus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +58,7 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
         _draw(panel, name, summary, moduli[name])
     legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
     told = "; ".join(
-        f"{name} {entry.mean * GPA:.3g} GPa, nine times in ten between {entry.q05 * GPA:.3g} and {entry.q95 * GPA:.3g}"
+        f"{name} {plus_minus(entry, GPA)} GPa, nine times in ten {interval(entry, GPA)}"
         for name, entry in summary.elastic.items()
     )
     caption = (
@@ -69,7 +70,7 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
 
 def modulus_title(name: str) -> str:
     """What stands above the panel of a modulus."""
-    return f"{name}: {STIFFNESS[name]}"
+    return f"{in_figure(name)}: {STIFFNESS[name]}"
 
 
 def _draw(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64]) -> None:
@@ -96,7 +97,7 @@ def _draw(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64])
     _mark(panel, weighted, limits, "weighted least squares", color=WEIGHTED, ls="--", lw=1.2)
     panel.set(xlim=limits, ylim=(0, 1.04), yticks=[])
     panel.set_title(modulus_title(name), fontsize=WORDS, loc="left", weight="bold")
-    panel.set_xlabel(f"GPa    ({entry.mean * GPA:.3g} ± {entry.sd * GPA:.2g})", fontsize=SMALL)
+    panel.set_xlabel(f"GPa    ({plus_minus(entry, GPA)})", fontsize=SMALL)
     panel.spines["left"].set_visible(False)
 
 

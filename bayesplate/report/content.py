@@ -26,9 +26,10 @@ from bayesplate.results.words import (
     number,
     percent,
     plus_minus,
+    rounded,
+    two_digits,
 )
 
-_ALIKE = 1e-9
 _MAKERS = (
     ("wave_speed", "wave speed c", 1.0, "m/s"),
     ("radiation_ratio", "radiation ratio c/ρ", 1.0, "m⁴/(kg s)"),
@@ -51,12 +52,12 @@ def summary_sentences(summary: Summary) -> list[str]:
     else:
         sentences.append(f"{missed}; a mode that it has not seen, by {_cents(left_out)}.")
     share, weakest = max((entry.sd / entry.mean, name) for name, entry in summary.elastic.items())
-    sentences.append(f"Least well known is {constant_name(weakest)}: ± {percent(share, 1)}.")
+    sentences.append(f"Least well known is {constant_name(weakest)}: ± {two_digits(share, 100)} %.")
     return sentences
 
 
 def _cents(value: float) -> str:
-    return f"{value:.0f} cents ({100 * (2 ** (value / 1200) - 1):.1f} %)"
+    return f"{two_digits(value)} cents ({two_digits(2 ** (value / 1200) - 1, 100)} %)"
 
 
 def constants_table(summary: Summary) -> Table:
@@ -67,19 +68,20 @@ def constants_table(summary: Summary) -> Table:
         digits = decimals(entry.sd * GPA)
         points = (summary.least_squares, summary.weighted_least_squares)
         cells = (number(estimate[name], digits, factor=GPA) for estimate in points)
-        trimmed = _trimmed(summary.percentile, name, digits)
+        trimmed = _trimmed(summary.percentile, name)
         rows.append((constant_name(name), plus_minus(entry, GPA), interval(entry, GPA), *cells, trimmed))
     columns = ("GPa", "mean ± sd", "90 % interval", "paper's least squares", "weighted", "percentile method")
     return Table("Elastic constants", columns, tuple(rows))
 
 
-def _trimmed(percentile: Percentile | None, name: str, digits: int) -> str:
+def _trimmed(percentile: Percentile | None, name: str) -> str:
     """The percentile method's mean and its own spread, GPa."""
     if percentile is None or (mean := percentile[name].mean) is None:
         return MISSING
     sd_percent = percentile[name].sd_percent
-    spread = "" if sd_percent is None else f" ± {mean * GPA * sd_percent / 100:.{digits}f}"
-    return number(mean, digits, factor=GPA) + spread
+    if sd_percent is None:
+        return number(mean, 3, factor=GPA)
+    return " ± ".join(text for text in rounded(mean * GPA, mean * GPA * sd_percent / 100) if text)
 
 
 def makers_table(summary: Summary) -> Table:
@@ -115,13 +117,7 @@ def effects_table(summary: Summary) -> Table | None:
 def _measured(entry: Spread) -> tuple[str, str]:
     """Mean ± sd and the unit, in the unit that people use."""
     factor, unit = unit_of_people(entry.unit)
-    return _spread(entry, factor), unit or MISSING
-
-
-def _spread(entry: Spread, factor: float) -> str:
-    """Mean ± sd of a number of any size."""
-    mean, sd = entry.mean * factor, entry.sd * factor
-    return f"{mean:.4g}" if sd <= _ALIKE * abs(mean) else f"{mean:.3g} ± {sd:.2g}"
+    return plus_minus(entry, factor), unit or MISSING
 
 
 def effect_sentences(summary: Summary) -> list[str]:
@@ -140,7 +136,7 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
         board = inference.problem.board
         named = {one.name: input_words(one, board)[0] for one in board.uncertain}
         told = [f"{named[key]} {percent(share)}" for key, share in largest if share >= 0.05]
-        both = (f"{100 * entry.sd / entry.mean:.1f} %", f"{100 * alone[name]:.1f} %")
+        both = (f"{two_digits(entry.sd / entry.mean, 100)} %", f"{two_digits(alone[name], 100)} %")
         rows.append((name, *both, ", ".join(told) or MISSING))
     columns = ("constant", "sd", "from the expected noise alone", "share of the variance from inputs")
     return Table("Where the uncertainty comes from", columns, tuple(rows))
@@ -151,7 +147,7 @@ def inputs_table(board: Board, summary: Summary) -> Table:
     rows = []
     for one in board.parameters:
         words, factor, unit = input_words(one, board)
-        after = _spread(summary.inputs[one.name], factor) if one.name in summary.inputs else MISSING
+        after = plus_minus(summary.inputs[one.name], factor) if one.name in summary.inputs else MISSING
         rows.append((f"{words}, {unit}" if unit else words, _stated(one.prior, factor), after))
     return Table("Inputs", ("quantity", "as stated", "after the fit"), tuple(rows))
 
@@ -161,7 +157,7 @@ def _stated(quantity: Quantity, factor: float) -> str:
         return f"{quantity.mean * factor:.6g} (taken as exact)"
     n = len(quantity.readings)
     readings = f", {n} reading{'s' * (n != 1)}" if n else ""
-    return f"{quantity.mean * factor:.5g} ± {quantity.sd * factor:.2g}{readings}"
+    return plus_minus(quantity, factor) + readings
 
 
 def setups_table(board: Board) -> Table:
@@ -213,11 +209,11 @@ def model_rows(summary: Summary) -> list[tuple[str, str]]:
     noise = "Student's distribution (robust)" if model.robust else "normal distribution"
     return [
         ("plate theory", model.theory),
-        ("frequency law", f"{model.law}; the linear one is off by {number(error.linearisation_rms_cents, 1)} cents"),
+        ("frequency law", f"{model.law}; the linear one is off by {two_digits(error.linearisation_rms_cents)} cents"),
         ("declared effects", effects),
         ("noise of a reading", noise),
         ("prior card", model.prior),
-        ("exact law checked", f"within {error.exact_law_worst_cents:.2g} cents of full solves"),
+        ("exact law checked", f"within {two_digits(error.exact_law_worst_cents)} cents of full solves"),
     ]
 
 

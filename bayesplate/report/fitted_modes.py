@@ -74,7 +74,7 @@ def fitted_modes_picture(
         draw_sand(panel, shapes[mode.label])
         _caption(panel, mode)
     told = "; ".join(
-        f"{mode.label} measured {mode.measured_hz:.5g} Hz, predicted {mode.predicted_hz.mean:.5g} Hz"
+        f"{mode.label} measured {mode.measured_hz:.6g} Hz, predicted {mode.predicted_hz.mean:.1f} Hz"
         for mode in ordered
     )
     title = f"Chladni figures of the fitted modes, setup {setup.name}"
@@ -85,10 +85,6 @@ def _caption(panel: Axes, mode: ModeRow) -> None:
     """Name, measured and predicted frequency below a panel."""
     common: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
     panel.annotate(mode.label, (0.5, 0.0), (0, -5), fontsize=WORDS, weight="bold", **common)
-    panel.annotate(f"measured {_hertz(mode.measured_hz)}", (0.5, 0.0), (0, -16), fontsize=SMALL, **common)
-    predicted = f"predicted {_hertz(mode.predicted_hz.mean)}"
+    panel.annotate(f"measured {mode.measured_hz:.6g} Hz", (0.5, 0.0), (0, -16), fontsize=SMALL, **common)
+    predicted = f"predicted {mode.predicted_hz.mean:.1f} Hz"
     panel.annotate(predicted, (0.5, 0.0), (0, -26), fontsize=SMALL, color=DARK, **common)
-
-
-def _hertz(value: float) -> str:
-    return f"{value:.4g} Hz"

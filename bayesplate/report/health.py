@@ -9,6 +9,7 @@ import numpy as np
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.inference import Inference
 from bayesplate.report.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, Picture, legend_below, stacked
+from bayesplate.report.symbols import in_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +33,7 @@ def health_picture(inference: Inference) -> Picture:
     chains, convergence = inference.chains, inference.convergence
     n_ensembles, n_steps, _, _ = chains.draws.shape
     names = [*RIGIDITIES, "noise"]
-    figure, panels = stacked([0.72] * len(names), left=0.6, bottom=0.78, gap=0.16)
+    figure, panels = stacked([0.68] * len(names), left=0.62, right=0.25, top=0.26, bottom=0.78, gap=0.34)
     every = max(1, n_steps // _MOST_POINTS)
     steps = np.arange(0, n_steps, every)
     for i, (panel, name) in enumerate(zip(panels, names, strict=True)):
@@ -43,7 +44,7 @@ def health_picture(inference: Inference) -> Picture:
         if chains.burn_in:
             panel.axvspan(0, chains.burn_in, color=LIGHT, lw=0, zorder=0, label="left out: burn-in")
         settled = means[:, steps >= chains.burn_in]
-        label = f"{name}, %" if name == "noise" else f"{name}, N m"
+        label = "noise, %" if name == "noise" else f"{in_figure(name)}, N m"
         _frame(panel, settled, label, n_steps, is_last=panel is panels[-1])
     legend_below(figure, panels[0].get_legend_handles_labels()[0], 3)
     alt = (
@@ -61,7 +62,8 @@ def _frame(panel: Axes, settled: np.ndarray, label: str, n_steps: int, *, is_las
     low, high = np.quantile(settled, _SHOWN)
     margin = 0.25 * (high - low) + 1e-12
     panel.set(xlim=(0, n_steps), ylim=(low - margin, high + margin))
-    panel.set_ylabel(label, fontsize=SMALL)
+    panel.set_title(label, fontsize=SMALL, loc="left", pad=3)
+    panel.ticklabel_format(axis="y", useOffset=False)
     panel.locator_params(axis="y", nbins=4)
     if is_last:
         panel.set_xlabel("step", fontsize=SMALL)

@@ -1,4 +1,4 @@
-"""report.html: one page that holds everything a fit or a diagnosis found, its figures within, readable on a phone."""
+"""report.html: everything that a fit or a diagnosis found, figures within; two pages on paper, readable on a phone."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ from bayesplate.report.saving import save_pictures
 from bayesplate.report.shares import shares_picture
 from bayesplate.report.signatures import before_after_picture, signatures_picture
 from bayesplate.report.style import Picture, visible
+from bayesplate.report.symbols import in_page
 from bayesplate.report.verdict import diagnosis_section
 from bayesplate.results.exports import write_exports
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
@@ -134,12 +135,12 @@ def pictures(
         "diagnosis_first": first,
         "diagnosis_more": more,
         "constants": [constants_picture(summary, draws.moduli)],
-        "percentiles": percentiles_pictures(inference, draws),
-        "weak": [shares_picture(summary, problem.identifiability)],
         "board": [board_picture(board)],
         "modes": modes_pictures(inference, draws, summary),
         "errors": [residuals_picture(summary)],
         "folded": [
+            shares_picture(summary, problem.identifiability),
+            *percentiles_pictures(inference, draws),
             predictive_picture(summary, draws.predictive),
             priors_picture(problem, draws),
             pairs_picture(problem, draws),
@@ -236,7 +237,7 @@ def render(
     )
 
 
-PLACES = ("diagnosis_first", "diagnosis_more", "constants", "percentiles", "weak", "board", "modes", "errors", "folded")
+PLACES = ("diagnosis_first", "diagnosis_more", "constants", "board", "modes", "errors", "folded")
 """Where pictures stand on the page."""
 
 
@@ -260,4 +261,5 @@ def _template() -> Any:
 
     loader = PackageLoader("bayesplate.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=cleaned)
+    environment.filters["symbols"] = lambda text: in_page(visible(str(text)))
     return environment.get_template("report.html")

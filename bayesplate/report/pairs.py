@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.report.priors import input_words
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, plain_axes, short
+from bayesplate.report.symbols import in_figure
 from bayesplate.results.budget import input_shares
 from bayesplate.results.words import GPA
 
@@ -115,17 +117,23 @@ def _label(panel: Axes, below: str, beside: str, side: float) -> None:
     panel.tick_params(labelsize=SMALL - 1.5)
     if below:
         panel.tick_params(axis="x", labelrotation=45)
-        panel.set_xlabel(_broken(below, side), fontsize=SMALL - 1, parse_math=False)
+        panel.set_xlabel(_broken(below, side), fontsize=SMALL - 1, parse_math=_is_modulus(below))
     else:
         panel.set_xticklabels([])
     if beside:
-        panel.set_ylabel(_broken(beside, side), fontsize=SMALL - 1, parse_math=False)
+        panel.set_ylabel(_broken(beside, side), fontsize=SMALL - 1, parse_math=_is_modulus(beside))
     elif panel.get_yticks().size:
         panel.set_yticklabels([])
 
 
+def _is_modulus(name: str) -> bool:
+    return name.partition(",")[0] in MODULI
+
+
 def _broken(name: str, side: float) -> str:
     """A name in two lines, the unit below, each no longer than the panel."""
+    if _is_modulus(name):
+        return in_figure(name).replace(", ", ",\n")
     first, comma, unit = name.rpartition(", ") if ", " in name else (name, "", "")
     for words, brief in (("length along the grain", "length"), ("length across the grain", "width"), (" ratio", "")):
         first = first.replace(words, brief)

@@ -23,6 +23,7 @@ from bayesplate.report.style import (
     plain_axes,
     stacked,
 )
+from bayesplate.report.symbols import in_figure
 from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def percentiles_figure(
     for panel, name in zip(panels, MODULI, strict=True):
         plain_axes(panel)
         _draw(panel, name, percentile, n_modes, moduli[name])
-        panel.set_title(name)
+        panel.set_title(in_figure(name))
     panels[0].set_ylabel("modes in the subset")
     figure.legend(handles=_handles(panels[0]), loc="outside lower center", ncols=4, frameon=False, fontsize=WORDS)
     figure.suptitle(drawable(title), fontsize=11, parse_math=False)

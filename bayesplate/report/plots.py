@@ -16,6 +16,7 @@ from bayesplate.plate.material import MODULI
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
+from bayesplate.report.symbols import in_figure
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.summary import Summary
 from bayesplate.results.words import GPA
@@ -197,7 +198,7 @@ class ComparePlots:
 
         _place("theory", theory, list(self.draws))
         moduli: Mapping[str, NDArray[np.float64]] = self.draws[theory].moduli
-        return corner_figure({f"{name}, GPa": values * GPA for name, values in moduli.items()})
+        return corner_figure({f"{in_figure(name)}, GPa": values * GPA for name, values in moduli.items()})
 
     def __repr__(self) -> str:
         return f"<figures: {_methods(self)}>"
@@ -213,9 +214,9 @@ def _place(what: str, name: str | None, names: Sequence[str]) -> int:
 def _factor_and_words(name: str, problem: PosedProblem) -> tuple[float, str]:
     """Factor to the unit that people use, and what stands at the axis."""
     if name in MODULI:
-        return GPA, f"{name}, GPa"
+        return GPA, f"{in_figure(name)}, GPa"
     if name not in problem.board.inputs:
-        return 1.0, f"{name}, N m"
+        return 1.0, f"{in_figure(name)}, N m"
     factor, unit = unit_of_people(problem.board.parameter(name).unit)
     return factor, f"{name}, {unit}" if unit else name
 

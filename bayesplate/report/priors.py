@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.board import Board
+from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.quantities import Quantity
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, legend_below, plain_axes, short
+from bayesplate.report.symbols import in_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -151,7 +153,9 @@ def _draw(panel: Axes, one: Compared) -> None:
     panel.spines["left"].set_visible(False)
     panel.locator_params(axis="x", nbins=4)
     title = short(f"{one.name}, {one.unit}" if one.unit else one.name, _LONGEST)
-    panel.set_title(title, fontsize=SMALL, loc="left", weight="bold", pad=12, parse_math=False)
+    is_ours = one.name in (*MODULI, *RIGIDITIES)
+    title = in_figure(title) if is_ours else title
+    panel.set_title(title, fontsize=SMALL, loc="left", weight="bold", pad=12, parse_math=is_ours)
     panel.text(0.0, 1.04, one.told, transform=panel.transAxes, va="bottom", fontsize=SMALL - 0.5)
 
 

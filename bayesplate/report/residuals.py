@@ -87,26 +87,26 @@ def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Pic
     modes = summary.modes
     measured = np.array([mode.measured_hz for mode in modes])
     draws = cents(np.log(np.maximum(predictive.reshape(-1, len(modes)), 1e-9) / measured))
-    q05, q25, q75, q95 = np.quantile(draws, _QUANTILES, axis=0)
     below, above = _rounding(modes)
+    bars = np.quantile(draws, _QUANTILES, axis=0)
+    q05, q25, q75, q95 = bars + np.array([below, below, above, above])  # a reading stands for all that round to it
     figure, panel = _rows(modes)
     rows = np.arange(len(modes))
     panel.hlines(rows, q05, q95, color=BLUE, alpha=0.35, lw=9, label="expected, 90 %")
     panel.hlines(rows, q25, q75, color=BLUE, lw=9, label="expected, 50 %")
-    if (above > below).any():
-        panel.hlines(rows, below, above, color=ORANGE, lw=3.5, label="rounding of the reading")
     panel.plot(np.zeros(len(modes)), rows, "o", color="white", mec="black", mew=1.0, ms=5, label="the reading")
     panel.axvline(0, color=GREY, lw=0.7, zorder=0)
     panel.set_xlabel("above (+) or below (-) the reading, cents", fontsize=SMALL)
     legend_below(figure, panel.get_legend_handles_labels()[0], 2)
-    inside = int(np.sum((q05 - above <= 0) & (q95 - below >= 0)))
+    inside = int(np.sum((q05 <= 0) & (q95 >= 0)))
     alt = (
-        f"Bars of the readings that the model expects. {inside} of {len(modes)} readings lie in their 90 % bars, "
-        "counting their rounding."
+        f"Bars of the readings that the model expects. {inside} of {len(modes)} readings lie in their 90 % bars, which "
+        "count their rounding."
     )
     caption = (
-        "If the model holds, about nine readings in ten lie within their pale bars. It has seen these readings: a good "
-        "picture here is needed, but proves little; the open diamonds of the figure before are the harder test."
+        "If the model holds, nine readings in ten or more lie within their pale bars, and half of them or more within "
+        "the dark ones, which reach as far as rounding may hide. The model has seen these readings: a good picture is "
+        "needed, but proves little; the open diamonds in the figure of the errors are the harder test."
     )
     return Picture("predictive", "What the model would expect you to read", alt, caption, figure)
 

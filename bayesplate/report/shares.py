@@ -8,6 +8,7 @@ import numpy as np
 
 from bayesplate.estimates.identifiability import Identifiability
 from bayesplate.report.style import BLUE, DARK, GREEN, GREY, ORANGE, SMALL, WORDS, Picture, legend_below, short, stacked
+from bayesplate.report.symbols import in_figure
 from bayesplate.results.checking import CheckedMode, CheckReport
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
@@ -49,7 +50,7 @@ def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Pi
         wide = np.maximum(share, 0.0)
         panel.barh(
             rows, 100 * wide, left=100 * start, height=0.72, color=colour, hatch=hatch, edgecolor="white", lw=0.6,
-            label=label,
+            label=in_figure(label),
         )  # fmt: skip
         start = start + wide
     for row, mode in zip(rows, modes, strict=True):

@@ -23,6 +23,7 @@ from bayesplate.report.style import (
     legend_below,
     stacked,
 )
+from bayesplate.report.symbols import in_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,7 +85,7 @@ def before_after_picture(diagnosis: Diagnosis) -> Picture | None:
     panels[1].axvline(0, color=DARK, lw=0.8)
     reach = max(1.2, 1.15 * float(np.abs(values).max()))
     panels[1].set_xlim(-reach, reach)
-    _named(panels[1], list(shifts), "standard deviations", "Shift of the constants")
+    _named(panels[1], [in_figure(name) for name in shifts], "standard deviations", "Shift of the constants")
     legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
     told = "; ".join(f"{one.words}: {_cents(one.of(before))} before, {_cents(one.of(after))} after" for one in drawn)
     moved = "; ".join(f"{name} by {value:+.1f} sd" for name, value in shifts.items())

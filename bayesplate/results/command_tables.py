@@ -6,7 +6,7 @@ from bayesplate.results.checking import CheckReport
 from bayesplate.results.comparison import Estimated, MethodRow, TheoryRow
 from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
 from bayesplate.results.tables import Table
-from bayesplate.results.words import CONSTANTS, GPA, MISSING, decimals, mode_name, narrow_name, number
+from bayesplate.results.words import CONSTANTS, GPA, MISSING, mode_name, narrow_name, number, rounded, two_digits
 
 _METHODS = {
     "paper_least_squares": "paper",
@@ -26,7 +26,7 @@ _DEFAULT_DIGITS = 3
 def check_tables(report: CheckReport) -> tuple[Table, ...]:
     """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
     constants = tuple(
-        (narrow_name(name), f"{report.estimate[name] * GPA:.4g}", f"± {report.expected_sd_percent[name]:.1f} %")
+        (narrow_name(name), f"{report.estimate[name] * GPA:.4g}", f"± {two_digits(report.expected_sd_percent[name])} %")
         for name in CONSTANTS
     )
     modes = tuple(
@@ -107,8 +107,7 @@ def _constant(entry: Estimated) -> str:
         return MISSING
     if not entry.sd:
         return number(entry.mean, _DEFAULT_DIGITS, factor=GPA)
-    digits = decimals(entry.sd * GPA)
-    return f"{number(entry.mean, digits, factor=GPA)} ± {number(entry.sd, digits, factor=GPA)}"
+    return " ± ".join(rounded(entry.mean * GPA, entry.sd * GPA))
 
 
 def sheet_tables(report: ModesReport) -> tuple[Table, ...]:

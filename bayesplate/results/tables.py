@@ -19,6 +19,7 @@ from bayesplate.results.words import (
     narrow_name,
     number,
     plus_minus,
+    two_digits,
 )
 
 
@@ -44,7 +45,7 @@ def constants_table(summary: Summary) -> Table:
     for name in CONSTANTS:
         entry = summary.elastic[name]
         least_squares = number(summary.weighted_least_squares[name], decimals(entry.sd * GPA), factor=GPA)
-        share = f"{100 * entry.sd / entry.mean:.1f}"
+        share = two_digits(entry.sd / entry.mean, 100)
         rows.append((narrow_name(name), plus_minus(entry, GPA), interval(entry, GPA), share, least_squares))
     return Table(
         f"Elastic constants of {summary.name}, GPa",
@@ -71,7 +72,7 @@ def modes_table(summary: Summary) -> Table:
                 f"{mode.measured_hz:.6g}",
                 f"{mode.predicted_hz.mean:.1f}",
                 number(mode.residual_cents, 1, signed=True),
-                f"{low:+.1f} to {high:+.1f}",
+                f"{number(low, 1, signed=True)} to {number(high, 1, signed=True)}",
                 *rounding,
                 number(mode.left_out_cents, 1, signed=True),
             )

@@ -19,7 +19,7 @@ STIFFNESS = {
 """What each modulus is, to be read without its symbol."""
 
 _ALIKE = 1e-12
-_MOST_DECIMALS = 6
+_MOST_DECIMALS = 8
 
 
 class Uncertain(Protocol):
@@ -57,34 +57,54 @@ def narrow_name(name: str) -> str:
 
 
 def decimals(sd: float) -> int:
-    """Decimals that show two significant digits of a standard deviation, at most six."""
-    digits = 0
-    while sd < 9.95 and digits < _MOST_DECIMALS and sd > 0:
-        sd *= 10
-        digits += 1
-    return digits
+    """Decimals that show two significant digits of a standard deviation, at most eight."""
+    return min(max(_place(sd), 0), _MOST_DECIMALS)
+
+
+def _place(sd: float) -> int:
+    """Decimal place of the second significant digit; negative left of the point: -1 for 120, 1 for 3.4, 3 for 0.028."""
+    return 1 - int(f"{sd:.1e}".partition("e")[2]) if 0 < sd < float("inf") else 0
+
+
+def rounded(mean: float, sd: float) -> tuple[str, str]:
+    """A mean and its standard deviation as they are printed everywhere.
+
+    The sd has two significant digits and the mean ends at the same decimal place, thousands stand apart. A mean that is
+    exact has five digits, and no sd.
+    """
+    if sd <= _ALIKE * abs(mean):
+        return f"{mean:.5g}", ""
+    place, digits = _place(sd), decimals(sd)
+    texts = (f"{round(value, place):,.{digits}f}" for value in (mean, sd))
+    mean_text, sd_text = (_unsigned_zero(text).replace(",", "\N{NARROW NO-BREAK SPACE}") for text in texts)
+    return mean_text, sd_text
 
 
 def plus_minus(entry: Uncertain, factor: float = 1.0) -> str:
-    """Mean ± sd, two digits of the sd; the number alone where it is exact."""
-    mean, sd = entry.mean * factor, entry.sd * factor
-    if sd <= _ALIKE * abs(mean):
-        return f"{mean:.4g}"
-    digits = decimals(sd)
-    return f"{mean:,.{digits}f} ± {sd:,.{digits}f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    """Mean ± sd as of `rounded`; the number alone where it is exact."""
+    return " ± ".join(text for text in rounded(entry.mean * factor, entry.sd * factor) if text)
 
 
 def interval(entry: Interval, factor: float = 1.0) -> str:
-    """The middle 90 %."""
+    """The middle 90 %, to the decimal place of the mean."""
     digits = decimals(entry.sd * factor)
-    return f"{entry.q05 * factor:.{digits}f} to {entry.q95 * factor:.{digits}f}"
+    return f"{number(entry.q05, digits, factor=factor)} to {number(entry.q95, digits, factor=factor)}"
 
 
 def number(value: float | None, digits: int, *, signed: bool = False, factor: float = 1.0) -> str:
-    """A number with fixed decimals, or a dash where there is none."""
+    """A number with fixed decimals, zero without a sign, or a dash where there is none."""
     if value is None:
         return MISSING
-    return f"{value * factor:{'+' if signed else ''}.{digits}f}"
+    return _unsigned_zero(f"{value * factor:{'+' if signed else ''}.{digits}f}")
+
+
+def two_digits(value: float | None, factor: float = 1.0) -> str:
+    """A number of which only the size matters, as an error or a standard deviation in per cent: 0.028, 3.0, 17."""
+    return MISSING if value is None else number(value, decimals(abs(value * factor)), factor=factor)
+
+
+def _unsigned_zero(text: str) -> str:
+    return text if text.strip("+-0.") else text.lstrip("+-")
 
 
 def percent(share: float | None, digits: int = 0) -> str:

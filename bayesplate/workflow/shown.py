@@ -17,7 +17,7 @@ from bayesplate.results.notebook import html
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table, constants_table, modes_table, unlabelled_table
-from bayesplate.results.words import number, percent
+from bayesplate.results.words import percent, two_digits
 
 __all__ = [
     "Progress",
@@ -63,7 +63,7 @@ def show_fit(summary: Summary) -> Shown:
     closing = (
         f"{model.theory} plate, {model.law} law. Error rms {error.in_sample_rms_cents:.1f} cents in sample, "
         + (f"{left_out:.1f} left out" if left_out is not None else "too few modes to leave one out")
-        + f"; noise {noise}; the linear law is off by {number(error.linearisation_rms_cents, 1)} cents."
+        + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )
     return Shown(tables, summary.identifiability, summary.warnings, closing)
 

@@ -35,6 +35,25 @@ def test_every_reading_has_a_pareto_k_and_some_are_beyond_weights(found):
     assert 2.0 < found["effective_parameters"] < 6.0
 
 
+def test_weights_agree_with_refits_where_pareto_k_is_low(found):
+    """Both densities are those of one reading given the others; some thousand draws know them to a few hundredths."""
+    serve = [label for label, k in found["pareto_k"].items() if k < 0.5]
+
+    assert len(serve) >= 2
+    for label in serve:
+        assert found["weighed"][label] == pytest.approx(found["refitted"][label], abs=0.05)
+
+
+def test_a_reading_without_which_a_constant_is_open_has_the_highest_pareto_k(found):
+    """Without it the others leave D_s open by a factor; what the fit leans on most is what weights cannot take away."""
+    (open_without,) = [label for label, value in found["refitted"].items() if value is None]
+
+    assert open_without == max(found["pareto_k"], key=found["pareto_k"].get) == "clamped (0,2)"
+    assert found["left_out_cents"][open_without] is not None  # the most likely constants are there, if badly known
+    leant_on = sorted(found["leverage"], key=found["leverage"].get)[-2:]
+    assert {label for label, k in found["pareto_k"].items() if k > 0.7} == set(leant_on)
+
+
 def test_the_likelihood_says_more_than_either_prior(found):
     """By power scaling: one more reading's worth of likelihood moves a constant further than the priors do."""
     for name in ("E_x", "E_y", "G_xy"):

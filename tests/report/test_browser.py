@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -72,11 +73,61 @@ def test_words_are_large_enough_on_a_phone(page, reports):
     assert 6.5 / 72 / 4.5 * image > 6.5
 
 
+PAPER = {"A4": (8.27, 11.69), "letter": (8.5, 11.0)}
+
+
+@pytest.mark.parametrize("paper", PAPER)
+def test_a_fit_is_printed_on_two_sheets_and_a_verdict_adds_one(page, reports, paper):
+    """What is folded is not printed; what was opened comes after, on sheets of its own."""
+    sheets = {}
+    for which, own in reports.items():
+        page.open(own.as_uri(), 1100)
+        sheets[which] = page.printed(*PAPER[paper])
+    page.value("document.querySelector('#appendix details').open = true")
+
+    assert sheets == {"fit": 2, "diagnosis": 3}
+    assert page.printed(*PAPER[paper]) == 4
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_words_and_figures_are_legible_in_the_light_and_in_the_dark(page, reports, scheme):
+    """Contrast of at least 4.5 between words and their ground; the dark lines of a figure keep a white ground."""
+    page.open(reports["diagnosis"].as_uri(), 1100)
+    page.prefer(scheme)
+    ground = brightness(page.value("getComputedStyle(document.body).backgroundColor"))
+    words = [
+        brightness(page.value(f"getComputedStyle(document.querySelector('{one}')).color"))
+        for one in ("h1", "figcaption", "td", ".quiet", ".verdicts li", ".given")
+    ]
+    figure = page.value("getComputedStyle(document.images[0]).backgroundColor")
+    page.prefer("light")
+
+    assert (ground > 0.5) == (scheme == "light")
+    assert all((max(one, ground) + 0.05) / (min(one, ground) + 0.05) > 4.5 for one in words)
+    assert figure == "rgb(255, 255, 255)"
+
+
+def brightness(colour: str) -> float:
+    """Relative luminance of a colour as browsers write it, 0 to 1, as the guidelines of the web define it."""
+    parts = [int(one) / 255 for one in re.findall(r"\d+", colour)[:3]]
+    red, green, blue = (one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4 for one in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@pytest.mark.parametrize(("width", "columns"), [(390, 1), (1100, 2)])
+def test_figures_use_the_width(page, reports, width, columns):
+    page.open(reports["fit"].as_uri(), width)
+    page.value("document.querySelectorAll('details').forEach(one => one.open = true)")
+    widths = page.value("[...document.images].map(one => one.getBoundingClientRect().width)")
+
+    assert all(0.9 * (width - 40) / columns - 32 < one <= width / columns for one in widths)
+
+
 def test_the_style_is_let_in(page, reports):
     """Its hash stands in the policy: a page whose style was refused would have the browser's own margins."""
     page.open(reports["fit"].as_uri(), 1280)
 
-    assert page.value("getComputedStyle(document.body).maxWidth") == "780px"
+    assert page.value("getComputedStyle(document.body).maxWidth") == "1080px"
 
 
 def test_hostile_texts_appear_literally(page, clamped, tmp_path):

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnoses import DIAGNOSES
 from made_reports import fitted
 from payloads import PAYLOADS
 
+from bayesplate.report.health import health_picture
 from bayesplate.report.page import pictures
 from bayesplate.report.percentiles import percentiles_figure
 from bayesplate.report.priors import Compared, compared
+from bayesplate.report.residuals import predictive_picture
 from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
 
 LONG_NAME = "a-cantilever-with-a-very-long-setup-name-beyond-all-reason"
@@ -119,6 +123,29 @@ def test_before_and_after_are_the_diagnosis_own(drawn):
 
     assert [bar.get_width() for bar in errors.patches] == [21.25, 46.5, 46.5, 4.25, 9.5, 12.5]
     np.testing.assert_array_equal(shifts.lines[0].get_xdata(), [2.5, -1.25, 0.0])
+
+
+def test_the_expected_readings_have_a_bar_where_all_round_to_one(clamped):
+    """A model that always expects the reading itself: both bars reach as far as rounding hides, by the summary."""
+    modes = clamped.summary.modes
+    always = np.array([[mode.measured_hz for mode in modes]] * 4)
+    (panel,) = predictive_picture(clamped.summary, always).figure.axes
+    bars = {one.get_label(): np.array([path[:, 0] for path in one.get_segments()]) for one in panel.collections}
+
+    assert all(mode.rounding_cents[0] < 0 < mode.rounding_cents[1] for mode in modes)
+    for label in ("expected, 90 %", "expected, 50 %"):
+        np.testing.assert_allclose(bars[label], [mode.rounding_cents for mode in modes])
+
+
+def test_no_word_of_the_sampler_is_cut_off_by_large_numbers(clamped):
+    """Rigidities of 20 000 N m, as well known as those of the board: no number stands apart as an offset."""
+    chains = clamped.inference.chains
+    draws = chains.draws.copy()
+    draws[..., :3] = np.log(2e4) + draws[..., :3] - draws[..., :3].mean(axis=(0, 1, 2))
+    picture = health_picture(replace(clamped.inference, chains=replace(chains, draws=draws)))
+
+    require_whole([picture])
+    assert not any(panel.yaxis.get_offset_text().get_text() for panel in picture.figure.axes)
 
 
 def test_no_word_is_cut_off_or_too_small(drawn):

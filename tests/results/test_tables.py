@@ -10,7 +10,7 @@ from made_summaries import SUMMARY, mode, spread
 
 from bayesplate.report import content
 from bayesplate.results.tables import constants_table, modes_table, rounding_that_decides, unlabelled_table
-from bayesplate.results.words import decimals, interval, number, percent, plus_minus
+from bayesplate.results.words import decimals, interval, number, percent, plus_minus, rounded, two_digits
 from bayesplate.workflow.shown import show_fit
 
 
@@ -78,7 +78,7 @@ def test_what_fit_prints():
     assert (shown.remarks, shown.warnings) == (SUMMARY.identifiability, SUMMARY.warnings)
     assert shown.closing == (
         "thin plate, exact law. Error rms 7.5 cents in sample, 12.2 left out; noise 0.50 %; the linear law is off by "
-        "0.5 cents."
+        "0.50 cents."
     )
     few = replace(SUMMARY, error=replace(SUMMARY.error, leave_one_out_rms_cents=None))
     assert "too few modes to leave one out" in show_fit(few).closing
@@ -89,15 +89,15 @@ def test_what_a_page_says():
 
     assert first.startswith("From 3 modes: 10.50 ± 0.25 GPa along the grain, 1.00 ± 0.12 GPa across it, and a shear")
     assert missed == (
-        "The fit misses the frequencies by 8 cents (0.4 %); a mode that it has not seen, by 12 cents (0.7 %)."
+        "The fit misses the frequencies by 7.5 cents (0.43 %); a mode that it has not seen, by 12 cents (0.71 %)."
     )
-    assert weakest == "Least well known is G_xy, shear: ± 12.5 %."
+    assert weakest == "Least well known is G_xy, shear: ± 12 %."
     assert content.constants_table(SUMMARY).rows == (
         ("E_x, along the grain", "10.50 ± 0.25", "10.00 to 11.00", "10.25", "10.25", "10.00 ± 0.20"),
         ("E_y, across the grain", "1.00 ± 0.12", "0.75 to 1.25", "–", "1.12", "–"),
         ("G_xy, shear", "0.500 ± 0.062", "0.375 to 0.625", "0.500", "0.500", "0.500"),
     )
-    assert content.effects_table(SUMMARY).rows == (("attached mass, bench", "mass", "2 ± 0.5", "g"),)
+    assert content.effects_table(SUMMARY).rows == (("attached mass, bench", "mass", "2.00 ± 0.50", "g"),)
     assert content.laws_table(SUMMARY).rows[0] == ("E_x", "–", "10.500")
     assert dict(content.sampler_rows(SUMMARY)) == {
         "ensembles, walkers, steps": "4, 32, 2000",
@@ -108,10 +108,32 @@ def test_what_a_page_says():
     }
 
 
+@pytest.mark.parametrize(
+    ("mean", "sd", "printed"),
+    [
+        (13.0, 0.032, "13.000 ± 0.032"),
+        (0.899, 0.22, "0.90 ± 0.22"),
+        (12.5, 0.028, "12.500 ± 0.028"),
+        (5304.0, 123.0, "5\N{NARROW NO-BREAK SPACE}300 ± 120"),
+        (2.0, 9.97, "2 ± 10"),
+        (0.12, 0.0997, "0.12 ± 0.10"),
+        (-0.004, 0.5, "0.00 ± 0.50"),
+        (0.00012, 0.0000066, "0.0001200 ± 0.0000066"),
+        (399.0, 0.0, "399"),
+    ],
+)
+def test_one_rule_rounds_every_mean_and_its_sd(mean, sd, printed):
+    """Two significant digits of the sd, the mean to the same decimal place: by hand."""
+    assert plus_minus(replace(spread(1.0, 0.1, "1"), mean=mean, sd=sd)) == printed
+    assert " ± ".join(text for text in rounded(mean, sd) if text) == printed
+
+
 def test_numbers_as_people_read_them():
-    assert [decimals(sd) for sd in (0.0, 9.96, 9.94, 0.0996, 0.0994, 1e-9)] == [0, 0, 1, 2, 3, 6]
+    assert [decimals(sd) for sd in (0.0, 123.0, 9.96, 9.94, 0.0996, 0.0994, 1e-9)] == [0, 0, 0, 1, 2, 3, 8]
     assert plus_minus(spread(12345.6, 12.0, "1")) == "12\N{NARROW NO-BREAK SPACE}346 ± 12"
     assert plus_minus(spread(2.5, 0.0, "1")) == "2.5"
     assert interval(spread(10.0e9, 0.5e9, "Pa"), 1e-9) == "9.00 to 11.00"
     assert [number(None, 1), number(1.25, 1, signed=True), number(-2.0, 0, factor=-1.0)] == ["–", "+1.2", "2"]
+    assert [number(-0.04, 1, signed=True), number(-0.06, 1, signed=True)] == ["0.0", "-0.1"]
+    assert [two_digits(value) for value in (0.028, 3.0, 17.3, 0.0, None)] == ["0.028", "3.0", "17", "0", "–"]
     assert [percent(None), percent(0.125), percent(0.125, 1)] == ["–", "12 %", "12.5 %"]

@@ -83,7 +83,7 @@ CASES: dict[str, tuple[list[Change], list[str]]] = {
     ),
     "a Poisson ratio that is free already": (
         [declaring("poisson_ratio"), ("poisson_xy = 0.4", "poisson_xy = { mean = 0.4, sd = 0.1 }")],
-        [refused("poisson_ratio", "poisson_xy is already uncertain (0.4 +- 0.1) and so part of every fit")],
+        [refused("poisson_ratio", "poisson_xy is already uncertain (0.4 ± 0.1) and so part of every fit")],
     ),
     "nothing attached": (
         [declaring("attached_mass"), NO_ITEM],

@@ -103,7 +103,7 @@ def test_a_corner_plot_has_a_panel_for_every_pair_and_marks_least_squares(result
     figure = result.plot.corner(["E_x", "D_y"])
     panels = np.reshape(figure.axes, (2, 2))
 
-    assert [panels[1, 0].get_xlabel(), panels[1, 0].get_ylabel()] == ["E_x, GPa", "D_y, N m"]
+    assert [panels[1, 0].get_xlabel(), panels[1, 0].get_ylabel()] == ["$E_{x}$, GPa", "$D_{y}$, N m"]
     marked = panels[0, 0].lines[-1].get_xdata()[0]
     assert marked == pytest.approx(result.summary.weighted_least_squares.E_x / 1e9)
 

@@ -10,7 +10,7 @@ from bayesplate.diagnosis.wording.words import MERITS, MISSING, Merit, names_of,
 from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.results.contract import Spread
 from bayesplate.results.tables import Table
-from bayesplate.results.words import decimals
+from bayesplate.results.words import GPA, decimals, interval, plus_minus
 
 _GPA = 1e9
 _NARROW = ("effect", "shift", "visible", "probable", "range (90 %)", "fate")
@@ -102,10 +102,8 @@ def _number(value: float | None) -> str:
 
 
 def _spread(one: Spread) -> tuple[str, str]:
-    """Mean ± sd and the middle 90 %, GPa, with two digits of the sd."""
-    mean, sd, low, high = (value / _GPA for value in (one.mean, one.sd, one.q05, one.q95))
-    digits = decimals(sd)
-    return f"{mean:.{digits}f} ± {sd:.{digits}f}", f"{low:.{digits}f} to {high:.{digits}f}"
+    """Mean ± sd and the middle 90 %, GPa."""
+    return plus_minus(one, GPA), interval(one, GPA)
 
 
 def _bias(bias: Mapping[str, float] | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from computations.left_out import pareto, pareto_told
 from computations.library import (
     default_noise,
     effects_listed,
@@ -31,6 +32,8 @@ __all__ = [
     "leverages",
     "long_checks",
     "paper_table",
+    "pareto",
+    "pareto_told",
     "provenance",
     "reference",
     "references",

@@ -56,7 +56,7 @@ CHECKS = (
         "The diagnosis on trial: boards planted by an independent generator, with one effect, two, none, or one that "
         "the library does not know, judged blindly and counted.",
     ),
-    ("benchmarks", "make benchmarks", "Times of the parts and of whole fits."),
+    ("trial-short", "make trial", "The same in a paragraph."),
 )
 """Long checks: the stem of their page or printed output, the command that makes it, and what it shows."""
 

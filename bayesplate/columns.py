@@ -1,0 +1,98 @@
+"""Tables on a terminal of any width: columns wrapped between words, or rows below each other; nothing is cut off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bayesplate.workflow.shown import Table
+
+_UNBROKEN = 16
+"""A number with its uncertainty, or an interval, of at most so many characters stays in one line."""
+
+_RULES = 3
+"""Characters of a rule between two columns with its spaces."""
+
+
+def laid_out(table: Table, width: int) -> Any:
+    """A table as rich prints it: as a grid where that fits, otherwise each row as a small list of its own.
+
+    Parameters
+    ----------
+    table : Table
+    width : int
+        Of the terminal, characters.
+
+    Returns
+    -------
+    rich.console.RenderableType
+    """
+    widths = column_widths(table, width)
+    return _stacked(table) if widths is None else _grid(table, widths)
+
+
+def column_widths(table: Table, width: int) -> list[int] | None:
+    """Characters of each column, the longest ones narrowed first; None if no division leaves every number whole."""
+    columns = list(zip(table.columns, *table.rows, strict=True))
+    available = width - _RULES * len(columns) - 1
+    natural = [max(_longest_line(cell) for cell in column) for column in columns]
+    least = [max(map(_least, column)) for column in columns]
+    # a name is broken only where nothing else helps
+    for narrowest in ([natural[0], *least[1:]], least):
+        if sum(narrowest) <= available:
+            return _narrowed(natural, narrowest, available)
+    return None
+
+
+def _narrowed(natural: Sequence[int], least: Sequence[int], available: int) -> list[int]:
+    """Widths that fit: character by character from the widest column that can still give one."""
+    widths = list(natural)
+    while sum(widths) > available:
+        _, widest = max((one, i) for i, one in enumerate(widths) if one > least[i])
+        widths[widest] -= 1
+    return widths
+
+
+def _longest_line(cell: str) -> int:
+    return max((len(line) for line in cell.split("\n")), default=0)
+
+
+def _least(cell: str) -> int:
+    """The least width at which a cell stays whole: that of its longest word, or its own if it is a short number."""
+    parts = []
+    for line in cell.split("\n"):
+        parts += [line] if len(line) <= _UNBROKEN and _holds_a_number(line) else line.split()
+    return max(map(len, parts), default=0)
+
+
+def _holds_a_number(line: str) -> bool:
+    return any(character.isdigit() for character in line)
+
+
+def _grid(table: Table, widths: Sequence[int]) -> Any:
+    from rich.table import Table as Grid
+    from rich.text import Text
+
+    grid = Grid(title=Text(table.title), title_justify="left", title_style="bold")
+    for i, (column, width) in enumerate(zip(table.columns, widths, strict=True)):
+        grid.add_column(Text(column), justify="left" if i == 0 else "right", width=width, overflow="fold")
+    for row in table.rows:
+        grid.add_row(*(Text(cell) for cell in row))
+    return grid
+
+
+def _stacked(table: Table) -> Any:
+    """Each row under its first cell: the name of a column, and the cell."""
+    from rich.console import Group
+    from rich.padding import Padding
+    from rich.text import Text
+
+    names = [" ".join(column.split()) for column in table.columns]
+    parts: list[Any] = [Text(table.title, style="bold")]
+    for first, *cells in table.rows:
+        parts.append(Text(f"{names[0]} {first}".strip()))
+        for name, cell in zip(names[1:], cells, strict=True):
+            told = ", ".join(cell.rstrip().split("\n"))
+            parts.append(Padding(Text(f"{name}: {told}"), (0, 0, 0, 2), expand=False))
+    return Group(*parts)

@@ -1,0 +1,67 @@
+"""Tables on terminals of any width: no number loses a digit, and a wide terminal shows a plain grid."""
+
+from __future__ import annotations
+
+import re
+from io import StringIO
+
+import pytest
+from diagnoses import DIAGNOSES
+from made_summaries import SUMMARY
+from rich.console import Console
+
+from bayesplate.columns import column_widths, laid_out
+from bayesplate.diagnosis.wording.tables import candidates_table
+from bayesplate.results.tables import Table
+from bayesplate.workflow.shown import show_diagnosis, show_fit
+
+TABLES = {
+    "fit": show_fit(SUMMARY).tables,
+    "diagnosis": show_diagnosis(DIAGNOSES["named"]).tables,
+    "wide": (candidates_table(DIAGNOSES["named"]),),
+}
+
+
+def printed(table: Table, width: int) -> list[str]:
+    """The lines of a table on a terminal."""
+    stream = StringIO()
+    Console(file=stream, width=width, highlight=False).print(laid_out(table, width))
+    return [line.rstrip() for line in stream.getvalue().splitlines()]
+
+
+@pytest.mark.parametrize("width", [40, 50, 60, 80])
+@pytest.mark.parametrize("shown", TABLES)
+def test_no_number_is_cut_on_a_narrow_terminal(shown, width):
+    for table in TABLES[shown]:
+        lines = printed(table, width)
+        words = set(re.findall(r"[^\s│┃]+", "\n".join(lines)))
+
+        assert max(map(len, lines)) <= width
+        assert "…" not in "".join(lines)
+        for row in table.rows:
+            for cell in row:
+                assert {word for word in cell.split() if len(word) < width - 4} <= words, cell
+
+
+@pytest.mark.parametrize("width", [50, 60])
+def test_a_number_and_its_uncertainty_stay_in_one_line(width):
+    text = "\n".join(printed(TABLES["fit"][0], width))
+
+    assert "10.50 ± 0.25" in text
+    assert "10.00 to 11.00" in text
+
+
+def test_a_table_that_fits_is_a_grid_and_one_that_does_not_is_stacked():
+    table = Table("Made", ("mode", "90 % interval", "a reason in words"), (("(1,0)", "-35.3 to +45.7", "not needed"),))
+
+    assert column_widths(table, 80) == [5, 14, 17]
+    assert column_widths(table, 40) == [5, 14, 11]  # by hand: 40 less 10 of rules leaves 30
+    assert column_widths(table, 30) is None
+    assert printed(table, 30) == [
+        "Made",
+        "mode (1,0)",
+        "  90 % interval: -35.3 to",
+        "  +45.7",
+        "  a reason in words: not",
+        "  needed",
+    ]
