@@ -91,7 +91,11 @@ def require_labels(board: Board) -> None:
     """
     for setup in board.setups:
         if not setup.readings:
-            peaks = f"its {len(setup.unlabelled)} peaks have none" if setup.unlabelled else "it has no peaks either"
+            peaks = (
+                f"its {len(setup.unlabelled)} peaks have none (bayesplate modes proposes some)"
+                if setup.unlabelled
+                else "it has no peaks either"
+            )
             raise NotIdentifiableError(
                 f"{board.name}: setup {setup.name!r} has no labelled mode, {peaks}; give at least one label"
             )

@@ -25,7 +25,7 @@ from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.plate import is_rigid
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, moduli
+from bayesplate.plate.material import moduli
 from bayesplate.plate.readings import reading_sd
 from bayesplate.plate.setup import Reading, Setup
 from bayesplate.quantities import Quantity
@@ -42,7 +42,7 @@ MISSED, SPURIOUS = 0.2, 0.02
 
 _N_DRAWS = 6000
 _N_BEAMS = 8
-_N_FITTED, _MOST_STEPS = 6, 8
+_N_FITTED, _MOST_FITTED, _MOST_STEPS = 5, 8, 8
 _WORTH_A_FIT = 15.0
 """ln of how many times less probable, by the rough frequencies, an assignment may be that is fitted."""
 _ROUGH_SD = 0.06
@@ -101,7 +101,7 @@ def proposals(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[
         modes = _modes_at(labelled, estimate, max(setup.unlabelled))
         weighed[labels] = _log_weight(labelled, estimate, labels, modes, prior), _labelled(board, setup, labels)
         better = _assign(np.log(np.sort(setup.unlabelled)), modes, np.maximum(2.0 * estimate.scales.max(), 0.01))
-        if better not in weighed and len(weighed) < 2 * _N_FITTED:
+        if better not in weighed and len(weighed) + len(waiting) < _MOST_FITTED:
             waiting.append(better)
     if not weighed:
         return []

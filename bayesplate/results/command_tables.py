@@ -6,7 +6,17 @@ from bayesplate.results.checking import CheckReport
 from bayesplate.results.comparison import Estimated, MethodRow, TheoryRow
 from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
 from bayesplate.results.tables import Table
-from bayesplate.results.words import CONSTANTS, GPA, MISSING, mode_name, narrow_name, number, rounded, two_digits
+from bayesplate.results.words import (
+    CONSTANTS,
+    GPA,
+    MISSING,
+    mode_name,
+    narrow_name,
+    number,
+    percent,
+    rounded,
+    two_digits,
+)
 
 _METHODS = {
     "paper_least_squares": "paper",
@@ -21,6 +31,7 @@ METHODS_REMARK = (
     "is no error; linear, exact: posterior under that law, ± its standard deviation"
 )
 _DEFAULT_DIGITS = 3
+_NO_MODE, _LEAST_TOLD = "none", 0.005
 
 
 def check_tables(report: CheckReport) -> tuple[Table, ...]:
@@ -111,8 +122,34 @@ def _constant(entry: Estimated) -> str:
 
 
 def sheet_tables(report: ModesReport) -> tuple[Table, ...]:
-    """One table per setup."""
-    return tuple(_sheet_table(report.name, setup) for setup in report.setups)
+    """What the peaks may be, where none has a label, and one table per setup."""
+    tables = tuple(_sheet_table(report.name, setup) for setup in report.setups)
+    return (_proposed_table(report), *tables) if report.proposed else tables
+
+
+def _proposed_table(report: ModesReport) -> Table:
+    """The labels proposed for bare peaks, how probable each is, and what else it may be."""
+    rows = []
+    for one in report.proposed:
+        label = one.label or _NO_MODE
+        others = [
+            f"{name} {percent(share)}"
+            for name, share in one.probability.items()
+            if name != label and share > _LEAST_TOLD
+        ]
+        rows.append((f"{one.measured_hz:.6g}", label, percent(one.probability[label]), ", ".join(others) or MISSING))
+    return Table(f"Labels proposed for the peaks of {report.name}", ("Hz", "mode", "probability", "or"), tuple(rows))
+
+
+def proposal_remarks(report: ModesReport) -> tuple[str, ...]:
+    """What to do with proposed labels: look at the figures, then write them on the card."""
+    if not report.proposed:
+        return ()
+    lines = ", ".join(f'"{one.label}" = {one.measured_hz:g}' for one in report.proposed if one.label)
+    return (
+        "no peak has a label, so these are proposals: compare the figures in sand with the sheet, then write "
+        f"frequencies_hz = {{ {lines} }}",
+    )
 
 
 def _sheet_table(name: str, setup: SheetReport) -> Table:

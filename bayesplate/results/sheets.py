@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from bayesplate.estimates.proposals import Proposal, probabilities
 from bayesplate.estimates.sheet import Sheet, SheetMode
+from bayesplate.plate.board import Board
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,26 @@ class SheetReport:
     combined: tuple[MixtureRow, ...]
 
 
+@dataclass(frozen=True)
+class ProposedLabel:
+    """What a peak without a label may be.
+
+    Attributes
+    ----------
+    setup : str
+    measured_hz : float
+    label : str or None
+        In the most probable way to label all peaks; None where it is no mode of the plate.
+    probability : dict of float
+        Of each label, "none" for no mode, over all ways that were looked at; the highest first.
+    """
+
+    setup: str
+    measured_hz: float
+    label: str | None
+    probability: Mapping[str, float]
+
+
 @dataclass(frozen=True, repr=False)
 class ModesReport:
     """The lowest modes of a board.
@@ -78,6 +100,8 @@ class ModesReport:
     basis : str
         At which constants they are computed.
     setups : tuple of SheetReport
+    proposed : tuple of ProposedLabel
+        One per peak where no label was given at all; the modes are then those of the most probable labels.
     notes : tuple of str
     files : tuple of str
         Sheets that were written.
@@ -87,12 +111,29 @@ class ModesReport:
     title: str
     basis: str
     setups: tuple[SheetReport, ...]
+    proposed: tuple[ProposedLabel, ...]
     notes: tuple[str, ...]
     files: tuple[str, ...]
 
     def __repr__(self) -> str:
         told = "; ".join(f"{one.setup}: {len(one.modes)} from {one.modes[0].hz:.4g} Hz" for one in self.setups)
         return f"<ModesReport of {self.name}: {told}>"
+
+
+def proposed_labels(board: Board, found: Sequence[Proposal]) -> tuple[ProposedLabel, ...]:
+    """What each peak of a board with one setup may be; empty without proposals."""
+    if not found:
+        return ()
+    (setup,) = board.setups
+    return tuple(
+        ProposedLabel(
+            setup.name,
+            hertz,
+            None if found[0].labels[i] is None else str(found[0].labels[i]),
+            {"none" if label is None else str(label): share for label, share in probabilities(found, i).items()},
+        )
+        for i, hertz in enumerate(sorted(setup.unlabelled))
+    )
 
 
 def sheet_report(sheet: Sheet) -> SheetReport:

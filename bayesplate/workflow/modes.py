@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.estimates.proposals import proposals
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
@@ -20,13 +21,14 @@ from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
 from bayesplate.results.folder import make_folder, require_new, writing
-from bayesplate.results.sheets import ModesReport, sheet_report
+from bayesplate.results.sheets import ModesReport, proposed_labels, sheet_report
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import Card, Prepared, prepare
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_modes
 
 _AT_ESTIMATE = "at the weighted least-squares estimate"
+_AT_PROPOSED = "at the weighted least-squares estimate with the labels proposed"
 _AT_PRIOR = "at the median of the prior"
 
 
@@ -76,7 +78,8 @@ def modes(
     card : Problem, str, path or Board
         A problem, the name of a shipped board card, the path of a card, or a board made in Python. A card or a board
         may be without frequencies: then the modes are those of the prior's median, with the range in which the prior
-        expects each. Modes that were not measured have the range that the measured ones foretell.
+        expects each. Modes that were not measured have the range that the measured ones foretell. Peaks alone,
+        without a label, are given the most probable labels.
     out : path, optional
         Folder of modes.png and modes.svg (modes-SETUP.png where there are several setups); nothing is written without
         it.
@@ -102,9 +105,13 @@ def modes(
     stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
     names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
     files = () if out is None else require_new(Path(out), names, force=force)
+    rng = np.random.default_rng(seed)
+    found = proposals(board, prepared.prior, rng)
+    if found:
+        prepared = replace(prepared, board=found[0].board)
     values, precision, why = _constants(prepared)
-    basis = _AT_PRIOR if precision is None else _AT_ESTIMATE
-    sheets = tuple(_sheets(prepared, values, precision, np.random.default_rng(seed)))
+    basis = _AT_PRIOR if precision is None else _AT_PROPOSED if found else _AT_ESTIMATE
+    sheets = tuple(_sheets(prepared, values, precision, rng, basis))
     if out is not None:
         _draw(sheets, Path(out), files)
     report = ModesReport(
@@ -112,6 +119,7 @@ def modes(
         title=board.title,
         basis=basis,
         setups=tuple(sheet_report(one) for one in sheets),
+        proposed=proposed_labels(board, found),
         notes=(*why, *board.notes),
         files=tuple(str(path) for path in files),
     )
@@ -144,9 +152,10 @@ def _has_labels(board: Board) -> bool:
     return any(setup.readings for setup in board.setups)
 
 
-def _sheets(prepared: Prepared, values: Values, precision: Precision | None, rng: np.random.Generator) -> list[Sheet]:
+def _sheets(
+    prepared: Prepared, values: Values, precision: Precision | None, rng: np.random.Generator, basis: str
+) -> list[Sheet]:
     board, made = prepared.board, []
-    basis = _AT_PRIOR if precision is None else _AT_ESTIMATE
     for setup in board.setups:
         system = system_of(board, setup)
         bands = None

@@ -10,7 +10,14 @@ from bayesplate.diagnosis.wording.told import verdict_sentence
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.checking import CheckReport
-from bayesplate.results.command_tables import METHODS_REMARK, check_tables, forward_table, methods_table, sheet_tables
+from bayesplate.results.command_tables import (
+    METHODS_REMARK,
+    check_tables,
+    forward_table,
+    methods_table,
+    proposal_remarks,
+    sheet_tables,
+)
 from bayesplate.results.comparison import Comparison
 from bayesplate.results.folder import json_text
 from bayesplate.results.notebook import html
@@ -95,7 +102,7 @@ def show_diagnosis(diagnosis: Diagnosis) -> Shown:
 def show_modes(report: ModesReport) -> Shown:
     """The report of `bayesplate.workflow.modes.modes` for a person."""
     files = f"; sheet to print: {', '.join(report.files)}" if report.files else ""
-    return Shown(sheet_tables(report), (), report.notes, f"Frequencies {report.basis}{files}")
+    return Shown(sheet_tables(report), proposal_remarks(report), report.notes, f"Frequencies {report.basis}{files}")
 
 
 def progress_text(progress: Progress) -> str:

@@ -112,7 +112,10 @@ def test_checking_imports_no_sampler():
 
 
 UNIDENTIFIABLE = [
-    ((), "setup 'cantilever' has no labelled mode, its 1 peaks have none; give at least one label"),
+    (
+        (),
+        "its 1 peaks have none (bayesplate modes proposes some); give at least one label",
+    ),
     (("(1,0)", "(1,1)"), "2 labelled modes for three constants D_x, D_y, D_s: at least 1 more needed"),
     (("(1,0)", "(1,1)", "(2,1)"), "determine D_y (so E_y)"),
 ]

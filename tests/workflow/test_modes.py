@@ -14,6 +14,7 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.workflow.modes import modes
 from bayesplate.workflow.prepare import prepare
+from bayesplate.workflow.shown import show_modes
 
 UNMEASURED = """\
 format = 1
@@ -162,3 +163,23 @@ def test_modes_not_measured_have_the_range_that_the_others_foretell(finnish_shee
         assert mode["hz"] == pytest.approx(np.sqrt(low * high))
         # No less than the expected noise of a clamped board, 0.8 %; no more than an error of 10 % in a stiffness makes.
         assert 0.967 * 0.008 <= half_width < 0.5 * 0.10
+
+
+def test_bare_peaks_are_given_labels_and_told_how_to_write_them(tmp_path):
+    """The peaks of a shipped card, its labels taken away: the sheet is then that of the labels."""
+    card = tmp_path / "bare.toml"
+    card.write_text(
+        UNMEASURED.replace('"supported"', '"free"').replace("not-yet", "bare")
+        + "unlabelled_hz = [40.1, 63.9, 96.9, 108.3, 123.6, 176.2]\n"
+    )
+    report = modes(card).summary
+    shown = show_modes(report)
+
+    assert shown.tables[0].title == "Labels proposed for the peaks of bare"
+    assert "no peak has a label, so these are proposals" in shown.remarks[0]
+    assert report.basis.endswith("with the labels proposed")
+    assert [one.measured_hz for one in report.proposed] == [40.1, 63.9, 96.9, 108.3, 123.6, 176.2]
+    for one in report.proposed:
+        assert sum(one.probability.values()) == pytest.approx(1.0)
+    measured = {mode.label: mode.measured_hz for mode in report.setups[0].modes if mode.measured_hz is not None}
+    assert measured == {one.label: one.measured_hz for one in report.proposed if one.label}

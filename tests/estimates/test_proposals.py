@@ -1,0 +1,97 @@
+"""Labels proposed for bare peaks: the assignment against enumeration, and boards by an independent solver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import made_boards
+import numpy as np
+import pytest
+import ritz
+
+from bayesplate.cards import load_prior
+from bayesplate.estimates import proposals as proposed
+from bayesplate.estimates.proposals import MISSED, SPURIOUS, probabilities, proposals
+from bayesplate.labels import Label
+from bayesplate.plate.board import Board
+
+PLATE = ritz.Plate.from_moduli(10e9, 0.8e9, 0.75e9, 0.4, rho=430.0, h=3e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
+LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2))
+MISSING = (0, 2)
+
+
+def board_of(peaks: list[float]) -> Board:
+    setup = replace(made_boards.setup_of(ritz.ALL_FREE, {}), unlabelled=tuple(peaks))
+    return made_boards.board_of(PLATE, [setup])
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Seven of the lowest eight modes, with noise, in no order, under the prior of the wood."""
+    hertz = ritz.simulate(PLATE, [label for label in LABELS if label != MISSING])
+    noisy = made_boards.with_noise(hertz, 0.003, np.random.default_rng(5))
+    truth = tuple(Label(*label) for label in sorted(noisy, key=noisy.__getitem__))
+    return truth, proposals(board_of(list(noisy.values())), load_prior("spruce"), np.random.default_rng(1))
+
+
+def test_the_labels_of_a_free_board_are_found_though_a_mode_was_missed(found):
+    truth, ways = found
+
+    assert ways[0].labels == truth
+    assert ways[0].probability > 0.9
+    assert sum(one.probability for one in ways) == pytest.approx(1.0)
+    assert [one.probability for one in ways] == sorted((one.probability for one in ways), reverse=True)
+
+
+def test_the_most_probable_board_holds_its_peaks_as_readings(found):
+    truth, ways = found
+    (setup,) = ways[0].board.setups
+
+    assert tuple(reading.label for reading in setup.readings) == truth
+    assert setup.unlabelled == ()
+
+
+def test_probabilities_of_a_peak_are_those_of_the_ways_that_give_it_a_label(found):
+    truth, ways = found
+    for i in range(len(truth)):
+        shares = probabilities(ways, i)
+        assert sum(shares.values()) == pytest.approx(1.0)
+        for label, share in shares.items():
+            assert share == pytest.approx(sum(one.probability for one in ways if one.labels[i] == label))
+
+
+def test_three_peaks_and_boards_with_a_label_are_left_alone():
+    prior, rng = load_prior("spruce"), np.random.default_rng(1)
+    labelled = made_boards.setup_of(ritz.ALL_FREE, {(1, 1): 35.0, (2, 0): 50.0})
+    with_label = made_boards.board_of(PLATE, [replace(labelled, unlabelled=(86.0, 111.0, 129.0, 139.0))])
+
+    assert proposals(board_of([35.0, 50.0, 86.0]), prior, rng) == []
+    assert proposals(with_label, prior, rng) == []
+
+
+def cost_of(pairs: list[tuple[int, int]], peaks: np.ndarray, modes: np.ndarray, sd: float) -> float:
+    """-ln of the probability of one assignment, as the module's docstring words it."""
+    used = max((j for _, j in pairs), default=-1) + 1
+    gaps = sum(
+        0.5 * ((peaks[i] - modes[j]) / sd) ** 2 + np.log(sd * np.sqrt(2 * np.pi)) - np.log(1 - MISSED) for i, j in pairs
+    )
+    return gaps - (used - len(pairs)) * np.log(MISSED) - (peaks.size - len(pairs)) * np.log(SPURIOUS)
+
+
+def test_the_cheapest_assignment_is_that_of_enumeration():
+    rng = np.random.default_rng(2)
+    for _ in range(30):
+        n_peaks, n_modes, sd = int(rng.integers(1, 5)), 6, 0.05
+        peaks, modes = np.sort(rng.uniform(0, 1, n_peaks)), np.sort(rng.uniform(0, 1, n_modes))
+        ways = {
+            tuple(zip(some, others, strict=True))
+            for k in range(n_peaks + 1)
+            for some in combinations(range(n_peaks), k)
+            for others in combinations(range(n_modes), k)
+        }
+        best = min(ways, key=lambda pairs: cost_of(list(pairs), peaks, modes, sd))
+        cost, picked = proposed._align(peaks, modes[None], sd)
+
+        assert cost[0] == pytest.approx(cost_of(list(best), peaks, modes, sd))
+        assert tuple((i, j) for i, j in enumerate(picked[0]) if j >= 0) == best
