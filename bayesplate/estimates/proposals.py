@@ -17,6 +17,7 @@ from scipy.special import logsumexp
 from bayesplate.cards import PriorCard
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
+from bayesplate.estimates.plausibility import MOST_ORTHOTROPIC
 from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.terms import term_weights
@@ -39,6 +40,10 @@ FEWEST_PEAKS = 4
 
 MISSED, SPURIOUS = 0.2, 0.02
 """Probability that a mode below the highest peak was not seen, and that a peak is of something else."""
+
+UNUSUAL = 0.02
+"""Probability that a plate is stiffer along y than along x, which cards take along the grain, or that no wood is as
+orthotropic."""
 
 _N_DRAWS = 6000
 _N_BEAMS = 8
@@ -252,4 +257,5 @@ def _log_weight(board: Board, estimate: Estimate, labels: Assignment, modes: Nam
     by_name = dict(values) | elastic._asdict()
     density = sum(float(one.log_density_of_log(np.log(by_name[name]))) for name, one in prior.constants.items())
     seen = n_missed * np.log(MISSED) + n_seen * np.log(1.0 - MISSED) + n_stray * np.log(SPURIOUS)
-    return float(logsumexp(by_noise) + density + seen)
+    usual = 0.0 if 1.0 <= elastic.E_x / elastic.E_y <= MOST_ORTHOTROPIC else np.log(UNUSUAL)
+    return float(logsumexp(by_noise) + density + seen + usual)
