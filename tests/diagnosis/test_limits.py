@@ -86,7 +86,7 @@ def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike):
     one = one / np.linalg.norm(one / base.scales)
     other = other - one * np.sum(one * other / base.scales**2)
     other = likeness * one + np.sqrt(1.0 - likeness**2) * other / np.linalg.norm(other / base.scales)
-    seen = [Signature(name, {}, d / base.scales, d / base.scales, {}, 1.0) for name, d in ((A, one), (B, other))]
+    seen = [Signature(name, {}, d, d, {}, 1.0, base.scales) for name, d in ((A, one), (B, other))]
 
     assert look_alikes(seen) == {A: (B,) if alike else (), B: (A,) if alike else ()}
     assert entry_of(found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6))).look_alikes == (B,) * alike

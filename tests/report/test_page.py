@@ -209,12 +209,12 @@ def test_each_verdict_is_told_in_plain_words(clamped, verdict):
 
 
 def test_constants_averaged_over_the_effects_are_shown(clamped):
-    averaged = {"E_x": replace(spread(10.25e9), sd=0.5e9, q05=9.5e9, q95=11.0e9)}
+    averaged = DIAGNOSES["named"].elastic_averaged | {"E_x": replace(spread(10.25e9), sd=0.5e9, q05=9.5e9, q95=11.0e9)}
     found = replace(DIAGNOSES["named"], elastic_averaged=averaged)
     text = Read(clamped.page("A board", diagnosis=found)).text
 
-    assert "if any of the effects may be there" in text
-    assert "10.25 ± 0.50" in text
+    assert "averaged over all explanations by their probability" in text
+    assert text.count("10.25 ± 0.50") == 3  # in short, of the verdict, and beside the older methods
     assert "9.50 to 11.00" in text
 
 

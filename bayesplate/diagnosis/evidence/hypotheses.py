@@ -37,6 +37,13 @@ class Swap:
         readings[:, [self.first, self.second]] = readings[:, [self.second, self.first]]
         return readings - baseline.log_frequency
 
+    def words(self, baseline: Baseline) -> str:
+        """Which labels: "(2,0) and (1,2)", with the setup where there are several."""
+        setups = baseline.board.setups
+        labels = [str(label) for setup in setups for label in setup.labels]
+        where = f" in setup {setups[baseline.setup_index[self.first]].name}" if len(setups) > 1 else ""
+        return f"{labels[self.first]} and {labels[self.second]}{where}"
+
     def in_fold(self, fold: Fold) -> Fold:
         """The fold that leaves out the same reading where the two are exchanged: it stands under the other label."""
         exchanged = {self.first: self.second, self.second: self.first}
