@@ -218,6 +218,31 @@ def test_constants_averaged_over_the_effects_are_shown(clamped):
     assert "9.50 to 11.00" in text
 
 
+@pytest.mark.parametrize("verdict", DIAGNOSES)
+def test_the_first_lines_are_of_the_constants_to_quote(clamped, verdict):
+    """Averaged ones, with the errors of the first fit unless one model is named; where nothing fits, with a warning."""
+    found = DIAGNOSES[verdict]
+    found = replace(found, elastic_averaged=found.elastic_averaged | {"E_x": spread(7.5e9)})
+    first = " ".join(Read(clamped.page("A board", diagnosis=found)).text.partition("Is the ideal plate")[0].split())
+    assert "7.50 ± 0.75 GPa along the grain" in first
+    assert ("averaged over everything that may be the case" in first) is (verdict != "unexplained")
+    assert ("too narrow" in first) is (verdict == "unexplained")
+    assert ("by 4 cents" in first, "by 21 cents" in first) == (verdict == "named", verdict != "named")
+
+
+def test_a_page_says_which_member_of_a_group_the_rest_is_of(clamped):
+    text = " ".join(Read(clamped.page("A board", diagnosis=DIAGNOSES["indistinguishable group"])).text.split())
+    assert "with membrane tension, which is only one of the explanations. Quote the averaged constants." in text
+    silent = replace(DIAGNOSES["none needed"], recommendation="")
+    assert "What to measure next" not in Read(clamped.page("A board", diagnosis=silent)).text
+
+
+def test_the_exported_constants_are_those_to_quote(clamped, tmp_path):
+    clamped.write(tmp_path / "group", DIAGNOSES["indistinguishable group"])
+    rows = (tmp_path / "group" / "constants.csv").read_text(encoding="utf-8").splitlines()
+    assert [float(row.split(",")[2]) for row in rows[1:]] == pytest.approx([10.25, 1.0, 0.5, 30.0, 2.5, 5.0])
+
+
 def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path):
     named = Read(clamped.write(tmp_path / "named", DIAGNOSES["named"]).read_text(encoding="utf-8"))
     clamped.write(tmp_path / "none", DIAGNOSES["none needed"])

@@ -8,6 +8,7 @@ import pytest
 
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
+from bayesplate.terminal import progress_line
 from bayesplate.workflow.shown import progress_text
 from bayesplate.workflow.stages import Stages
 
@@ -54,3 +55,20 @@ def test_sampling_within_a_part_is_told_after_it():
     text = progress_text(Progress(25, 20_000, None, "fit", 0.5), 10.0)
     assert text == "50 % done, about 10 s left: fit; sampling: step 25 of at most 20000"
     assert progress_text(Progress(25, 20_000, None)) == "sampling: step 25 of at most 20000"
+
+
+def test_a_line_is_printed_when_a_part_begins_and_now_and_then_while_sampling(capsys):
+    def sampling(n_steps: int) -> Progress:
+        return Progress(n_steps, 20_000, None, "fit", 0.5)
+
+    with progress_line(shown=True) as tell:
+        for progress in (
+            Progress(0, 0, None, "fit", 0.0),
+            sampling(25),
+            sampling(1000),
+            Progress(0, 0, None, "search", 0.6),
+        ):
+            tell(progress)
+    printed = capsys.readouterr().err.splitlines()
+    assert [line.partition(" % done")[0] for line in printed] == ["0", "50", "60"]
+    assert "step 1000" in printed[1]

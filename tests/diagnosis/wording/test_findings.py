@@ -132,7 +132,7 @@ def test_less_probable_is_only_what_is_so_and_would_fit():
     assert (told[AIR].fate, told[AIR].rejected_because) == (
         "less probable", "less probable (0.100) than transverse shear (0.600)",
     )  # fmt: skip
-    assert told[RELABELLING].rejected_because.startswith("with it alone the misfit is still too large (p < 0.001); with")
+    assert told[RELABELLING].rejected_because.startswith("with it alone the misfit is still too large (p < 0.001); ")
     alike = fate_of(quiet, replace(decide(quiet), effects=()), answers(quiet), SHEAR, 1)
     assert alike == ("less probable", "no more probable (0.600) than transverse shear (0.600)")
 
