@@ -233,6 +233,19 @@ def test_below_sight_comes_first():
     assert all(told[name].below_detection_limit for name in NAMES)
 
 
+def test_what_would_not_show_at_its_usual_size_may_be_probable_at_another():
+    """A candidate that is found with a tenth or more is told by its probability; with less it could not have been."""
+    probable = entries(made({(SHEAR,): 0.8, (AIR,): 0.11, (GRAIN,): 0.09}, size=1e-4, residual=np.zeros(6)))
+    assert [probable[name].fate for name in NAMES] == ["in the verdict", "less probable", "not detectable"]
+
+
+def test_an_exchange_that_would_fit_is_told_with_its_own_probability():
+    found = made({(SHEAR,): 0.6, (RELABELLING,): 0.05})
+    found = replace(found, residual=Swap(1, 2).applied(found.ground.baseline, np.zeros((1, 6)))[0])
+    told = entries(found)[RELABELLING].rejected_because
+    assert told.startswith("less probable (0.050) than transverse shear (0.600); with these labels exchanged")
+
+
 def test_an_entry_by_hand():
     """Cents from logarithms, bias from the refit of the constants, the size's quantiles from the cells."""
     found = made(NAMED)
