@@ -125,26 +125,6 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
     return tuple(swaps)
 
 
-def order_conflicts(baseline: Baseline) -> tuple[str, ...]:
-    """Readings of one symmetry class that stand in another order than the modes they are called after.
-
-    Modes of one class do not cross: at a veering they exchange their figures, and a board that lacks something may show
-    the figures the other way round than the ideal one that is fitted to it. No search can mend that; it is said.
-    """
-    readings = baseline.residual + baseline.log_frequency
-    names = [f"{label}" for setup in baseline.board.setups for label in setup.labels]
-    sentences = []
-    for first, second in combinations(range(baseline.n_modes), 2):
-        one, other = baseline.places[first], baseline.places[second]
-        same = baseline.setup_index[first] == baseline.setup_index[second] and one.parity == other.parity
-        if same and (one.rank - other.rank) * (readings[first] - readings[second]) < 0:
-            sentences.append(
-                f"the readings {names[first]} and {names[second]} stand in the other order than these modes of the "
-                "fitted plate: compare their figures again, or fit with the two labels exchanged"
-            )
-    return tuple(sentences)
-
-
 def log_evidences(found: Sequence[Hypothesis], fold: Fold, residuals: Floats) -> Floats:
     """Logarithm of the evidence of every hypothesis for every data set: (n_hypotheses, n_sets) array."""
     return np.stack([one.terms(fold).log_evidence(one.seen(fold.baseline, residuals)) for one in found])

@@ -179,6 +179,8 @@ def test_what_looks_like_the_named_effect_is_told():
     )
     assert alike_sentence(one) in verdict_sentences(one)
     assert alike_sentence(one) in show_diagnosis(one).remarks
+    both = replace(one, effects=("membrane_tension", "air_loading"), candidates=(alike, AIR))
+    assert alike_sentence(both).startswith("Attached mass would look")  # a member of the verdict is no rival
     assert alike_sentence(NAMED) == alike_sentence(replace(one, verdict="indistinguishable group")) == ""
 
 
