@@ -76,6 +76,11 @@ def test_a_size_is_at_its_limit_where_half_a_percent_of_its_prior_lies_beyond(ba
     found = replace(found, residual=of_a.shift[int(np.argmin(np.abs(of_a.z[:, 0] - z)))])
 
     assert bool(at_limit(found, 1)) is is_limited
+    one = found.ground.candidates[A]
+    free = replace(one.laws[0].form.free[0], unit="kg")
+    law = replace(one.laws[0], form=replace(one.laws[0].form, free=(free,)))
+    weighed = replace(found, ground=replace(found.ground, candidates={A: replace(one, laws=(law,))}))
+    assert at_limit(weighed, 1) == ("" if not is_limited else f"size = {1000 * float(prior.value(z)):.3g} g")
 
 
 @pytest.mark.parametrize(("likeness", "alike"), [(0.949, False), (0.951, True), (-0.949, False), (-0.951, True)])

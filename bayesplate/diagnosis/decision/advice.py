@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.forms import Form
-from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects.words import effect_names, joined
 from bayesplate.estimates.least_squares import reading_scales
 from bayesplate.frequencies.model import setup_model
@@ -103,7 +102,7 @@ def _to_tell_apart(asked: Sequence[str], now: Option, further: Sequence[Option])
     """What would make effects that show less alike."""
     best = min(further, key=lambda option: option.likeness)
     can_be_seen = len(asked) > 1 and min(now.visibility, best.visibility) >= 1.0
-    if not can_be_seen or best.likeness > min(LOOK_ALIKE, now.likeness - _WORTH):
+    if not can_be_seen or best.likeness > now.likeness - _WORTH:
         return ""
     return (
         f"{best.sentence}: the largest likeness among {effect_names(asked)} would fall from {now.likeness:.2f} to "

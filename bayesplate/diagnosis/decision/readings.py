@@ -39,8 +39,8 @@ class Suspect:
 def suspects(found: Found) -> tuple[Suspect, ...]:
     """Readings without any one of which the others agree with the model, the least expected first."""
     ground = found.ground
-    if ground.baseline.n_modes < FEWEST:
-        return ()
+    if ground.baseline.n_modes < FEWEST or found.p_value(0) >= PASSES:
+        return ()  # too few to tell, or all of them agree
     bare, residuals = ground.hypotheses[0], found.residual[None, :]
     whole = float(bare.terms(ground.whole).log_evidence(residuals)[0])
     told = []

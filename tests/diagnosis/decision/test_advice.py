@@ -61,6 +61,10 @@ def test_of_several_ways_the_one_that_shows_most_is_recommended(monkeypatch):
     now, one, two = option(0.5, 0.1, 0.2), option(0.5, 5.0, 0.5, sentence="One"), option(0.5, 1.1, 1.2, sentence="Two")
     monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: (now, one, two))
     assert recommendation(None, ("a", "b")).startswith("Two: a and b would then show")
+    two, one = option(0.5, 1.1, 1.2, 0.1, sentence="Two"), option(0.5, 1.5, 0.5, 0.5, sentence="One")
+    now = option(0.5, 0.1, 0.2, 0.1)
+    monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: (now, one, two))
+    assert recommendation(None, ("a", "b", "c")).startswith("Two: a and b would then show")
     monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: (now,))
     assert recommendation(None, ("a", "b")) == recommendation(None, ()) == ""
 

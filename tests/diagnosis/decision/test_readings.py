@@ -31,6 +31,7 @@ def test_the_reading_that_is_wrong_is_named(mode, size):
     assert f"read as {hertz:.6g} Hz" in sentence
     assert ("above" if size > 0 else "below") in sentence
     assert suspects(found)[0].off == pytest.approx(size, rel=0.2)
+    assert f"the {hertz * np.exp(-suspects(found)[0].off):.4g} Hz that they let expect" in sentence
 
 
 def test_two_wrong_readings_are_not_one():
@@ -50,6 +51,18 @@ def test_where_several_readings_may_be_the_wrong_one_none_is_named():
     assert {one.index for one in told} == {0, 1}
     assert told[0].log_weight - told[1].log_weight < np.log(3.0)
     assert wrong_reading(found) == ""
+
+
+def test_of_two_the_one_that_is_clearly_less_expected_is_named():
+    found = found_of(0.04 * np.eye(6)[3], n_modes=6)
+    assert [one.index for one in suspects(found)] == [3, 0]
+    assert wrong_reading(found).startswith("Read (3,0) again")
+
+
+def test_no_reading_is_wrong_where_all_agree():
+    found = found_of(0.04 * np.eye(6)[0], n_modes=6)
+    assert found.p_value(0) > 0.05
+    assert suspects(found) == ()
 
 
 def test_the_setup_is_named_where_there_are_several():
