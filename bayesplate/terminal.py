@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from io import StringIO
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -74,24 +75,26 @@ def _close_output() -> None:
 
 @contextmanager
 def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]:
-    """A status line on the standard error while sampling; a line now and then where that is no terminal."""
+    """A status line on the standard error while at work; a line now and then where that is no terminal."""
     if not shown:
         yield None
         return
     from rich.console import Console
 
-    console = Console(stderr=True)
+    console, started, stage = Console(stderr=True), monotonic(), ""
     with console.status("reading the card and solving the plate") as status:
         # Now, and not when first told: Python gives another exit code to a run that is interrupted while it defines
         # classes of an import by executing text.
         from bayesplate.workflow.shown import progress_text
 
         def tell(progress: Progress) -> None:
-            text = progress_text(progress)
+            nonlocal stage
+            text = progress_text(progress, monotonic() - started)
             if console.is_terminal:
                 status.update(text)
-            elif progress.n_steps % 1000 == 0:
+            elif progress.stage != stage or (progress.n_steps % 1000 == 0 and progress.n_steps):
                 click.echo(text, err=True)
+            stage = progress.stage
 
         yield tell
 

@@ -32,6 +32,11 @@ AFTER = Errors(
     log_score=-15.5,
     hits_90=1.0,
 )
+WORDS = {
+    "membrane_tension": "membrane tension",
+    "air_loading": "air loading",
+    "relabelling": "relabelling (1,0) and (0,1)",
+}
 SHIFT = {
     "E_x": ElasticShift(before=10.25e9, after=11.5e9, shift_in_sd=2.5),
     "E_y": ElasticShift(before=1.0e9, after=0.75e9, shift_in_sd=-1.25),
@@ -101,7 +106,9 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         verdict=word,
         claim=claim,
         effects=effects,
+        words=" or ".join(WORDS[name] for name in effects),
         refitted=refitted,
+        refitted_words=" and ".join(WORDS[name] for name in refitted),
         reason="the reason of it",
         sentences=tuple(EFFECTS[name].sentence for name in effects),
         declared=(),
@@ -115,7 +122,12 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         elastic_shift=SHIFT if after else still,
         finalists=(finalist,) if after else (),
         elastic_averaged={name: spread(one.before) for name, one in SHIFT.items()},
-        answers=(Explanation(effects=("membrane_tension",), probability=0.97),),
+        rigidity_averaged={name: spread(value, "N m") for name, value in (("D_x", 30.0), ("D_y", 2.5), ("D_s", 5.0))},
+        answers=(
+            Explanation(effects=("membrane_tension",), probability=0.97, words="membrane tension"),
+            Explanation(effects=("air_loading",), probability=0.0075, words="air loading"),
+            Explanation(effects=("grain_angle",), probability=0.0025, words="grain angle"),
+        ),
         candidates=() if word == "undetectable" else (TENSION, AIR, GRAIN),
         recommendation=NEXT,
         notes=(),

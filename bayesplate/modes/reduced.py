@@ -18,6 +18,7 @@ from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 from bayesplate.modes.solve import ClassModes, solve_class
 
 _SPARE = 2
+_RESISTS = 1e-6
 _LOWEST_SHARE = 1e-6
 _ACCEPTED_CENTS = 0.1
 _STEADY = 0.05
@@ -172,8 +173,8 @@ def _reduce(
 ) -> tuple[ReducedBlock, float]:
     trained = [solve_class(block, weights, n_modes + _SPARE) for weights in training]
     vectors = [solution.vectors for solution in trained]
-    # A second mass lets elastic modes carry some rigid motion; with the board's own alone they are orthogonal to it.
-    rigid = trained[0].rigid[:, : block.n_rigid if block.n_masses > 1 else 0]
+    # A second mass or a support lets elastic modes carry some rigid motion; otherwise they are orthogonal to it.
+    rigid = trained[0].rigid[:, : block.n_rigid if block.n_masses > 1 or _is_supported(block, trained[0]) else 0]
     solutions = [solve_class(block, weights, n_modes + _SPARE) for weights in held_out]
     exact = np.stack([solution.eigenvalues[:n_modes] for solution in solutions])
     is_steady = _is_steady([*training, *held_out])
@@ -188,6 +189,15 @@ def _reduce(
             if worst <= _ACCEPTED_CENTS:
                 return reduced, worst
     return reduced, worst
+
+
+def _is_supported(block: Block, solution: ClassModes) -> bool:
+    """Whether a stiffness term resists the rigid motions."""
+    if not block.n_rigid:
+        return False
+    every = (block.project(block.terms, vectors) for vectors in (solution.rigid, solution.vectors))
+    resists, bends = (np.abs(terms).max(axis=(1, 2)) for terms in every)
+    return bool((resists > _RESISTS * bends).any())
 
 
 def _project(

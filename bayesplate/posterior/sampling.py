@@ -114,11 +114,24 @@ class Progress:
         Steps done and allowed.
     convergence : Convergence or None
         The last judgement; None before the first.
+    stage : str
+        What of a longer run is being done; empty if it is nothing but this sampling.
+    done : float or None
+        Share of that run, 0 to 1; None where nobody knows.
     """
 
     n_steps: int
     max_steps: int
     convergence: Convergence | None
+    stage: str = ""
+    done: float | None = None
+
+    @property
+    def sampled(self) -> float:
+        """Share of this sampling, by its autocorrelation times: 0 to 1."""
+        if self.convergence is None:
+            return 0.0
+        return min(self.convergence.n_kept_steps / self.convergence.tau_max / Gate().tau_count_min, 1.0)
 
 
 def sample(

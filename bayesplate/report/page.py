@@ -37,7 +37,7 @@ from bayesplate.report.shares import shares_picture
 from bayesplate.report.signatures import before_after_picture, signatures_picture
 from bayesplate.report.style import Picture, visible
 from bayesplate.report.symbols import in_page
-from bayesplate.report.verdict import diagnosis_section
+from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, short_sentences
 from bayesplate.results.exports import write_exports
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
 from bayesplate.results.references import references
@@ -104,7 +104,7 @@ def write_report(
         vector = save_pictures(every, folder / FIGURES, "svg")
         shown = {place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}
         title = inference.problem.board.title or summary.name
-        write_exports(folder, summary, title)
+        write_exports(folder, quoted(summary, diagnosis), title)
         if diagnosis is not None:
             write_before_after(folder, diagnosis, title)
         write_text(page, render(card, inference, draws, summary, shown, diagnosis))
@@ -211,14 +211,14 @@ def render(
         css=Markup(css),  # our own file; the policy lets in nothing else
         title=board.title or board.name,
         name=board.name,
-        sentences=content.summary_sentences(summary),
-        warnings=summary.warnings,
+        sentences=short_sentences(summary, diagnosis),
+        warnings=page_warnings(summary, diagnosis),
         weak=summary.identifiability,
         effects=content.effect_sentences(summary),
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
         pictures=_with_all_places(shown),
         tables={
-            "constants": content.constants_table(summary),
+            "constants": content.constants_table(quoted(summary, diagnosis)),
             "effects": content.effects_table(summary),
             "makers": content.makers_table(summary),
             "ratios": content.ratios_table(summary),

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.tables import averaged_table, candidates_table, errors_table, shift_table
-from bayesplate.diagnosis.wording.told import remarks, verdict_sentences
+from bayesplate.diagnosis.wording.tables import (
+    answers_table,
+    averaged_table,
+    candidates_table,
+    errors_table,
+    shift_table,
+    sizes_table,
+)
+from bayesplate.diagnosis.wording.told import headline_sentence, remarks, shown_model, verdict_sentences, warnings
 from bayesplate.diagnosis.wording.words import VERDICTS
+from bayesplate.report.content import summary_sentences
+from bayesplate.results.contract import Elastic, Rigidity
+from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table
 
 
@@ -22,9 +32,11 @@ class DiagnosisSection:
         Each word that a verdict may be, what it means, and whether it is the one given.
     sentences : tuple of str
     tables : tuple of Table
-        Errors, shift of the constants, constants averaged over the effects.
+        Constants to quote, probabilities, errors, shift of the constants, sizes.
     explained : tuple of str
         What two words of these tables mean.
+    model : str
+        Which model the rest of the page is of.
     notes : tuple of str
     candidates : Table or None
     recommendation : str
@@ -35,6 +47,7 @@ class DiagnosisSection:
     sentences: tuple[str, ...]
     tables: tuple[Table, ...]
     explained: tuple[str, ...]
+    model: str
     notes: tuple[str, ...]
     candidates: Table | None
     recommendation: str
@@ -49,14 +62,54 @@ _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviation
 
 def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     """The section of a diagnosis."""
-    tables = (errors_table(diagnosis), shift_table(diagnosis), averaged_table(diagnosis))
+    tables = (
+        averaged_table(diagnosis),
+        answers_table(diagnosis),
+        errors_table(diagnosis),
+        shift_table(diagnosis),
+        sizes_table(diagnosis),
+    )
     return DiagnosisSection(
         heading=VERDICTS[diagnosis.verdict].heading,
         verdicts=tuple((word, one.heading, word == diagnosis.verdict) for word, one in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),
         tables=tuple(table for table in tables if table is not None),
         explained=(_LOG_SCORE, *((_SHIFT,) if diagnosis.is_refitted else ())),
+        model=shown_model(diagnosis),
         notes=tuple(remarks(diagnosis)),
         candidates=candidates_table(diagnosis),
         recommendation=diagnosis.recommendation,
     )
+
+
+def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
+    """A summary with the constants that are to be quoted, and the errors of the fit that they stand for.
+
+    Without a diagnosis it stays as it is; after one the constants are the averaged ones, and the errors those of the
+    first fit unless one model was named.
+    """
+    if diagnosis is None:
+        return summary
+    errors = diagnosis.after if diagnosis.verdict == "named" else diagnosis.before
+    return replace(
+        summary,
+        elastic=Elastic(**diagnosis.elastic_averaged),
+        rigidity=Rigidity(**diagnosis.rigidity_averaged),
+        error=replace(
+            summary.error,
+            in_sample_rms_cents=errors.in_sample_rms_cents,
+            leave_one_out_rms_cents=errors.leave_one_out_rms_cents,
+        ),
+    )
+
+
+def short_sentences(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:
+    """The first lines of a page: the constants to quote, what they are, and how far the frequencies are missed."""
+    first, *others = summary_sentences(quoted(summary, diagnosis))
+    what = "" if diagnosis is None else headline_sentence(diagnosis)
+    return [first, *([what] if what else []), *others]
+
+
+def page_warnings(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:
+    """What stands beneath them: doubts of the diagnosis, then those of the fit."""
+    return [*(warnings(diagnosis) if diagnosis is not None else []), *summary.warnings]

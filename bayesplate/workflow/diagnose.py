@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from bayesplate.diagnosis.decision.advice import recommendation
+from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import excludes_zero, likely_forms, refit_board
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives, answers, decide
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, alternatives, answer_words, answers, decide
 from bayesplate.diagnosis.evidence.folds import nested
-from bayesplate.diagnosis.evidence.hypotheses import order_conflicts
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
+from bayesplate.diagnosis.evidence.order import order_notes
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
@@ -34,10 +35,13 @@ from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.workflow.fitting import Fitted, fitted, opened, with_board
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.stages import Stages
 
 _NULL_LINE = 7
 _MOST_ASKED = 4
 _MOST_FINALISTS = 3
+_FIT, _SEARCH, _CONTROL = 3.0, 3.0, 1.0
+"""How long the parts take beside each other, for the time that is left."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,7 +122,7 @@ def diagnose(
     n_null : int
         Data sets of the null control.
     progress : callable, optional
-        Told after every chunk of sampling.
+        Told when a part begins and after every chunk of sampling, with the share of the whole that is done.
 
     Returns
     -------
@@ -140,22 +144,30 @@ def diagnose(
     begun = opened(problem, seed, out, force=force, resume=resume, first=BEFORE)
     folder = begun.folder
 
-    def run(under: Problem, name: str) -> Fitted:
+    stages = Stages(progress, _FIT + _SEARCH + _CONTROL + _FIT)
+
+    def run(under: Problem, name: str, stage: str) -> Fitted:
         def refuse(inference: Inference) -> None:
             refuse_unconverged(inference, seed, under, begun.path if name == BEFORE else None)
 
-        return fitted(under, seed, begun.checkpoints(name), refuse, progress)
+        stages.begin(stage, _FIT)
+        return fitted(under, seed, begun.checkpoints(name), refuse, stages.sampled)
 
-    before = run(problem, BEFORE)
-    found = search(prepare_search(baseline_of(before.inference.problem)))
+    before = run(problem, BEFORE, "fit without further effects")
+    stages.begin("search for effects", _SEARCH)
+    found = search(prepare_search(baseline_of(before.inference.problem), tell=stages.reached))
     verdict = decide(found)
+    finals = finalists(found, verdict)
+    stages.left = _CONTROL + _FIT * len(finals)
+    stages.begin("the same search on simulated boards", _CONTROL)
     control = null_control(found, np.random.default_rng([seed, _NULL_LINE]), n_null)
     refits: dict[int, Fitted] = {}
-    notes = list(order_conflicts(found.ground.baseline))
-    for answer in finalists(found, verdict):
+    notes = list(order_notes(found))
+    for answer in finals:
         try:
             name = "-".join((*answer.members, str(answer.index)))
-            refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name)
+            stage = f"fit with {answer_words(found, answer)}"
+            refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
             notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
     case = _case(found, verdict, control, before, refits, tuple(notes))
@@ -174,9 +186,7 @@ def diagnose(
 
 def finalists(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
     """Explanations to fit again by the sampler: the one that is named, or the first few alternatives of a group."""
-    if not verdict.index:
-        return ()
-    return alternatives(found, answers(found))[: _MOST_FINALISTS if verdict.word != "named" else 1]
+    return accepted(found, verdict)[:_MOST_FINALISTS]
 
 
 def _case(
@@ -198,18 +208,25 @@ def _case(
         before=Side(0, before.summary, before.draws),
         after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
         is_clear_of_zero=clear,
-        recommendation=recommendation(found, asked_about(found, verdict)),
+        recommendation=advice(found, verdict),
         finalists=[(one, refits[one.index].summary) for one in finalists(found, verdict) if one.index in refits],
+        drawn={index: one.draws for index, one in refits.items()},
         notes=notes,
     )
+
+
+def advice(found: Found, verdict: Verdict) -> str:
+    """What to do next: read a wrong reading again, or measure what would tell more; empty if nothing would help."""
+    if verdict.word == "unexplained":
+        return wrong_reading(found)
+    return recommendation(found, asked_about(found, verdict))
 
 
 def asked_about(found: Found, verdict: Verdict) -> tuple[str, ...]:
     """Effects that the next measurement should tell apart: the alternatives, or what is most probable so far."""
     ranked = answers(found)
-    if verdict.word in ("named", "indistinguishable group"):
-        near = alternatives(found, ranked) if verdict.word != "named" else ranked[:2]
-    else:
-        near = ranked[:3]
+    near = alternatives(found, ranked) if verdict.index else ranked[:3]
+    if verdict.index and len(near) == 1:
+        return ()
     names = dict.fromkeys(name for one in near for name in one.members if name in found.ground.candidates)
     return tuple(names)[:_MOST_ASKED]

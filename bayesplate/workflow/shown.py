@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.tables import candidates_table, errors_table, shift_table
-from bayesplate.diagnosis.wording.told import verdict_sentence
+from bayesplate.diagnosis.wording.tables import every_table
+from bayesplate.diagnosis.wording.told import alike_sentence, verdict_sentence, warnings
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.checking import CheckReport
@@ -90,13 +90,9 @@ def show_compare(comparison: Comparison) -> Shown:
 
 def show_diagnosis(diagnosis: Diagnosis) -> Shown:
     """The result of `bayesplate.workflow.diagnose.diagnose` for a person."""
-    tables = (errors_table(diagnosis), shift_table(diagnosis), candidates_table(diagnosis, narrow=True))
-    return Shown(
-        tuple(table for table in tables if table is not None),
-        (*diagnosis.sentences, diagnosis.recommendation),
-        diagnosis.notes,
-        verdict_sentence(diagnosis),
-    )
+    told = (*diagnosis.sentences, alike_sentence(diagnosis), diagnosis.recommendation)
+    remarks = tuple(sentence for sentence in told if sentence)
+    return Shown(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))
 
 
 def show_modes(report: ModesReport) -> Shown:
@@ -105,8 +101,22 @@ def show_modes(report: ModesReport) -> Shown:
     return Shown(sheet_tables(report), proposal_remarks(report), report.notes, f"Frequencies {report.basis}{files}")
 
 
-def progress_text(progress: Progress) -> str:
-    """Where sampling stands, in one line."""
+def progress_text(progress: Progress, seconds: float = 0.0) -> str:
+    """Where a run stands after so many seconds, in one line: the share done, the time left, and the sampling."""
+    if not progress.stage:
+        return _sampling_text(progress)
+    done = progress.done or 0.0
+    left = f", about {_time_words(seconds * (1.0 - done) / done)} left" if done > 0.0 else ""
+    sampling = f"; {_sampling_text(progress)}" if progress.n_steps else ""
+    return f"{100.0 * done:.0f} % done{left}: {progress.stage}{sampling}"
+
+
+def _time_words(seconds: float) -> str:
+    """A time as people say it."""
+    return f"{max(round(seconds), 1)} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+
+
+def _sampling_text(progress: Progress) -> str:
     text = f"sampling: step {progress.n_steps} of at most {progress.max_steps}"
     verdict = progress.convergence
     if verdict is None:

@@ -76,6 +76,11 @@ def test_a_size_is_at_its_limit_where_half_a_percent_of_its_prior_lies_beyond(ba
     found = replace(found, residual=of_a.shift[int(np.argmin(np.abs(of_a.z[:, 0] - z)))])
 
     assert bool(at_limit(found, 1)) is is_limited
+    one = found.ground.candidates[A]
+    free = replace(one.laws[0].form.free[0], unit="kg")
+    law = replace(one.laws[0], form=replace(one.laws[0].form, free=(free,)))
+    weighed = replace(found, ground=replace(found.ground, candidates={A: replace(one, laws=(law,))}))
+    assert at_limit(weighed, 1) == ("" if not is_limited else f"size = {1000 * float(prior.value(z)):.3g} g")
 
 
 @pytest.mark.parametrize(("likeness", "alike"), [(0.949, False), (0.951, True), (-0.949, False), (-0.951, True)])
@@ -86,7 +91,7 @@ def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike):
     one = one / np.linalg.norm(one / base.scales)
     other = other - one * np.sum(one * other / base.scales**2)
     other = likeness * one + np.sqrt(1.0 - likeness**2) * other / np.linalg.norm(other / base.scales)
-    seen = [Signature(name, {}, d / base.scales, d / base.scales, {}, 1.0) for name, d in ((A, one), (B, other))]
+    seen = [Signature(name, {}, d, d, {}, 1.0, base.scales) for name, d in ((A, one), (B, other))]
 
     assert look_alikes(seen) == {A: (B,) if alike else (), B: (A,) if alike else ()}
     assert entry_of(found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6))).look_alikes == (B,) * alike

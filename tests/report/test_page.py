@@ -210,12 +210,12 @@ def test_each_verdict_is_told_in_plain_words(clamped, verdict):
 
 
 def test_constants_averaged_over_the_effects_are_shown(clamped):
-    averaged = {"E_x": replace(spread(10.25e9), sd=0.5e9, q05=9.5e9, q95=11.0e9)}
+    averaged = DIAGNOSES["named"].elastic_averaged | {"E_x": replace(spread(10.25e9), sd=0.5e9, q05=9.5e9, q95=11.0e9)}
     found = replace(DIAGNOSES["named"], elastic_averaged=averaged)
     text = Read(clamped.page("A board", diagnosis=found)).text
 
-    assert "if any of the effects may be there" in text
-    assert "10.25 ± 0.50" in text
+    assert "averaged over all explanations by their probability" in text
+    assert text.count("10.25 ± 0.50") == 3  # in short, of the verdict, and beside the older methods
     assert "9.50 to 11.00" in text
 
 
@@ -250,6 +250,31 @@ def test_no_symbol_is_left_as_it_is_typed(clamped):
     page = Read(clamped.page("A board", diagnosis=DIAGNOSES["named"]))
 
     assert re.findall(r"\b[EGD]_[a-z]+", page.text) == []
+
+
+@pytest.mark.parametrize("verdict", DIAGNOSES)
+def test_the_first_lines_are_of_the_constants_to_quote(clamped, verdict):
+    """Averaged ones, with the errors of the first fit unless one model is named; where nothing fits, with a warning."""
+    found = DIAGNOSES[verdict]
+    found = replace(found, elastic_averaged=found.elastic_averaged | {"E_x": spread(7.5e9)})
+    first = " ".join(Read(clamped.page("A board", diagnosis=found)).text.partition("Is the ideal plate")[0].split())
+    assert "7.50 ± 0.75 GPa along the grain" in first
+    assert ("averaged over everything that may be the case" in first) is (verdict != "unexplained")
+    assert ("too narrow" in first) is (verdict == "unexplained")
+    assert ("by 4 cents" in first, "by 21 cents" in first) == (verdict == "named", verdict != "named")
+
+
+def test_a_page_says_which_member_of_a_group_the_rest_is_of(clamped):
+    text = " ".join(Read(clamped.page("A board", diagnosis=DIAGNOSES["indistinguishable group"])).text.split())
+    assert "with membrane tension, which is only one of the explanations. Quote the averaged constants." in text
+    silent = replace(DIAGNOSES["none needed"], recommendation="")
+    assert "What to measure next" not in Read(clamped.page("A board", diagnosis=silent)).text
+
+
+def test_the_exported_constants_are_those_to_quote(clamped, tmp_path):
+    clamped.write(tmp_path / "group", DIAGNOSES["indistinguishable group"])
+    rows = (tmp_path / "group" / "constants.csv").read_text(encoding="utf-8").splitlines()
+    assert [float(row.split(",")[2]) for row in rows[1:]] == pytest.approx([10.25, 1.0, 0.5, 30.0, 2.5, 5.0])
 
 
 def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path):

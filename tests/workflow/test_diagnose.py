@@ -99,7 +99,7 @@ def test_diagnosis_json_keeps_its_contract(which, request):
         assert one["amplitude"] is None or set(one["amplitude"]) >= {"q05", "q50", "q95", "unit"}
         assert one["bias_percent"] is None or set(one["bias_percent"]) == MODULI
     assert 0.0 <= found["gain_null_percentile"] <= 100.0
-    assert found["recommendation"].endswith(".")
+    assert found["recommendation"] == "" or found["recommendation"].endswith(".")
 
 
 def test_what_is_printed_as_json_is_what_is_written(with_shear):

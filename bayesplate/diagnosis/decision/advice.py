@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.forms import Form
-from bayesplate.effects.words import effect_names
+from bayesplate.effects.words import effect_names, joined
 from bayesplate.estimates.least_squares import reading_scales
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.spectrum import spectrum
@@ -28,6 +28,9 @@ _FURTHER_MODES = 3
 _FREE_MODES = 6
 _SEARCHED = 24
 _MOST_EFFECTS = 4
+_REFITS = 2
+_WORTH = 0.05
+"""A likeness that falls by less is no reason to measure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +43,18 @@ class Option:
         What to measure.
     likeness : float
         Largest |cos| between the visible parts of two of the effects asked about; 0 for a single one.
-    visibility : float
-        Smallest visible rms among them, in units of the rms below which a visible part drowns in the noise.
+    seen : tuple of float
+        Visible rms of each of them, in units of the rms below which a visible part drowns in the noise.
     """
 
     sentence: str
     likeness: float
-    visibility: float
+    seen: tuple[float, ...]
+
+    @property
+    def visibility(self) -> float:
+        """The smallest of these."""
+        return min(self.seen, default=0.0)
 
 
 def options(found: Found, effects: Sequence[str]) -> tuple[Option, ...]:
@@ -64,7 +72,8 @@ def options(found: Found, effects: Sequence[str]) -> tuple[Option, ...]:
         The readings as they are first, their sentence empty.
     """
     baseline = found.ground.baseline
-    asked = [found.ground.candidates[name].laws[0].form for name in effects if name in found.ground.candidates]
+    candidates = found.ground.candidates
+    asked = [candidates[name].laws[candidates[name].shown].form for name in effects if name in candidates]
     return tuple(
         _judged(sentence, board, baseline.values, asked[:_MOST_EFFECTS])
         for sentence, board in _boards(baseline.board, baseline.values)
@@ -72,7 +81,7 @@ def options(found: Found, effects: Sequence[str]) -> tuple[Option, ...]:
 
 
 def recommendation(found: Found, effects: Sequence[str]) -> str:
-    """One sentence: what to measure next, and why.
+    """One sentence: what to measure next, and why; empty where no further reading that was looked at would help.
 
     Parameters
     ----------
@@ -80,21 +89,41 @@ def recommendation(found: Found, effects: Sequence[str]) -> str:
     effects : sequence of str
         The explanations that are left, or the effects that cannot be seen; at most four are looked at.
     """
-    judged = options(found, effects)
-    if len(judged) < 2 or not effects:
-        return "Measure the same modes again on another day: the spread between sessions is the noise to expect."
-    now, further = judged[0], judged[1:]
-    if len(effects) > 1 and now.visibility >= 1.0:
-        best = min(further, key=lambda option: option.likeness)
-        if best.likeness < now.likeness:
-            return (
-                f"{best.sentence}: the largest likeness among {effect_names(effects[:_MOST_EFFECTS])} would fall from "
-                f"{now.likeness:.2f} to {best.likeness:.2f}."
-            )
-    best = max(further, key=lambda option: option.visibility)
+    asked = tuple(effects)[:_MOST_EFFECTS]
+    if not asked:
+        return ""
+    now, *further = options(found, asked)
+    if not further:
+        return ""
+    return _to_tell_apart(asked, now, further) or _to_see(asked, now, further)
+
+
+def _to_tell_apart(asked: Sequence[str], now: Option, further: Sequence[Option]) -> str:
+    """What would make effects that show less alike."""
+    best = min(further, key=lambda option: option.likeness)
+    can_be_seen = len(asked) > 1 and min(now.visibility, best.visibility) >= 1.0
+    if not can_be_seen or best.likeness > now.likeness - _WORTH:
+        return ""
     return (
-        f"{best.sentence}: the least visible of {effect_names(effects[:_MOST_EFFECTS])} would show with "
-        f"{best.visibility:.1f} times the smallest trace that can be seen, {now.visibility:.1f} times now."
+        f"{best.sentence}: the largest likeness among {effect_names(asked)} would fall from {now.likeness:.2f} to "
+        f"{best.likeness:.2f}."
+    )
+
+
+def _to_see(asked: Sequence[str], now: Option, further: Sequence[Option]) -> str:
+    """What would bring the most of the hidden effects into sight."""
+
+    def revealed(option: Option) -> list[int]:
+        return [i for i, (old, new) in enumerate(zip(now.seen, option.seen, strict=True)) if old < 1.0 <= new]
+
+    best = max(further, key=lambda option: (len(revealed(option)), option.visibility))
+    shown = revealed(best)
+    if not shown:
+        return ""
+    then, today = (joined([f"{option.seen[i]:.1f}" for i in shown]) for option in (best, now))
+    return (
+        f"{best.sentence}: {effect_names([asked[i] for i in shown])} would then show, with {then} times the smallest "
+        f"trace that can be seen ({today} times now)."
     )
 
 
@@ -148,13 +177,15 @@ def _judged(sentence: str, board: Board, values: Values, asked: Sequence[Form]) 
         with_form = _carrying(board, form)
         there = _at_nominal(with_form, form, values)
         raw = _solved(with_form, there)[0] - bare
-        moved = -absorbing @ raw
-        again = _solved(with_form, _moved(there, moved))[0] - bare
-        visible.append((again - slopes @ (absorbing @ again)) / scales)
+        left, moved = raw, np.zeros(len(RIGIDITIES))
+        for _ in range(_REFITS):
+            moved = moved + absorbing @ left
+            left = raw - (_solved(board, _moved(values, moved))[0] - bare)
+        visible.append((left - slopes @ (absorbing @ left)) / scales)
     limit = 2.0 / np.sqrt(scales.size)
-    rms = [float(np.sqrt(np.mean(one**2))) / limit for one in visible]
+    seen = tuple(float(np.sqrt(np.mean(one**2))) / limit for one in visible)
     likeness = [abs(_cosine(one, other)) for one, other in combinations(visible, 2)]
-    return Option(sentence, max(likeness, default=0.0), min(rms, default=0.0))
+    return Option(sentence, max(likeness, default=0.0), seen)
 
 
 def _carrying(board: Board, form: Form) -> Board:

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.folds import NEEDED
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.terms import normalised
-from bayesplate.effects.words import effect_names
+from bayesplate.effects.words import effect_name, effect_names
+from bayesplate.plate.parameter import unit_of_people
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -121,18 +123,18 @@ def decide(found: Found) -> Verdict:
             (),
             0,
             best,
-            f"with {effect_names(best.members)} the misfit is still too large (p = {passed:.3f})",
+            f"with {answer_words(found, best)} the misfit is still too large ({p_words(passed)})",
         )
     limit = at_limit(found, best.index)
     if limit:
         return Verdict(
-            "unexplained", (), 0, best, f"{effect_names(best.members)} fits only at the limit of its range: {limit}"
+            "unexplained", (), 0, best, f"{answer_words(found, best)} fits only at the limit of its range: {limit}"
         )
     rivals = [one for one in ranked[1:] if one.support * WITHIN >= best.support]
     nearest = max((one.support for one in rivals), default=0.0)
     if best.support >= CLEARLY * nearest:
         return Verdict(
-            "named", best.members, best.index, best, f"{effect_names(best.members)} has no rival within a factor 3"
+            "named", best.members, best.index, best, f"{answer_words(found, best)} has no rival within a factor 3"
         )
     group = tuple(dict.fromkeys(name for one in (best, *rivals) for name in one.members))
     return Verdict(
@@ -144,12 +146,12 @@ def _without(found: Found, best: Answer | None) -> Verdict:
     """No effect is probable enough: the bare model passes, cannot be questioned, or fails without a reason."""
     passed = found.p_value(0)
     if passed < PASSES:
-        reason = f"the misfit is too large for the noise (p = {passed:.3f}), but no effect is probable enough"
+        reason = f"the misfit is too large for the noise ({p_words(passed)}), but no effect is probable enough"
         return Verdict("unexplained", (), 0, best, reason)
     hidden = all(found.ground.is_below_detection_limit(name) for name in found.ground.candidates)
     if found.ground.candidates and hidden:
         return Verdict("undetectable", (), 0, best, "every effect is below what these readings could show")
-    return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave (p = {passed:.3f})")
+    return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave ({p_words(passed)})")
 
 
 def at_limit(found: Found, index: int) -> str:
@@ -170,7 +172,8 @@ def at_limit(found: Found, index: int) -> str:
                 order = np.argsort(z)
                 median = z[order][np.searchsorted(np.cumsum(shares[order]), 0.5 * shares.sum())]
                 if _is_extreme(free.prior, float(median)):
-                    return f"{free.key} = {float(free.prior.value(median)):.3g} {free.unit}".removesuffix(" 1")
+                    factor, unit = unit_of_people(free.unit)
+                    return f"{free.key} = {factor * float(free.prior.value(median)):.3g} {unit}".rstrip()
     return ""
 
 
@@ -211,6 +214,26 @@ def _is_extreme(prior: Quantity, z: float) -> bool:
     near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
     near_bottom = np.isfinite(low) and not starts_at_nothing and (ndtr(z) - ndtr(low)) / whole < AT_LIMIT
     return bool(near_top or near_bottom)
+
+
+def accepted(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
+    """The answers that a verdict stands for: the one that is named, the alternatives of a group, or none."""
+    if not verdict.index or verdict.best is None:
+        return ()
+    return (verdict.best,) if verdict.word == "named" else alternatives(found, answers(found))
+
+
+def answer_words(found: Found, answer: Answer) -> str:
+    """An answer in words: its effects, or the labels that it exchanges."""
+    swap = found.ground.hypotheses[answer.index].swap
+    if swap is None:
+        return effect_names(answer.members)
+    return f"{effect_name(RELABELLING)} {swap.words(found.ground.baseline)}"
+
+
+def p_words(p_value: float) -> str:
+    """A p-value with three decimals, or as smaller than they show."""
+    return f"p = {p_value:.3f}" if p_value >= 0.0005 else "p < 0.001"
 
 
 def alternatives(found: Found, ranked: Sequence[Answer]) -> tuple[Answer, ...]:

@@ -37,6 +37,13 @@ class Swap:
         readings[:, [self.first, self.second]] = readings[:, [self.second, self.first]]
         return readings - baseline.log_frequency
 
+    def words(self, baseline: Baseline) -> str:
+        """Which labels: "(2,0) and (1,2)", with the setup where there are several."""
+        setups = baseline.board.setups
+        labels = [str(label) for setup in setups for label in setup.labels]
+        where = f" in setup {setups[baseline.setup_index[self.first]].name}" if len(setups) > 1 else ""
+        return f"{labels[self.first]} and {labels[self.second]}{where}"
+
     def in_fold(self, fold: Fold) -> Fold:
         """The fold that leaves out the same reading where the two are exchanged: it stands under the other label."""
         exchanged = {self.first: self.second, self.second: self.first}
@@ -116,26 +123,6 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
             if differ and readings[second] - readings[first] < CLOSE:
                 swaps.append(Swap(int(first), int(second)))
     return tuple(swaps)
-
-
-def order_conflicts(baseline: Baseline) -> tuple[str, ...]:
-    """Readings of one symmetry class that stand in another order than the modes they are called after.
-
-    Modes of one class do not cross: at a veering they exchange their figures, and a board that lacks something may show
-    the figures the other way round than the ideal one that is fitted to it. No search can mend that; it is said.
-    """
-    readings = baseline.residual + baseline.log_frequency
-    names = [f"{label}" for setup in baseline.board.setups for label in setup.labels]
-    sentences = []
-    for first, second in combinations(range(baseline.n_modes), 2):
-        one, other = baseline.places[first], baseline.places[second]
-        same = baseline.setup_index[first] == baseline.setup_index[second] and one.parity == other.parity
-        if same and (one.rank - other.rank) * (readings[first] - readings[second]) < 0:
-            sentences.append(
-                f"the readings {names[first]} and {names[second]} stand in the other order than these modes of the "
-                "fitted plate: compare their figures again, or fit with the two labels exchanged"
-            )
-    return tuple(sentences)
 
 
 def log_evidences(found: Sequence[Hypothesis], fold: Fold, residuals: Floats) -> Floats:

@@ -15,7 +15,7 @@ from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import Form, forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate
+from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate, traced_shift
 
 Floats = NDArray[np.float64]
 Solve = Callable[[Baseline, Form], FormLaw]
@@ -35,7 +35,12 @@ class Candidate:
     raw, visible : (n_modes,) array
         Shift at nominal size before and after the constants are refitted, ln f; of the form that shows most.
     moved : (3,) array
-        Change of ln D by that refit.
+        What that refit takes from ln D, so that the constants of a board with the effect are larger by it.
+    traced : (n_modes,) array, optional
+        The visible shift at the constants of a board with the effect that looks like the one at hand: what the search
+        goes by. By default the same as `visible`.
+    shown : int
+        Which of the laws `raw` and `visible` are of.
     """
 
     name: str
@@ -45,6 +50,8 @@ class Candidate:
     raw: Floats
     visible: Floats
     moved: Floats
+    traced: Floats | None = None
+    shown: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +81,17 @@ class Ground:
 
     def visibility(self, name: str) -> float:
         """Visible rms of a candidate in units of the rms that drowns in the noise: 2 noise / sqrt(n)."""
-        seen = self.baseline.whitened(self.candidates[name].visible)
+        seen = self.candidates[name].visible / self.baseline.scales
         return float(np.sqrt(np.mean(seen**2) * self.baseline.n_modes)) / 2.0
+
+    @property
+    def paired(self) -> tuple[str, ...]:
+        """Effects that may be one of two: those whose trace the search could see."""
+        return tuple(name for name, one in self.candidates.items() if self._is_traceable(one))
+
+    def _is_traceable(self, one: Candidate) -> bool:
+        seen = self.baseline.whitened(one.visible if one.traced is None else one.traced)
+        return not np.sqrt(np.sum(seen**2)) < 2.0
 
     def is_below_detection_limit(self, name: str) -> bool:
         """Whether this experiment could not see a candidate even if it were there."""
@@ -83,7 +99,7 @@ class Ground:
 
     def cosine(self, one: str, other: str) -> float:
         """Likeness of the visible parts of two candidates, -1 to 1; 0 where nothing is visible."""
-        first, second = (self.baseline.whitened(self.candidates[name].visible) for name in (one, other))
+        first, second = (self.candidates[name].visible / self.baseline.scales for name in (one, other))
         norms = float(np.linalg.norm(first) * np.linalg.norm(second))
         return float(first @ second) / norms if norms > 0 and self.n_directions else 0.0
 
@@ -120,7 +136,12 @@ class Found:
         return float(predictive_p_value(self.ground.hypotheses[index], self.ground.whole, self.residual[None, :])[0])
 
 
-def prepare_search(baseline: Baseline, solve: Solve | None = None, tried: Sequence[str] | None = None) -> Ground:
+def prepare_search(
+    baseline: Baseline,
+    solve: Solve | None = None,
+    tried: Sequence[str] | None = None,
+    tell: Callable[[float], None] | None = None,
+) -> Ground:
     """Tabulate every candidate of a board.
 
     Parameters
@@ -130,6 +151,8 @@ def prepare_search(baseline: Baseline, solve: Solve | None = None, tried: Sequen
         By default full solves around the baseline.
     tried : sequence of str, optional
         Effects to try; by default all that are not declared and can act.
+    tell : callable, optional
+        Told after every effect which share of them is done.
 
     Returns
     -------
@@ -137,15 +160,16 @@ def prepare_search(baseline: Baseline, solve: Solve | None = None, tried: Sequen
     """
     solve = form_law if solve is None else solve
     candidates = {}
-    for name, each in forms(baseline.board).items():
-        if tried is None or name in tried:
-            laws = tuple(solve(baseline, form).placed(baseline) for form in each)
-            candidates[name] = _candidate(baseline, name, laws)
+    every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
+    for name, each in every.items():
+        laws = tuple(solve(baseline, form).placed(baseline) for form in each)
+        candidates[name] = _candidate(baseline, name, laws)
+        if tell is not None:
+            tell(len(candidates) / len(every))
     ground = Ground(baseline, candidates, ())
     fine = {name: one.fine for name, one in candidates.items()}
     coarse = {name: one.coarse for name, one in candidates.items()}
-    paired = [name for name in candidates if not ground.is_below_detection_limit(name)]
-    return Ground(baseline, candidates, hypotheses(baseline, fine, coarse, paired))
+    return Ground(baseline, candidates, hypotheses(baseline, fine, coarse, ground.paired))
 
 
 def search(ground: Ground, residual: Floats | None = None) -> Found:
@@ -157,6 +181,7 @@ def search(ground: Ground, residual: Floats | None = None) -> Found:
 
 def _candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Candidate:
     shifts = [nominal_shift(baseline, law) for law in laws]
-    raw, visible, moved = max(shifts, key=lambda three: float(np.nansum(three[1] ** 2)))
+    shown = int(np.argmax([np.nansum((visible / baseline.scales) ** 2) for _, visible, _ in shifts]))
+    traced = max((traced_shift(baseline, law) for law in laws), key=lambda shift: float(np.nansum(shift**2)))
     fine, coarse = tabulate(baseline, name, laws), tabulate(baseline, name, laws, COARSE)
-    return Candidate(name, laws, fine, coarse, raw, visible, moved)
+    return Candidate(name, laws, fine, coarse, *shifts[shown], traced, shown)

@@ -31,8 +31,7 @@ def inclusion_with_width(found: Found, factor: float) -> dict[str, float]:
     ground = found.ground
     fine = {name: _widened(one, one.fine, factor) for name, one in ground.candidates.items()}
     coarse = {name: _widened(one, one.coarse, factor) for name, one in ground.candidates.items()}
-    paired = [name for name in ground.candidates if not ground.is_below_detection_limit(name)]
-    widened = hypotheses(ground.baseline, fine, coarse, paired)
+    widened = hypotheses(ground.baseline, fine, coarse, ground.paired)
     evidences = log_evidences(widened, ground.whole, found.residual[None, :])
     shares = probabilities(widened, evidences)[:, 0]
     result = {name: float(shares[[name in one.members for one in widened]].sum()) for name in ground.candidates}

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.least_squares import Estimate, log_measured, reading_scales
-from bayesplate.estimates.refit import design
+from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
@@ -55,6 +55,8 @@ class Baseline:
         Of the labelled modes, setup after setup.
     symmetry : tuple of (bool, bool)
         Whether each setup's two halves are alike along x and along y.
+    predict : callable, optional
+        ln f (Hz) of the readings as a function of x, without the effect; by default linear.
     """
 
     board: Board
@@ -66,6 +68,7 @@ class Baseline:
     input_slopes: Floats
     places: tuple[Place, ...]
     symmetry: tuple[tuple[bool, bool], ...]
+    predict: Predict | None = None
 
     @property
     def n_modes(self) -> int:
@@ -96,6 +99,30 @@ class Baseline:
         """What constants leave of a shift, in units of each reading's uncertainty: (n_modes,) arrays."""
         return np.asarray((shift - self.slopes @ (self.absorbing @ shift)) / self.scales)
 
+    def refitted_to(self, shift: Floats) -> tuple[Floats, Floats]:
+        """The constants fitted again, by weighted least squares, to frequencies that have shifted.
+
+        Parameters
+        ----------
+        shift : (n_modes,) array
+
+        Returns
+        -------
+        visible : (n_modes,) array
+            What they leave of the shift: weighted by the readings' uncertainties it is never the larger one.
+        step : (3,) array
+            Change of ln D.
+        """
+        if self.predict is None or not np.isfinite(shift).all():
+            step = self.absorbing @ shift
+            return shift - self.slopes @ step, step
+        fitted = refit(self.predict, self.log_frequency + shift, self.scales, self.log_rigidities)
+        return self.log_frequency + shift - self.predict(fitted[None, :])[0], fitted - self.log_rigidities
+
+    def weighted_rms(self, shift: Floats) -> float:
+        """Rms over the modes, each with the weight that it has in the fit, in the unit of a (n_modes,) array."""
+        return weighted_rms(shift, self.scales)
+
 
 def baseline_of(problem: PosedProblem) -> Baseline:
     """The baseline of a problem that is ready to be sampled, at the centre of its posterior under the exact law."""
@@ -117,7 +144,13 @@ def baseline_of(problem: PosedProblem) -> Baseline:
         input_slopes=inputs,
         places=places_of(problem.posterior.models),
         symmetry=symmetry_of(problem.posterior.models),
+        predict=lambda x: predict(np.concatenate([x, np.tile(at[N_RIGIDITIES:], (len(x), 1))], axis=1)),
     )
+
+
+def weighted_rms(shift: Floats, scales: Floats) -> float:
+    """Root of the mean square of (n_modes,) shifts, weighted by the inverse squares of the readings' uncertainties."""
+    return float(np.sqrt(np.average(shift**2, weights=1.0 / scales**2)))
 
 
 def baseline_at(board: Board, estimate: Estimate) -> Baseline:

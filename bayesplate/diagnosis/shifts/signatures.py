@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.diagnosis.shifts.baseline import weighted_rms
 from bayesplate.effects import EFFECTS, declare, effects_of
 from bayesplate.estimates.refit import Predict, refit
 from bayesplate.frequencies.laws import cents
@@ -27,7 +28,10 @@ from bayesplate.posterior.parameters import N_RIGIDITIES
 Floats = NDArray[np.float64]
 
 LOOK_ALIKE = 0.95
-"""|cos| of two visible parts above which no data of this kind can tell two effects apart."""
+"""|cos| of two visible parts above which two effects look alike: they differ by less than a third of their trace.
+
+A remark, no rule: whether the readings tell two of them apart is said by their probabilities.
+"""
 
 INVISIBLE = (
     "A uniform change of thickness, density or side lengths cannot be seen in the frequencies: it goes into the "
@@ -52,6 +56,8 @@ class Signature:
         What ignoring the effect does to E_x, E_y, G_xy.
     detection_limit_cents : float
         Rms below which a visible part drowns in the noise: 2 noise / sqrt(n).
+    scales : (n_modes,) array
+        Relative uncertainty of each reading: its weight in the fit, in every rms and in the likeness of two effects.
     """
 
     effect: str
@@ -60,16 +66,17 @@ class Signature:
     visible: Floats
     bias_percent: Mapping[str, float]
     detection_limit_cents: float
+    scales: Floats
 
     @property
     def raw_rms(self) -> float:
-        """Rms shift over the modes, cents."""
-        return float(np.sqrt(np.mean(self.raw**2)))
+        """Weighted rms shift over the modes, cents."""
+        return weighted_rms(self.raw, self.scales)
 
     @property
     def visible_rms(self) -> float:
-        """Rms over the modes of the visible part, cents."""
-        return float(np.sqrt(np.mean(self.visible**2)))
+        """Weighted rms over the modes of the visible part, cents: never more than the raw one."""
+        return weighted_rms(self.visible, self.scales)
 
     @property
     def is_below_detection_limit(self) -> bool:
@@ -103,7 +110,7 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
     start = problem.centre[:N_RIGIDITIES]
     base = predict(start[None, :])[0]
     scales = problem.estimate.scales
-    noise = float(np.sqrt(np.mean(cents(scales) ** 2)))
+    noise = float(1.0 / np.sqrt(np.mean(1.0 / cents(scales) ** 2)))
     result = []
     for name in candidates(problem.board) if names is None else names:
         shifted, size = frequencies_with(problem, name)
@@ -116,6 +123,7 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
                 visible=cents(shifted - predict(fitted[None, :])[0]),
                 bias_percent=_bias(problem, start, fitted),
                 detection_limit_cents=2.0 * noise / np.sqrt(base.size),
+                scales=scales,
             )
         )
     return tuple(result)
@@ -164,8 +172,9 @@ def look_alikes(found: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
 
 def cosine(one: Signature, other: Signature) -> float:
     """Cosine of the visible parts of two effects; 0 if one has none."""
-    norms = float(np.linalg.norm(one.visible) * np.linalg.norm(other.visible))
-    return float(one.visible @ other.visible) / norms if norms > 0 else 0.0
+    first, second = one.visible / one.scales, other.visible / other.scales
+    norms = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(first @ second) / norms if norms > 0 else 0.0
 
 
 def _bias(problem: PosedProblem, true: Floats, fitted: Floats) -> dict[str, float]:

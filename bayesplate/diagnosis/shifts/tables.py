@@ -173,12 +173,17 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Float
 
 
 def nominal_shift(baseline: Baseline, law: FormLaw) -> tuple[Floats, Floats, Floats]:
-    """Raw and visible shift at the form's nominal size, (n_modes,) arrays, ln f, and what the refit changed, (3,)."""
-    z = np.array([[float(free.prior.standard(free.nominal)) for free in law.form.free]])
-    values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
+    """Raw and visible shift at the nominal size, (n_modes,) arrays, ln f, and what the refit hides of ln D, (3,)."""
+    values = {free.name: np.array([free.nominal]) for free in law.form.free}
     raw = law.log_frequencies(baseline, baseline.log_rigidities[None, :], values)[0] - baseline.log_frequency
-    visible, moved = refitted(baseline, law, z)
-    return raw, visible[0], moved[0]
+    visible, step = baseline.refitted_to(raw)
+    return raw, visible, -step
+
+
+def traced_shift(baseline: Baseline, law: FormLaw) -> Floats:
+    """Visible shift at the form's nominal size where the search finds the constants: (n_modes,) array, ln f."""
+    z = np.array([[float(free.prior.standard(free.nominal)) for free in law.form.free]])
+    return refitted(baseline, law, z)[0][0]
 
 
 def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: tuple[int, int, int]) -> Table:

@@ -15,7 +15,7 @@ Fate = Literal["in the verdict", "not detectable", "not needed", "not establishe
 
 @dataclass(frozen=True, kw_only=True)
 class Amplitude:
-    """Posterior quantiles of an effect's first parameter, given that the effect is there.
+    """Posterior quantiles of an effect's first parameter, given that it is there; all alike if the card fixes it.
 
     Attributes
     ----------
@@ -44,8 +44,9 @@ class EffectEntry:
     name, setup : str
         `setup` is "board" for an effect of the whole board.
     raw_rms_cents, visible_rms_cents : float or None
-        Shift of the modes at the nominal size, and what is left of it after the constants are fitted again; None where
-        there is no frequency, or nothing is left because there are as many constants as modes.
+        Shift of the modes at the nominal size, and what is left of it after the constants are fitted again, both with
+        the weights of that fit, so that the second is never the larger; None where there is no frequency, or nothing
+        is left because there are as many constants as modes.
     visible_cents : tuple of (float or None)
         The same mode by mode.
     below_detection_limit : bool
@@ -57,7 +58,7 @@ class EffectEntry:
         Against no effect, and the part of it that the width of the prior costs.
     p_value : float or None
     amplitude : Amplitude or None
-        None if its size is fixed.
+        None if it has no size.
     look_alikes : tuple of str
     rejected_because : str or None
         None if it is part of the verdict.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry
-from bayesplate.results.contract import Spread, as_json
+from bayesplate.results.contract import NOT_IN_JSON, Spread, as_json
 
 FORMAT = 1
 
@@ -100,10 +100,19 @@ class Finalist:
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """One way to explain the residual, an effect or a pair, with its probability."""
+    """One way to explain the residual, an effect, a pair or an exchange of labels, with its probability.
+
+    Attributes
+    ----------
+    effects : tuple of str
+    probability : float
+    words : str
+        The same as people read it; not written to JSON.
+    """
 
     effects: tuple[str, ...]
     probability: float
+    words: str = field(metadata=NOT_IN_JSON)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,8 +132,12 @@ class Diagnosis:
         Whether it may be said that the error is reduced.
     effects : tuple of str
         Named: all of them are present. Group: each is an alternative.
+    words : str
+        The same as people read them, with the labels of an exchange; not written to JSON.
     refitted : tuple of str
         What the model after holds beyond the one before.
+    refitted_words : str
+        The same as people read it; not written to JSON.
     reason : str
     sentences : tuple of str
         What each of `effects` is.
@@ -142,10 +155,11 @@ class Diagnosis:
         By modulus.
     finalists : tuple of Finalist
         Best first.
-    elastic_averaged : dict of Spread
-        The moduli averaged over everything that may be the case, Pa.
+    elastic_averaged, rigidity_averaged : dict of Spread
+        The constants to quote, Pa and N m: averaged over everything that may be the case, each by its probability; if
+        nothing explains the readings, those of the first fit. The rigidities are not written to JSON.
     answers : tuple of Explanation
-        The most probable ones, best first.
+        Best first; with the probability of none they sum to one.
     candidates : tuple of EffectEntry and ExchangeEntry
     recommendation : str
     notes : tuple of str
@@ -158,7 +172,9 @@ class Diagnosis:
     verdict: Word
     claim: bool
     effects: tuple[str, ...]
+    words: str = field(metadata=NOT_IN_JSON)
     refitted: tuple[str, ...]
+    refitted_words: str = field(metadata=NOT_IN_JSON)
     reason: str
     sentences: tuple[str, ...]
     declared: tuple[str, ...]
@@ -172,6 +188,7 @@ class Diagnosis:
     elastic_shift: Mapping[str, ElasticShift]
     finalists: tuple[Finalist, ...]
     elastic_averaged: Mapping[str, Spread]
+    rigidity_averaged: Mapping[str, Spread] = field(metadata=NOT_IN_JSON)
     answers: tuple[Explanation, ...]
     candidates: tuple[CandidateEntry, ...]
     recommendation: str

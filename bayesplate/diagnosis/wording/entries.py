@@ -1,4 +1,4 @@
-"""Each candidate of a diagnosis: what it would do, how probable it is, and why it was rejected."""
+"""Each candidate of a diagnosis: what it would do, how probable it is, and what became of it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
-from bayesplate.diagnosis.evidence.folds import NEEDED
-from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, size_posterior
 from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
-from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry, Fate
-from bayesplate.effects import EFFECTS
-from bayesplate.effects.words import effect_names
+from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
+from bayesplate.diagnosis.wording.fates import fate_of, fate_of_exchange
+from bayesplate.effects import EFFECTS, effects_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.results.contract import finite
@@ -41,13 +39,13 @@ def effect_entry(
     index = next(i for i, other in enumerate(ground.hypotheses) if other.members == (one.name,))
     gained = float(found.log_evidence[index] - found.log_evidence[0])
     best_fit = _best_fit(found, index) - _best_fit(found, 0)
-    fate, because = _fate(found, verdict, ranked, one.name)
+    fate, because = fate_of(found, verdict, ranked, one.name, index)
     visible = cents(one.visible) if ground.n_directions else np.full(one.visible.size, np.nan)
     return EffectEntry(
         name=one.name,
         setup=_where(one),
-        raw_rms_cents=finite(rms(cents(one.raw))),
-        visible_rms_cents=finite(rms(visible)),
+        raw_rms_cents=finite(ground.baseline.weighted_rms(cents(one.raw))),
+        visible_rms_cents=finite(ground.baseline.weighted_rms(visible)),
         visible_cents=tuple(finite(float(value)) for value in visible),
         below_detection_limit=ground.is_below_detection_limit(one.name),
         bias_percent=_bias(found, one),
@@ -67,25 +65,25 @@ def effect_entry(
     )
 
 
-def exchange_entries(found: Found, verdict: Verdict) -> tuple[ExchangeEntry, ...]:
+def exchange_entries(found: Found, verdict: Verdict, ranked: Sequence[Answer]) -> tuple[ExchangeEntry, ...]:
     """Exchanged labels, as one candidate each."""
     ground = found.ground
+    taken = {one.index for one in accepted(found, verdict)}
     labels = [f"{label}" for setup in ground.baseline.board.setups for label in setup.labels]
     entries = []
     for i, one in enumerate(ground.hypotheses):
         if one.swap is None:
             continue
         setup = ground.baseline.board.setups[ground.baseline.setup_index[one.swap.first]]
-        is_accepted = i == verdict.index or RELABELLING in verdict.effects
-        fate: Fate = "not needed" if found.none >= NEEDED else "less probable"
+        fate, because = fate_of_exchange(found, verdict, ranked, i, is_accepted=i in taken)
         entries.append(
             ExchangeEntry(
                 setup=setup.name,
                 labels=(labels[one.swap.first], labels[one.swap.second]),
                 inclusion_probability=float(found.probability[i]),
                 log_bayes_factor=float(found.log_evidence[i] - found.log_evidence[0]),
-                rejected_because=None if is_accepted else "exchanging the labels does not make the readings likelier",
-                fate="in the verdict" if is_accepted else fate,
+                rejected_because=because,
+                fate=fate,
             )
         )
     return tuple(entries)
@@ -100,8 +98,8 @@ def _where(one: Candidate) -> str:
     form = one.laws[0].form
     if EFFECTS[one.name].scope == "board":
         return "board"
-    names = [setup.name for setup in form.board.setups if not EFFECTS[one.name].refusal(form.board, setup)]
-    return ", ".join(names)
+    there = [setup.name for setup in form.board.setups if one.name in {e.name for e in effects_of(form.board, setup)}]
+    return ", ".join(there)
 
 
 def _bias(found: Found, one: Candidate) -> dict[str, float]:
@@ -130,9 +128,12 @@ def _best_fit(found: Found, index: int) -> float:
 
 
 def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
-    """Quantiles of the first free parameter of the most probable form, given that the effect is there."""
+    """Quantiles of the first free parameter of the most probable form, given that the effect is there.
+
+    Of an effect whose size the card fixes: the first of its parameters, without spread.
+    """
     if not one.laws[0].form.free:
-        return None
+        return _fixed(one)
     shares = [size_posterior(found, index, 0, form, 0) for form in range(len(one.laws))]
     best = int(np.argmax([share.sum() for share, _ in shares]))
     free = one.laws[best].form.free[0]
@@ -144,20 +145,15 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
     return Amplitude(parameter=free.key, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit)
 
 
-def _fate(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str) -> tuple[Fate, str | None]:
-    """What became of a candidate, and why it was rejected."""
-    if name in verdict.effects:
-        return "in the verdict", None
-    if found.ground.is_below_detection_limit(name):
-        return "not detectable", "its visible part is below what these readings could show"
-    if found.none >= NEEDED:
-        fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
-        return fate, f"{fate}: nothing lacking has a probability of {found.none:.2f}"
-    if verdict.word == "unexplained" and verdict.best is not None and name in verdict.best.members:
-        return "does not fit", verdict.reason
-    best = ranked[0]
-    told = f"less probable ({found.inclusion(name):.3f}) than {effect_names(best.members)} ({best.support:.3f})"
-    return "less probable", told
+def _fixed(one: Candidate) -> Amplitude | None:
+    form = one.laws[0].form
+    for parameter in form.board.parameters:
+        if parameter.effect == one.name and parameter.prior.is_exact:
+            size = parameter.prior.mean
+            return Amplitude(
+                parameter=parameter.key, form=form.detail, q05=size, q50=size, q95=size, unit=parameter.unit
+            )
+    return None
 
 
 def rms(values: Floats) -> float:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.words import MERITS
+from bayesplate.effects.words import effect_name
+from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.exports import Cell, csv_text, latex, tabular
 from bayesplate.results.folder import BEFORE_AFTER, write_text
 
@@ -33,18 +35,35 @@ def write_before_after(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[
 
 
 def before_after_csv(diagnosis: Diagnosis) -> str:
-    """Figures of merit before and after, then the moduli in GPa, at full precision."""
-    rows: list[list[Cell]] = [["quantity", "before", "after", "shift_in_sd"]]
-    rows += [[one.title, one.of(diagnosis.before), one.of(diagnosis.after), None] for one in MERITS]
-    rows += [
-        [f"{name}, GPa", one.before * _GPA, one.after * _GPA, one.shift_in_sd]
-        for name, one in diagnosis.elastic_shift.items()
-    ]
-    return csv_text(rows)
+    """Errors, moduli in GPa and sizes at full precision; what is after stands there only if something was added."""
+    added = diagnosis.is_refitted
+    rows: list[list[Cell]] = [["quantity", "before", "after", "shift_in_sd", "averaged", "averaged_sd"]]
+    rows += [[one.title, one.of(diagnosis.before), one.of(diagnosis.after), None, None, None] for one in MERITS]
+    for name, one in diagnosis.elastic_shift.items():
+        averaged = diagnosis.elastic_averaged[name]
+        values = (one.before, one.after, one.shift_in_sd / _GPA, averaged.mean, averaged.sd)
+        rows.append([f"{name}, GPa", *(value * _GPA for value in values)])
+    if added:
+        rows += [[name, None, mean, None, None, None] for name, mean in _sizes(diagnosis)]
+        return csv_text(rows)
+    return csv_text([[row[0], row[1], *row[4:]] for row in rows])
+
+
+def _sizes(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+    """Name with unit, and mean, of each size of what was added."""
+    found = []
+    for one in diagnosis.finalists:
+        for owner, effects in one.sizes.items() if one.effects == diagnosis.refitted else ():
+            for effect, parameters in effects.items():
+                for parameter, spread in parameters.items():
+                    factor, unit = unit_of_people(spread.unit)
+                    words = f"{effect_name(effect)} {parameter}, {owner}" + f", {unit}" * bool(unit)
+                    found.append((words, spread.mean * factor))
+    return found
 
 
 def before_after_tex(diagnosis: Diagnosis, title: str) -> str:
-    """The same as a tabular that needs no package."""
+    """Errors and moduli as a tabular that needs no package, with the same columns but the averaged ones."""
     rows = [
         [latex(one.title), _rounded(one.of(diagnosis.before)), _rounded(one.of(diagnosis.after)), ""] for one in MERITS
     ]
@@ -57,8 +76,10 @@ def before_after_tex(diagnosis: Diagnosis, title: str) -> str:
         ]
         for name, one in diagnosis.elastic_shift.items()
     ]
+    header = ["", "before", "after", "shift in sd"]
+    n_columns = len(header) if diagnosis.is_refitted else 2
     source = f"% Before and after, {latex(title)}; verdict: {latex(diagnosis.verdict)}"
-    return tabular(source, ["", "before", "after", "shift in sd"], rows)
+    return tabular(source, header[:n_columns], [row[:n_columns] for row in rows])
 
 
 def _rounded(value: float | None) -> str:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.diagnosis.decision.constants import draw_constants
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answers
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, answer_words, answers
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.null_control import NullControl, gain
+from bayesplate.diagnosis.evidence.order import ratio_words
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
 from bayesplate.diagnosis.wording.diagnosis import (
@@ -24,15 +27,17 @@ from bayesplate.diagnosis.wording.diagnosis import (
 )
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of, rms
 from bayesplate.effects import EFFECTS
+from bayesplate.effects.words import effect_names, joined
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI
+from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
 from bayesplate.results.contract import Spread
 from bayesplate.results.summary import Summary
 
+Floats = NDArray[np.float64]
+
 _AVERAGE_LINE = 11
 _N_AVERAGED = 8000
-_MOST_ANSWERS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +66,8 @@ class Case:
     recommendation : str
     finalists : sequence of (Answer, Summary)
         Explanations that were fitted again, best first, each with the summary of its fit.
+    drawn : dict of Draws
+        Of these fits, by the index of the hypothesis.
     notes : tuple of str
     """
 
@@ -73,6 +80,7 @@ class Case:
     is_clear_of_zero: bool
     recommendation: str
     finalists: Sequence[tuple[Answer, Summary]] = ()
+    drawn: Mapping[int, Draws] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @property
@@ -101,6 +109,8 @@ def diagnosis_of(case: Case) -> Diagnosis:
     ranked = answers(found)
     doubled = inclusion_with_width(found, 2.0)
     effects = found.ground.candidates.values()
+    averaged = _averaged(case)
+    taken = accepted(found, verdict)
     return Diagnosis(
         name=case.before.summary.name,
         seed=case.before.summary.seed,
@@ -108,9 +118,11 @@ def diagnosis_of(case: Case) -> Diagnosis:
         verdict=verdict.word,
         claim=case.claim,
         effects=verdict.effects,
+        words=_words(case, taken),
         refitted=found.ground.hypotheses[case.after.index].members,
+        refitted_words=next((answer_words(found, one) for one in taken if one.index == case.after.index), ""),
         reason=verdict.reason,
-        sentences=tuple(EFFECTS[name].sentence for name in verdict.effects if name in EFFECTS),
+        sentences=_sentences(case, taken),
         declared=found.ground.baseline.board.effects,
         probability_of_none=found.none,
         probability_of_none_with_doubled_priors=doubled[""],
@@ -121,11 +133,14 @@ def diagnosis_of(case: Case) -> Diagnosis:
         null_control=_null_control(case),
         elastic_shift=_elastic_shift(case),
         finalists=tuple(_finalist(answer, figures) for answer, figures in case.finalists),
-        elastic_averaged=_elastic_averaged(case),
-        answers=tuple(Explanation(effects=one.members, probability=one.support) for one in ranked[:_MOST_ANSWERS]),
+        elastic_averaged={name: averaged[name] for name in MODULI},
+        rigidity_averaged={name: averaged[name] for name in RIGIDITIES},
+        answers=tuple(
+            Explanation(effects=one.members, probability=one.support, words=answer_words(found, one)) for one in ranked
+        ),
         candidates=(
             *(effect_entry(found, verdict, ranked, one, doubled[one.name]) for one in effects),
-            *exchange_entries(found, verdict),
+            *exchange_entries(found, verdict, ranked),
         ),
         recommendation=case.recommendation,
         notes=case.notes,
@@ -165,11 +180,51 @@ def _elastic_shift(case: Case) -> dict[str, ElasticShift]:
     }
 
 
-def _elastic_averaged(case: Case) -> dict[str, Spread]:
-    """The constants averaged over everything that may be the case, in the linear approximation of the search."""
-    rng = np.random.default_rng([case.before.summary.seed, _AVERAGE_LINE])
-    drawn = draw_constants(case.found, rng, _N_AVERAGED)
-    return {name: Spread.of(drawn.values[name], "Pa") for name in MODULI}
+def _averaged(case: Case) -> dict[str, Spread]:
+    """The constants to quote, by name, Pa and N m.
+
+    Averaged over everything that may be the case: by the sampler's draws where a model was sampled, else in the linear
+    approximation of the search. Where nothing explains the readings there is nothing to average over but the first fit.
+    """
+    summary, found = case.before.summary, case.found
+    if case.verdict.word == "unexplained":
+        return dict((*summary.elastic.items(), *summary.rigidity.items()))
+    sampled = {0: case.before.draws, **case.drawn}
+    rng = np.random.default_rng([summary.seed, _AVERAGE_LINE])
+    counts = rng.multinomial(_N_AVERAGED, found.probability / found.probability.sum())
+    parts = [_constants(found, sampled.get(i), i, rng, int(n)) for i, n in enumerate(counts) if n]
+    units = dict.fromkeys(MODULI, "Pa") | dict.fromkeys(RIGIDITIES, "N m")
+    return {name: Spread.of(np.concatenate([part[name] for part in parts]), unit) for name, unit in units.items()}
+
+
+def _constants(found: Found, draws: Draws | None, index: int, rng: np.random.Generator, n: int) -> dict[str, Floats]:
+    """So many draws of every constant under one hypothesis."""
+    if draws is None:
+        return draw_constants(found, rng, n, among=[index]).values
+    every = {name: np.ravel(values) for name, values in (*draws.moduli.items(), *draws.rigidities.items())}
+    picked = rng.integers(next(iter(every.values())).size, size=n)
+    return {name: values[picked] for name, values in every.items()}
+
+
+def _words(case: Case, taken: Sequence[Answer]) -> str:
+    """What a verdict stands for, as people read it: all of it if it is named, otherwise the alternatives."""
+    if case.verdict.word == "named":
+        return joined([answer_words(case.found, one) for one in taken])
+    singles = [effect_names([name]) for name in case.verdict.effects if name != RELABELLING]
+    exchanged = [answer_words(case.found, one) for one in taken if one.members == (RELABELLING,)]
+    return joined([*singles, *exchanged], "or")
+
+
+def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
+    """What each effect of the verdict is, and what speaks for an exchange of labels."""
+    effects = [EFFECTS[name].sentence for name in case.verdict.effects if name in EFFECTS]
+    exchanged = [
+        f"The labels {swap.words(case.found.ground.baseline)} may have been exchanged: "
+        f"{ratio_words(case.found, one.index)}. Compare their figures, and correct the card if it is so."
+        for one in taken
+        if (swap := case.found.ground.hypotheses[one.index].swap) is not None
+    ]
+    return (*effects, *exchanged)
 
 
 def _finalist(answer: Answer, summary: Summary) -> Finalist:

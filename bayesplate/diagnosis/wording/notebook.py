@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.tables import candidates_table, errors_table, shift_table
-from bayesplate.diagnosis.wording.told import verdict_sentences
+from bayesplate.diagnosis.wording.tables import every_table
+from bayesplate.diagnosis.wording.told import verdict_sentences, warnings
 from bayesplate.diagnosis.wording.words import VERDICTS
 from bayesplate.results import notebook
 
 
 def html(diagnosis: Diagnosis) -> str:
     """Heading, sentences, tables, and what to measure next; every text escaped."""
-    sentences = [*verdict_sentences(diagnosis), *diagnosis.notes, f"What to measure next: {diagnosis.recommendation}"]
-    tables = (errors_table(diagnosis), shift_table(diagnosis), candidates_table(diagnosis, narrow=True))
+    advice = [f"What to measure next: {diagnosis.recommendation}"] if diagnosis.recommendation else []
+    sentences = [*verdict_sentences(diagnosis), *warnings(diagnosis), *advice]
     heading = f"{diagnosis.name}: {VERDICTS[diagnosis.verdict].heading}"
-    return notebook.html(heading, sentences, (one for one in tables if one is not None))
+    return notebook.html(heading, sentences, every_table(diagnosis))

@@ -2,35 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from bayesplate.diagnosis.wording.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.words import MERITS, MISSING, Merit, names_of, worth_showing
-from bayesplate.effects.words import effect_name, effect_names
-from bayesplate.results.contract import Spread
+from bayesplate.effects.words import effect_name
+from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.tables import Table
-from bayesplate.results.words import GPA, decimals, interval, plus_minus
+from bayesplate.results.words import GPA, decimals, interval, narrow_name, number, plus_minus
 
-_GPA = 1e9
-_NARROW = ("effect", "shift", "visible", "probable", "range (90 %)", "fate")
+_WORTH_A_ROW = 0.01
+_NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")
 _WIDE = (
     "effect",
     "shift",
     "visible",
     "E_x / E_y / G_xy off by, %",
-    "probable",
+    "inclusion probability",
     "size (90 %)",
     "looks like",
     "rejected because",
 )
 
 
+def every_table(diagnosis: Diagnosis) -> tuple[Table, ...]:
+    """The tables of a terminal or a notebook, the constants to quote first."""
+    tables = (
+        averaged_table(diagnosis),
+        answers_table(diagnosis),
+        errors_table(diagnosis),
+        shift_table(diagnosis),
+        sizes_table(diagnosis),
+        candidates_table(diagnosis, narrow=True),
+    )
+    return tuple(table for table in tables if table is not None)
+
+
 def errors_table(diagnosis: Diagnosis) -> Table:
     """Every figure of merit, before and after where something was added."""
     if diagnosis.is_refitted:
         title = "Error before and after"
-        columns = {"before": diagnosis.before, f"after: {effect_names(diagnosis.refitted)}": diagnosis.after}
+        columns = {"before": diagnosis.before, f"after: {diagnosis.refitted_words}": diagnosis.after}
     else:
         title, columns = "Error", {"as it is": diagnosis.before}
     rows = tuple((one.title, *(_merit(one, one.of(errors)) for errors in columns.values())) for one in MERITS)
@@ -43,17 +56,49 @@ def shift_table(diagnosis: Diagnosis) -> Table | None:
         return None
     rows = []
     for name, one in diagnosis.elastic_shift.items():
-        digits = decimals(0.01 * one.before / _GPA)
-        before, after = (f"{value / _GPA:.{digits}f}" for value in (one.before, one.after))
+        digits = decimals(0.01 * one.before * GPA)
+        before, after = (number(value, digits, factor=GPA) for value in (one.before, one.after))
         rows.append((name, before, after, f"{one.shift_in_sd:+.1f}"))
-    return Table("Shift of the constants, GPa", ("constant", "before", "after", "shift, sd"), tuple(rows))
+    title = f"Shift of the constants by {diagnosis.refitted_words}, GPa"
+    return Table(title, ("constant", "before", "after", "shift, sd"), tuple(rows))
 
 
 def averaged_table(diagnosis: Diagnosis) -> Table:
-    """The moduli averaged over every model that was weighed."""
-    rows = tuple((name, *_spread(one)) for name, one in diagnosis.elastic_averaged.items())
-    title = "The constants if any of the effects may be there, each by its probability, GPa"
-    return Table(title, ("constant", "mean ± sd", "90 % interval"), rows)
+    """The moduli to quote."""
+    every = diagnosis.elastic_averaged.items()
+    rows = tuple((narrow_name(name), plus_minus(one, GPA), interval(one, GPA)) for name, one in every)
+    averaged = "averaged over all explanations by their probability"
+    what = "of the model that does not explain the readings" if diagnosis.verdict == "unexplained" else averaged
+    return Table(f"The constants, {what}, GPa", ("constant", "mean ± sd", "90 % interval"), rows)
+
+
+def answers_table(diagnosis: Diagnosis) -> Table:
+    """Every explanation that is worth a row, none of them, and the rest: probabilities that sum to one as printed."""
+    shown = [one for one in diagnosis.answers if one.probability >= _WORTH_A_ROW]
+    named = [("nothing is lacking", diagnosis.probability_of_none), *((one.words, one.probability) for one in shown)]
+    rest = len(diagnosis.answers) - len(shown)
+    if rest:
+        left = max(1.0 - sum(share for _, share in named), 0.0)
+        named.append((f"any of {rest} other" + "s" * (rest > 1), left))
+    printed = _summing([share for _, share in named])
+    rows = tuple((words, share) for (words, _), share in zip(named, printed, strict=True))
+    return Table("What may be the case", ("explanation", "probability"), rows)
+
+
+def sizes_table(diagnosis: Diagnosis) -> Table | None:
+    """Every size of every explanation that was fitted again; None if none was."""
+    rows = []
+    for one in diagnosis.finalists:
+        for owner, effects in one.sizes.items():
+            where = "" if owner == "board" else f", {owner}"
+            for effect, parameters in effects.items():
+                for parameter, spread in parameters.items():
+                    factor, unit = unit_of_people(spread.unit)
+                    size = f"{plus_minus(spread, factor)} {unit}".rstrip()
+                    range_ = MISSING if spread.sd == 0.0 else f"{interval(spread, factor)} {unit}".rstrip()
+                    rows.append((f"{effect_name(effect)}{where}", parameter, size, range_))
+    columns = ("effect", "size", "mean ± sd", "90 % interval")
+    return Table("Sizes of what was fitted again", columns, tuple(rows)) if rows else None
 
 
 def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | None:
@@ -84,9 +129,8 @@ def _cells(name: str, one: CandidateEntry) -> Mapping[str, str]:
         "shift": _number(one.raw_rms_cents),
         "visible": _number(one.visible_rms_cents),
         "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
-        "probable": f"{one.inclusion_probability:.3f}",
+        "inclusion probability": f"{one.inclusion_probability:.3f}",
         "size (90 %)": _size(one.amplitude),
-        "range (90 %)": _range(one.amplitude),
         "looks like": ", ".join(effect_name(other) for other in one.look_alikes) or MISSING,
         "rejected because": one.rejected_because or MISSING,
         "fate": one.fate,
@@ -101,9 +145,13 @@ def _number(value: float | None) -> str:
     return MISSING if value is None else f"{value:.1f}"
 
 
-def _spread(one: Spread) -> tuple[str, str]:
-    """Mean ± sd and the middle 90 %, GPa."""
-    return plus_minus(one, GPA), interval(one, GPA)
+def _summing(shares: Sequence[float]) -> list[str]:
+    """Shares with three decimals that sum to one as they are printed: the last thousandths go to the largest rests."""
+    thousandths = [int(1000.0 * share) for share in shares]
+    by_rest = sorted(range(len(shares)), key=lambda i: thousandths[i] - 1000.0 * shares[i])
+    for i in by_rest[: 1000 - sum(thousandths)]:
+        thousandths[i] += 1
+    return [f"{one / 1000.0:.3f}" for one in thousandths]
 
 
 def _bias(bias: Mapping[str, float] | None) -> str:
@@ -113,16 +161,9 @@ def _bias(bias: Mapping[str, float] | None) -> str:
 def _size(amplitude: Amplitude | None) -> str:
     if amplitude is None:
         return MISSING
-    low, high = f"{amplitude.q05:.3g}", f"{amplitude.q95:.3g}"
-    return f"{amplitude.parameter} {amplitude.q50:.3g} ({low} to {high}){_unit(amplitude)}"
-
-
-def _range(amplitude: Amplitude | None) -> str:
-    """The same without the median, for which a terminal has no room."""
-    if amplitude is None:
-        return MISSING
-    return f"{amplitude.parameter} {amplitude.q05:.3g} to {amplitude.q95:.3g}{_unit(amplitude)}"
-
-
-def _unit(amplitude: Amplitude) -> str:
-    return "" if amplitude.unit == "1" else f" {amplitude.unit}"
+    factor, unit = unit_of_people(amplitude.unit)
+    smallest = 1e-3 * (amplitude.q95 - amplitude.q05)
+    every = (value if abs(value) >= smallest else 0.0 for value in (amplitude.q05, amplitude.q50, amplitude.q95))
+    low, middle, high = (f"{v:.0f}" if abs(v) >= 1000.0 else f"{v:.3g}" for v in (factor * value for value in every))
+    range_ = " (fixed)" if amplitude.q05 == amplitude.q95 else f" ({low} to {high})"
+    return f"{amplitude.parameter} {middle} {unit}".rstrip() + range_

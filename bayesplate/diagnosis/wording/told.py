@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
+from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.words import claim_sentence, meaning
 from bayesplate.effects.words import effect_names
@@ -19,19 +21,52 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> list[str]:
-    """The verdict for a page: what it means, what each effect is, what the constants include, what may be claimed."""
-    told = [meaning(diagnosis), *diagnosis.sentences, included_sentence(diagnosis), claim_sentence(diagnosis)]
+    """The verdict for a page: what it means, what each effect is, what else looks like it, and what may be claimed."""
+    told = [meaning(diagnosis), *diagnosis.sentences, alike_sentence(diagnosis), claim_sentence(diagnosis)]
     return [sentence for sentence in told if sentence]
 
 
-def included_sentence(diagnosis: Diagnosis) -> str:
-    """Which effects the constants of the diagnosis take into account; empty where there was nothing to add."""
-    if diagnosis.is_refitted:
-        return f"The constants take {effect_names(diagnosis.refitted)} into account."
-    return "The constants are those of the ideal plate." if diagnosis.effects else ""
+def alike_sentence(diagnosis: Diagnosis) -> str:
+    """Effects outside the verdict that look like the one that is named; empty if there are none."""
+    if diagnosis.verdict != "named":
+        return ""
+    inside = [one for one in diagnosis.candidates if isinstance(one, EffectEntry) and one.name in diagnosis.effects]
+    alike = dict.fromkeys(name for one in inside for name in one.look_alikes if name not in diagnosis.effects)
+    if not alike:
+        return ""
+    return (
+        f"{effect_names(list(alike)).capitalize()} would look much the same (likeness above {LOOK_ALIKE}): less than a "
+        "third of the trace tells them apart."
+    )
+
+
+def shown_model(diagnosis: Diagnosis) -> str:
+    """Which model the figures and tables below a verdict belong to; empty where it is the only one."""
+    if not diagnosis.is_refitted:
+        return ""
+    if diagnosis.verdict == "named":
+        return f"The figures and tables below are of the model with {diagnosis.refitted_words}."
+    return (
+        f"The figures and tables below are of the model with {diagnosis.refitted_words}, which is only one of the "
+        "explanations. Quote the averaged constants."
+    )
+
+
+def headline_sentence(diagnosis: Diagnosis) -> str:
+    """What the constants that are shown first are."""
+    if diagnosis.verdict == "unexplained":
+        return ""
+    return "These constants are averaged over everything that may be the case, each by its probability."
+
+
+def warnings(diagnosis: Diagnosis) -> list[str]:
+    """What a reader must know before using the constants."""
+    if diagnosis.verdict != "unexplained":
+        return list(diagnosis.notes)
+    doubt = "The model does not explain the readings: the intervals of the constants are too narrow."
+    return [doubt, *diagnosis.notes]
 
 
 def remarks(diagnosis: Diagnosis) -> list[str]:
-    """What else there is to know: how probable no effect is, the reason of the verdict, notes of the run."""
-    likely = f"Probability that no effect of the library is at work: {100 * diagnosis.probability_of_none:.0f} %."
-    return [likely, diagnosis.reason, *diagnosis.notes]
+    """What else there is to know: the reason of the verdict, notes of the run."""
+    return [f"The reason: {diagnosis.reason}.", *diagnosis.notes]

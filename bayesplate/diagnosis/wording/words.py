@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Errors
-from bayesplate.effects.words import effect_name, effect_names
+from bayesplate.effects.words import effect_name
 
 MISSING = "–"
 _UNLIKELY = 0.01
@@ -17,7 +17,7 @@ _UNLIKELY = 0.01
 
 @dataclass(frozen=True)
 class Meaning:
-    """A verdict in plain words: a heading, and what it means; {and} and {or} stand for the effects as a list."""
+    """A verdict in plain words: a heading, and what it means; {effects} stands for what it names."""
 
     heading: str
     sentence: str
@@ -29,14 +29,14 @@ VERDICTS: dict[Word, Meaning] = {
         "The readings differ from those of an ideal plate by no more than their noise would make them. No effect is "
         "needed to explain them, which does not prove that there is none.",
     ),
-    "named": Meaning("An effect was found", "The readings point to {and}."),
+    "named": Meaning("An effect was found", "The readings point to {effects}."),
     "indistinguishable group": Meaning(
         "Something is missing, but not which of several",
-        "One of these would explain the readings, but the readings cannot tell which: {or}.",
+        "One of these would explain the readings, but the readings cannot tell which: {effects}.",
     ),
     "unexplained": Meaning(
         "Something is missing that was not found",
-        "The readings disagree with the ideal plate by more than their noise, and no effect that was tried explains "
+        "The readings disagree with the model by more than their noise, and no effect that was tried explains "
         "it. Check the labels, the sizes and the mass first; then look at the largest errors.",
     ),
     "undetectable": Meaning(
@@ -85,20 +85,33 @@ MERITS = (
 
 def meaning(diagnosis: Diagnosis) -> str:
     """What the verdict means, with the effects that it names."""
-    lists = {"and": effect_names(diagnosis.effects), "or": effect_names(diagnosis.effects, "or")}
-    return VERDICTS[diagnosis.verdict].sentence.format_map(lists)
+    return VERDICTS[diagnosis.verdict].sentence.format_map({"effects": diagnosis.words})
 
 
 def claim_sentence(diagnosis: Diagnosis) -> str:
-    """Whether the error is reduced, and how the gain compares with chance; empty where nothing was added."""
+    """How the left-out error changed, beside chance, and what is claimed; empty where nothing was added."""
     if not diagnosis.is_refitted:
         return ""
+    change, is_gain = _change(diagnosis)
+    if not is_gain:
+        return f"The {change}. No improvement is claimed."
     share = diagnosis.gain_null_percentile
-    of_boards = "of simulated boards without any effect"
-    chance = "" if share is None else f": the gain is larger than on {share:.0f} % {of_boards}"
+    boards = "of simulated boards without any effect"
+    chance = "" if share is None else f" The evidence gained is larger than on {share:.0f} % {boards}."
     if diagnosis.claim:
-        return f"The error of the prediction is reduced{chance}."
-    return f"The error changes by no more than chance selection may give{chance}. No improvement is claimed."
+        return f"The error of the prediction is reduced: the {change}.{chance}"
+    return f"The {change}, no more than chance selection may give.{chance} No improvement is claimed."
+
+
+def _change(diagnosis: Diagnosis) -> tuple[str, bool]:
+    """The change of the most honest error that both models have, in words, and whether it is a gain."""
+    rms = [one for one in MERITS if one.is_rms and None not in (one.of(diagnosis.before), one.of(diagnosis.after))]
+    before, after = (rms[-1].of(errors) or 0.0 for errors in (diagnosis.before, diagnosis.after))
+    old, new = (f"{value:.0f}" if min(before, after) >= 10.0 else f"{value:.1f}" for value in (before, after))
+    name = "left-out error" if len(rms) > 1 else "error in the fit"
+    if old == new:
+        return f"{name} stayed at {new} cents", False
+    return f"{name} {'fell' if after < before else 'rose'} from {old} to {new} cents", after < before
 
 
 def worth_showing(diagnosis: Diagnosis) -> tuple[CandidateEntry, ...]:

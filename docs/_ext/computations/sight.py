@@ -99,7 +99,7 @@ def cosines(folder: Path, card: str) -> str:
         for j in range(i)
         if abs(matrix[i, j]) > 0.95
     ]
-    said = f"\nOne direction to these readings: {'; '.join(pairs)}.\n" if pairs else "\nNo pair is above 0.95.\n"
+    said = f"\nThese look alike to the readings: {'; '.join(pairs)}.\n" if pairs else "\nNo pair is above 0.95.\n"
     return figure(drawn, folder, f"cosines-{card}", alt) + said
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from bayesplate.diagnosis.decision.advice import options, recommendation
+from bayesplate.diagnosis.decision.advice import Option, options, recommendation
 from bayesplate.diagnosis.evidence.search import search
 
 ASKED = ("transverse_shear", "clamp_rotation")
@@ -20,7 +19,7 @@ def test_as_measured_the_options_begin_with_what_the_search_saw(finnish, told):
     ground = finnish.ground
     assert told[0].sentence == ""
     assert told[0].likeness == pytest.approx(abs(ground.cosine(*ASKED)), abs=0.1)
-    assert told[0].visibility == pytest.approx(min(ground.visibility(name) for name in ASKED), rel=0.1)
+    assert told[0].seen == pytest.approx([ground.visibility(name) for name in ASKED], rel=0.1)
 
 
 def test_further_readings_lower_no_visibility(told):
@@ -30,10 +29,47 @@ def test_further_readings_lower_no_visibility(told):
     assert max(option.visibility for option in told[1:]) > 1.2 * told[0].visibility
 
 
+def option(likeness, *seen, sentence="Measure more"):
+    return Option(sentence, likeness, seen)
+
+
+@pytest.mark.parametrize(
+    ("now", "then", "words"),
+    [
+        # alike now, told apart then
+        (option(0.99, 2.0, 3.0), option(0.2, 2.0, 3.0), "would fall from 0.99 to 0.20."),
+        (option(0.60, 2.0, 3.0), option(0.54, 2.0, 3.0), "would fall from 0.60 to 0.54."),
+        # hardly less alike, or still alike
+        (option(0.60, 2.0, 3.0), option(0.56, 2.0, 3.0), ""),
+        (option(0.999, 2.0, 3.0), option(0.951, 2.0, 3.0), ""),
+        # one is hidden, and stays so, or comes into sight
+        (option(0.99, 0.1, 3.0), option(0.2, 0.3, 3.0), ""),
+        (option(0.99, 0.4, 3.0), option(0.2, 1.0, 3.0), "a would then show, with 1.0 times the smallest trace that can "
+         "be seen (0.4 times now)."),
+        (option(0.99, 0.4, 0.2), option(0.2, 1.5, 2.5), "a and b would then show, with 1.5 and 2.5 times the smallest "
+         "trace that can be seen (0.4 and 0.2 times now)."),
+        (option(0.99, 0.4, 0.2), option(0.2, 1.5, 0.9), ": a would then show, with 1.5 times"),
+    ],
+)  # fmt: skip
+def test_advice_is_given_only_where_it_helps(monkeypatch, now, then, words):
+    monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: (now, then))
+    told = recommendation(None, ("a", "b"))
+    assert words in told if words else told == ""
+
+
+def test_of_several_ways_the_one_that_shows_most_is_recommended(monkeypatch):
+    now, one, two = option(0.5, 0.1, 0.2), option(0.5, 5.0, 0.5, sentence="One"), option(0.5, 1.1, 1.2, sentence="Two")
+    monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: (now, one, two))
+    assert recommendation(None, ("a", "b")).startswith("Two: a and b would then show")
+    two, one = option(0.5, 1.1, 1.2, 0.1, sentence="Two"), option(0.5, 1.5, 0.5, 0.5, sentence="One")
+    now = option(0.5, 0.1, 0.2, 0.1)
+    monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: (now, one, two))
+    assert recommendation(None, ("a", "b", "c")).startswith("Two: a and b would then show")
+    monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: (now,))
+    assert recommendation(None, ("a", "b")) == recommendation(None, ()) == ""
+
+
 def test_the_recommendation_names_the_effects_and_what_to_measure(finnish):
-    found = search(finnish.ground)
-    sentence = recommendation(found, ASKED)
+    sentence = recommendation(search(finnish.ground), ASKED)
     assert sentence.startswith("Measure ")
-    assert all(words in sentence for words in ("transverse shear", "clamp rotation"))
-    assert "the same modes again" in recommendation(found, ())
-    assert np.char.count(sentence, ". ") <= 3
+    assert "clamp rotation would then show" in sentence

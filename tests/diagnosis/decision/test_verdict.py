@@ -77,7 +77,7 @@ def test_unexplained_if_the_winner_fails_the_gate(base):
     assert found.p_value(1) < PASSES
     verdict = decide(found)
     assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
-    assert "p = " in verdict.reason
+    assert "p < 0.001" in verdict.reason
 
 
 def test_named_from_three_times_the_next_on(base):

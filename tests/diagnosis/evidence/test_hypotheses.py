@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from made_searches import bare, baseline, ground_of, one_level, table, with_readings
@@ -16,7 +14,6 @@ from bayesplate.diagnosis.evidence.hypotheses import (
     confusable,
     hypotheses,
     log_evidences,
-    order_conflicts,
     probabilities,
 )
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
@@ -71,23 +68,6 @@ def test_only_close_neighbours_of_different_symmetry_may_be_exchanged(base):
     assert {(one.first, one.second) for one in confusable(base)} == {(0, 1), (1, 2), (3, 4), (4, 5)}
     apart = baseline(np.random.default_rng(1), parities=CLOSE_PAIR, spacing=0.13)
     assert confusable(apart) == ()
-
-
-def test_readings_of_one_class_in_the_other_order_than_the_modes_are_told(base):
-    """A reading above the next one of its class is told; one that stays below it, or passes another class, is not."""
-    ranked = [
-        replace(one, rank=[p.parity for p in base.places[:i]].count(one.parity)) for i, one in enumerate(base.places)
-    ]
-    gap = base.log_frequency[2] - base.log_frequency[0]
-    labels = base.board.setups[0].labels
-
-    def told(*raised):
-        return order_conflicts(replace(base, places=tuple(ranked), residual=np.array([*raised, 0.0, 0.0, 0.0, 0.0])))
-
-    assert told(0.0, 0.0) == ()
-    assert told(0.99 * gap, 0.0) == ()
-    (sentence,) = told(1.01 * gap, 0.0)
-    assert f"{labels[0]} and {labels[2]}" in sentence
 
 
 def test_exchanging_twice_changes_nothing_and_once_moves_the_readings(base):

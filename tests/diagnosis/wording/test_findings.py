@@ -21,9 +21,12 @@ from bayesplate.diagnosis.shifts.tables import nothing
 from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
+from bayesplate.diagnosis.wording.fates import fate_of
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.material import RIGIDITIES, moduli
+from bayesplate.plate.parameter import BOARD, Parameter
+from bayesplate.quantities import Quantity
 from bayesplate.results.contract import Elastic
 
 SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "air_loading", "grain_angle")
@@ -63,13 +66,20 @@ def made(probability, size=0.05, residual=None, n_modes=6):
 def entries(found: Found) -> dict[str, EffectEntry]:
     verdict, ranked = decide(found), answers(found)
     told = [effect_entry(found, verdict, ranked, one, 0.5) for one in found.ground.candidates.values()]
-    return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict)[0]}
+    return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict, ranked)[0]}
+
+
+def draws_of(predictive: np.ndarray, E_x: float = 10e9) -> SimpleNamespace:
+    moduli = {"E_x": E_x, "E_y": 1e9, "G_xy": 1e9}
+    rigidities = {"D_x": 30.0, "D_y": 2.0, "D_s": 5.0}
+    every = ({name: np.full((1, 5), value) for name, value in group.items()} for group in (moduli, rigidities))
+    return SimpleNamespace(predictive=predictive, **dict(zip(("moduli", "rigidities"), every, strict=True)))
 
 
 def case_of(found: Found, control: NullControl, folded: Nested | None, **changed) -> Case:
     verdict = decide(found)
     readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
-    draws = SimpleNamespace(predictive=readings * np.linspace(0.99, 1.01, 21)[None, :, None])
+    draws = draws_of(readings * np.linspace(0.99, 1.01, 21)[None, :, None])
     after = Side(verdict.index, MOVED, draws) if verdict.index else Side(0, FIGURES, draws)
     case = Case(found, verdict, control, folded, Side(0, FIGURES, draws), after, True, "Measure on.")
     return replace(case, **changed)
@@ -91,16 +101,16 @@ def folds_of(found: Found, ratio: float) -> Nested:
 def test_what_became_of_each_candidate_of_a_named_effect():
     told = entries(made(NAMED))
     assert {name: one.fate for name, one in told.items()} == {
-        SHEAR: "in the verdict", AIR: "less probable", GRAIN: "less probable", RELABELLING: "less probable",
+        SHEAR: "in the verdict", AIR: "does not fit", GRAIN: "does not fit", RELABELLING: "does not fit",
     }  # fmt: skip
     assert told[SHEAR].rejected_because is None
-    assert told[AIR].rejected_because == "less probable (0.150) than transverse shear (0.790)"
+    assert told[AIR].rejected_because == "with it alone the misfit is still too large (p = 0.013)"
     assert told[RELABELLING].labels == ("(1,0)", "(2,0)")
 
 
 def test_a_group_holds_its_members():
     told = entries(made({(SHEAR,): 0.5, (AIR,): 0.4, (GRAIN,): 0.04}))
-    assert [told[name].fate for name in NAMES] == ["in the verdict", "in the verdict", "less probable"]
+    assert [told[name].fate for name in NAMES] == ["in the verdict", "in the verdict", "does not fit"]
     assert [told[name].rejected_because is None for name in NAMES] == [True, True, False]
     with_exchange = entries(made({(SHEAR,): 0.5, (RELABELLING,): 0.4}))
     assert with_exchange[RELABELLING].fate == "in the verdict"
@@ -111,7 +121,89 @@ def test_exchanged_labels_that_are_named_are_not_rejected():
     found = replace(found, residual=Swap(1, 2).applied(found.ground.baseline, np.zeros((1, 6)))[0])
     told = entries(found)
     assert (told[RELABELLING].fate, told[RELABELLING].rejected_because) == ("in the verdict", None)
-    assert told[SHEAR].rejected_because == "less probable (0.000) than relabelling (0.990)"
+    assert told[SHEAR].rejected_because.startswith("with it alone the misfit")
+
+
+def test_less_probable_is_only_what_is_so_and_would_fit():
+    """Readings of pure noise, which every candidate fits: the answer's own probability beside the winner's."""
+    quiet = made({(SHEAR,): 0.6, (AIR,): 0.1, (RELABELLING,): 0.05}, residual=np.zeros(6))
+    told = entries(quiet)
+    assert told[SHEAR].fate == "in the verdict"
+    assert (told[AIR].fate, told[AIR].rejected_because) == (
+        "less probable", "less probable (0.100) than transverse shear (0.600)",
+    )  # fmt: skip
+    assert told[RELABELLING].rejected_because.startswith("with it alone the misfit is still too large (p < 0.001); ")
+    alike = fate_of(quiet, replace(decide(quiet), effects=()), answers(quiet), SHEAR, 1)
+    assert alike == ("less probable", "no more probable (0.600) than transverse shear (0.600)")
+
+
+def test_a_size_at_its_limit_is_told_so_and_not_as_less_probable():
+    """Whatever the verdict rejects its winner for is told of the winner, though its probability is one."""
+    found = made({(SHEAR,): 1.0})
+    verdict = replace(decide(found), word="unexplained", effects=(), index=0, reason="only at the limit of its range")
+    told = fate_of(found, verdict, answers(found), SHEAR, 1)
+    assert told == ("does not fit", "only at the limit of its range")
+
+
+@pytest.mark.parametrize(("gained", "words"), [(3.0, "20.1 times likelier"), (-1.0, "2.72 times less likely"),
+                                              (30.0, "more than a million times likelier")])  # fmt: skip
+def test_an_exchange_is_told_with_its_likelihood_ratio(gained, words):
+    found = made({(): 0.5, (RELABELLING,): 0.1}, residual=np.zeros(6))
+    found = replace(found, log_evidence=np.array([2.0, 0.0, 0.0, 0.0, 2.0 + gained]))
+    told = entries(found)[RELABELLING]
+    assert told.rejected_because == (
+        f"not needed: nothing lacking has a probability of 0.50; with these labels exchanged the readings are {words}"
+    )
+
+
+def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():
+    """A second pair of labels within reach of nothing stays out, and the verdict says which two it means."""
+    found = made({(SHEAR,): 0.5, (RELABELLING,): 0.45})
+    ground = found.ground
+    more = replace(ground.hypotheses[4], swap=Swap(3, 4))
+    shares = np.array([*found.probability, 0.01])
+    ground = replace(ground, hypotheses=(*ground.hypotheses, more))
+    found = Found(ground, found.residual, np.log(shares + 1e-300), shares)
+    verdict, ranked = decide(found), answers(found)
+    assert verdict.effects == (SHEAR, RELABELLING)
+    assert [one.fate for one in exchange_entries(found, verdict, ranked)] == ["in the verdict", "does not fit"]
+    told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
+    assert told.words == "transverse shear or relabelling (1,0) and (2,0)"
+    assert [one.words for one in told.answers][:2] == ["transverse shear", "relabelling (1,0) and (2,0)"]
+    assert any("The labels (1,0) and (2,0) may have been exchanged" in one for one in told.sentences)
+
+
+def test_the_answers_and_none_sum_to_one():
+    told = diagnosis_of(case_of(found := made(NAMED), control_of(found, 0.5), folds_of(found, 0.25)))
+    assert told.probability_of_none + sum(one.probability for one in told.answers) == pytest.approx(1.0)
+
+
+def test_the_constants_to_quote_are_averaged_and_never_those_of_one_member():
+    """Draws of each model that was fitted, by its probability: here 10 GPa without and 20 GPa with shear."""
+    found = made({(): 0.4, (SHEAR,): 0.6}, residual=np.zeros(6))
+    found = replace(found, probability=np.array([0.04, 0.96, 0.0, 0.0, 0.0]))
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    group = replace(case.verdict, word="indistinguishable group", index=1)
+    told = diagnosis_of(replace(case, verdict=group, drawn={1: draws_of(case.before.draws.predictive, 20e9)}))
+    n = 8000
+    assert told.elastic_averaged["E_x"].mean / 1e9 == pytest.approx(19.6, abs=4 * 10 * np.sqrt(0.04 * 0.96 / n))
+    assert told.elastic_averaged["E_x"].sd / 1e9 == pytest.approx(10 * np.sqrt(0.04 * 0.96), rel=0.15)
+    assert (told.rigidity_averaged["D_x"].mean, told.rigidity_averaged["D_x"].unit) == (30.0, "N m")
+
+    unexplained = diagnosis_of(replace(case, verdict=replace(group, word="unexplained", index=0), after=case.before))
+    assert unexplained.elastic_averaged == dict(FIGURES.elastic.items())
+    assert unexplained.rigidity_averaged == dict(FIGURES.rigidity.items())
+
+
+def test_a_size_that_the_card_fixes_is_shown():
+    found = made(NAMED)
+    one = found.ground.candidates[AIR]
+    fixed = Parameter("density", BOARD, Quantity.exact(1.2), "kg/m^3", 0.0, effect=AIR)
+    board = replace(one.laws[0].form.board, parameters=(fixed,))
+    law = replace(one.laws[0], form=replace(one.laws[0].form, free=(), board=board))
+    ground = replace(found.ground, candidates={**found.ground.candidates, AIR: replace(one, laws=(law,))})
+    size = entries(replace(found, ground=ground))[AIR].amplitude
+    assert (size.parameter, size.q05, size.q50, size.q95, size.unit) == ("density", 1.2, 1.2, 1.2, "kg/m^3")
 
 
 def test_nothing_is_needed_from_a_tenth_on():
@@ -130,8 +222,8 @@ def test_the_winner_that_fails_the_gate_is_told_so():
     found = replace(found, residual=0.3 * found.ground.baseline.log_frequency * np.array([1, -1, 1, 1, -1, -1]))
     told = entries(found)
     assert told[SHEAR].fate == "does not fit"
-    assert told[SHEAR].rejected_because.startswith("with transverse shear the misfit is still too large (p = ")
-    assert told[AIR].fate == "less probable"
+    assert told[SHEAR].rejected_because.startswith("with transverse shear the misfit is still too large (p ")
+    assert told[AIR].fate == "does not fit"
 
 
 def test_below_sight_comes_first():
@@ -139,6 +231,19 @@ def test_below_sight_comes_first():
     assert {told[name].fate for name in NAMES} == {"not detectable"}
     assert told[AIR].rejected_because == "its visible part is below what these readings could show"
     assert all(told[name].below_detection_limit for name in NAMES)
+
+
+def test_what_would_not_show_at_its_usual_size_may_be_probable_at_another():
+    """A candidate that is found with a tenth or more is told by its probability; with less it could not have been."""
+    probable = entries(made({(SHEAR,): 0.8, (AIR,): 0.11, (GRAIN,): 0.09}, size=1e-4, residual=np.zeros(6)))
+    assert [probable[name].fate for name in NAMES] == ["in the verdict", "less probable", "not detectable"]
+
+
+def test_an_exchange_that_would_fit_is_told_with_its_own_probability():
+    found = made({(SHEAR,): 0.6, (RELABELLING,): 0.05})
+    found = replace(found, residual=Swap(1, 2).applied(found.ground.baseline, np.zeros((1, 6)))[0])
+    told = entries(found)[RELABELLING].rejected_because
+    assert told.startswith("less probable (0.050) than transverse shear (0.600); with these labels exchanged")
 
 
 def test_an_entry_by_hand():
@@ -241,7 +346,7 @@ def test_readings_outside_their_band_are_counted():
     readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
     # the last two lie at the 2.5 and 97.5 % quantiles of the draws, outside the 90 % but inside the range
     off = np.array([1.0, 1.0, 1.0, 1.0, 1.0095, 0.9905]) * readings * np.linspace(0.99, 1.01, 201)[None, :, None]
-    before = replace(case.before, draws=SimpleNamespace(predictive=off))
+    before = replace(case.before, draws=draws_of(off))
     assert diagnosis_of(replace(case, before=before)).before.hits_90 == pytest.approx(4 / 6)
 
 

@@ -14,11 +14,27 @@ from diagnoses import AFTER, AIR, BEFORE, DIAGNOSES, EXCHANGE, GRAIN, NEXT, TENS
 from payloads import PAYLOADS
 
 from bayesplate.diagnosis.decision.verdict import Word
+from bayesplate.diagnosis.wording.candidates import Amplitude
 from bayesplate.diagnosis.wording.diagnosis import Errors, diagnosis_json
 from bayesplate.diagnosis.wording.exports import before_after_csv, before_after_tex, write_before_after
-from bayesplate.diagnosis.wording.tables import averaged_table, candidates_table, errors_table, shift_table
-from bayesplate.diagnosis.wording.told import remarks, verdict_sentence, verdict_sentences
-from bayesplate.diagnosis.wording.words import MERITS, VERDICTS
+from bayesplate.diagnosis.wording.tables import (
+    answers_table,
+    averaged_table,
+    candidates_table,
+    errors_table,
+    shift_table,
+    sizes_table,
+)
+from bayesplate.diagnosis.wording.told import (
+    alike_sentence,
+    headline_sentence,
+    remarks,
+    shown_model,
+    verdict_sentence,
+    verdict_sentences,
+    warnings,
+)
+from bayesplate.diagnosis.wording.words import MERITS, VERDICTS, claim_sentence
 from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
@@ -85,7 +101,7 @@ def test_every_word_of_the_verdict_and_every_error_has_its_words():
     [
         ("none needed", "no more than their noise would make them"),
         ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
-         "the gain is larger than on 99 % of simulated boards"),
+         "the left-out error fell from 46 to 12 cents. The evidence gained is larger than on 99 % of simulated boards"),
         ("indistinguishable group", "cannot tell which: membrane tension or air loading."),
         ("unexplained", "no effect that was tried explains it"),
         ("undetectable", "could not show them even if they were there"),
@@ -102,14 +118,96 @@ def test_the_terminal_and_the_page_tell_the_same(word, words):
     assert verdict_sentences(one)[-1] == closing[-len(verdict_sentences(one)[-1]) :] or not one.is_refitted
 
 
-def test_the_page_says_what_the_constants_include():
-    assert "The constants take membrane tension into account." in verdict_sentences(DIAGNOSES["named"])
-    not_refitted = replace(DIAGNOSES["named"], refitted=())
-    assert "The constants are those of the ideal plate." in verdict_sentences(not_refitted)
-    assert not any("The constants take" in one for one in verdict_sentences(DIAGNOSES["none needed"]))
-    assert remarks(replace(NAMED, notes=("mind this",))) == [
-        "Probability that no effect of the library is at work: 2 %.", "the reason of it", "mind this",
-    ]  # fmt: skip
+def test_the_page_says_what_its_constants_are():
+    assert remarks(replace(NAMED, notes=("mind this",))) == ["The reason: the reason of it.", "mind this"]
+    assert shown_model(NAMED) == "The figures and tables below are of the model with membrane tension."
+    assert "only one of the explanations. Quote the averaged" in shown_model(DIAGNOSES["indistinguishable group"])
+    assert shown_model(DIAGNOSES["none needed"]) == shown_model(DIAGNOSES["unexplained"]) == ""
+    for word, one in DIAGNOSES.items():
+        assert ("averaged" in headline_sentence(one)) is (word != "unexplained")
+        assert ("averaged" in averaged_table(one).title) is (word != "unexplained")
+        assert ("too narrow" in " ".join(warnings(one))) is (word == "unexplained")
+        assert show_diagnosis(one).tables[0] == averaged_table(one)
+        assert warnings(replace(one, notes=("mind this",)))[-1] == "mind this"
+    assert show_diagnosis(DIAGNOSES["unexplained"]).warnings == tuple(warnings(DIAGNOSES["unexplained"]))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        (53.2, 61.4, "The left-out error rose from 53 to 61 cents. No improvement is claimed."),
+        (53.2, 53.4, "The left-out error stayed at 53 cents. No improvement is claimed."),
+        (5.2, 5.44, "The left-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
+        (61.4, 53.2, "The left-out error fell from 61 to 53 cents, no more than chance selection may give. The "
+         "evidence gained is larger than on 99 % of simulated boards without any effect. No improvement is claimed."),
+    ],
+)  # fmt: skip
+def test_an_error_that_rises_is_said_to_rise(before, after, words):
+    one = replace(
+        DIAGNOSES["indistinguishable group"],
+        before=replace(BEFORE, nested_leave_one_out_rms_cents=before),
+        after=replace(AFTER, nested_leave_one_out_rms_cents=after),
+    )
+    assert claim_sentence(one) == words
+
+
+def test_with_too_few_readings_the_error_that_both_models_have_is_told():
+    few = {"nested_leave_one_out_rms_cents": None}
+    one = replace(DIAGNOSES["indistinguishable group"], before=replace(BEFORE, **few), after=replace(AFTER, **few))
+    assert claim_sentence(one).startswith("The left-out error fell from 46.5 to 9.5 cents")
+    fewer = few | {"leave_one_out_rms_cents": None}
+    one = replace(one, before=replace(BEFORE, **fewer), after=replace(AFTER, **fewer))
+    assert claim_sentence(one).startswith("The error in the fit fell from 21.2 to 4.2 cents")
+
+
+def test_the_probabilities_sum_to_one_as_they_are_printed():
+    table = answers_table(NAMED)
+    assert (table.columns, table.rows) == (
+        ("explanation", "probability"),
+        (("nothing is lacking", "0.020"), ("membrane tension", "0.970"), ("any of 2 others", "0.010")),
+    )
+    thirds = [replace(NAMED.answers[0], probability=share, words=f"{i}") for i, share in enumerate((1 / 3, 1 / 3))]
+    shares = [row[1] for row in answers_table(replace(NAMED, probability_of_none=1 / 3, answers=tuple(thirds))).rows]
+    assert sorted(shares) == ["0.333", "0.333", "0.334"]
+
+
+def test_what_looks_like_the_named_effect_is_told():
+    alike = replace(TENSION, look_alikes=("air_loading", "attached_mass"))
+    one = replace(NAMED, candidates=(alike, AIR))
+    assert alike_sentence(one).startswith(
+        "Air loading and attached mass would look much the same (likeness above 0.95)"
+    )
+    assert alike_sentence(one) in verdict_sentences(one)
+    assert alike_sentence(one) in show_diagnosis(one).remarks
+    both = replace(one, effects=("membrane_tension", "air_loading"), candidates=(alike, AIR))
+    assert alike_sentence(both).startswith("Attached mass would look")  # a member of the verdict is no rival
+    assert alike_sentence(NAMED) == alike_sentence(replace(one, verdict="indistinguishable group")) == ""
+
+
+@pytest.mark.parametrize(
+    ("unit", "sizes", "shown"),
+    [
+        ("kg", (1e-4, 8e-4, 1.8e-3), "mass 0.8 g (0.1 to 1.8)"),
+        ("rad", (0.01745329, 0.03490659, 0.05235988), "mass 2 degrees (1 to 3)"),
+        ("Pa", (6.2e8, 6.2e8, 6.2e8), "mass 0.62 GPa (fixed)"),
+        ("m", (1e-4, 2e-4, 3e-4), "mass 0.2 mm (0.1 to 0.3)"),
+        ("1", (0.1, 0.2, 0.3), "mass 0.2 (0.1 to 0.3)"),
+        ("kg", (2.5, 8.3, 44.5), "mass 8300 g (2500 to 44500)"),
+        ("1", (-0.1, 1e-9, 0.1), "mass 0 (-0.1 to 0.1)"),
+    ],
+)
+def test_sizes_have_the_units_of_people(unit, sizes, shown):
+    low, middle, high = sizes
+    size = Amplitude(parameter="mass", form="", q05=low, q50=middle, q95=high, unit=unit)
+    one = replace(NAMED, candidates=(replace(TENSION, amplitude=size),))
+    for narrow in (False, True):
+        table = candidates_table(one, narrow=narrow)
+        assert dict(zip(table.columns, table.rows[0], strict=True))["size (90 %)"] == shown
+
+
+def test_the_sizes_of_what_was_fitted_again():
+    assert sizes_table(NAMED).rows == (("membrane tension, clamped", "tension", "120 ± 12 N/m", "102 to 138 N/m"),)
+    assert sizes_table(DIAGNOSES["none needed"]) is None
 
 
 def test_errors_before_and_after_or_as_they_are():
@@ -132,7 +230,7 @@ def test_errors_before_and_after_or_as_they_are():
 def test_constants_shift_only_where_something_was_added():
     assert shift_table(NAMED).rows[0] == ("E_x", "10.25", "11.50", "+2.5")
     assert shift_table(DIAGNOSES["none needed"]) is None
-    assert averaged_table(NAMED).rows[0] == ("E_x", "10.2 ± 1.0", "8.7 to 11.8")
+    assert averaged_table(NAMED).rows[0] == ("E_x, along grain", "10.2 ± 1.0", "8.7 to 11.8")
 
 
 def test_candidates_stand_in_the_order_of_their_probability():
@@ -141,13 +239,14 @@ def test_candidates_stand_in_the_order_of_their_probability():
 
     assert list(by_name) == ["membrane tension", "relabelling (1,0) and (0,1)", "air loading", "grain angle"]
     assert by_name["membrane tension"] == {
-        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "probable": "0.970",
-        "E_x / E_y / G_xy off by, %": "+1.5 / -2.5 / +0.5", "size (90 %)": "tension 120 (10 to 230) N/m",
+        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "inclusion probability": "0.970",
+        "E_x / E_y / G_xy off by, %": "+1.5 / -2.5 / +0.5", "size (90 %)": "tension 120 N/m (10 to 230)",
         "looks like": "–", "rejected because": "–",
     }  # fmt: skip
     assert by_name["air loading"]["looks like"] == "attached mass"
     assert by_name["air loading"]["size (90 %)"] == by_name["relabelling (1,0) and (0,1)"]["shift"] == "–"
-    assert narrow.rows[0][-2:] == ("tension 10 to 230 N/m", "in the verdict")
+    assert narrow.rows[0][-2:] == ("tension 120 N/m (10 to 230)", "in the verdict")
+    assert not any("probab" in column for column in narrow.columns)
     assert [row[-1] for row in narrow.rows] == ["in the verdict", "less probable", "not detectable", "less probable"]
     assert candidates_table(DIAGNOSES["undetectable"]) is None
 
@@ -167,9 +266,11 @@ def test_a_setup_is_named_where_there_are_several():
 def test_the_terminal_shows_only_tables_that_there_are():
     shown, bare = show_diagnosis(NAMED), show_diagnosis(DIAGNOSES["undetectable"])
     assert [table.title.partition(":")[0] for table in shown.tables] == [
-        "Error before and after", "Shift of the constants, GPa", "Candidates at their usual size",
+        "The constants, averaged over all explanations by their probability, GPa", "What may be the case",
+        "Error before and after", "Shift of the constants by membrane tension, GPa", "Sizes of what was fitted again",
+        "Candidates at their usual size",
     ]  # fmt: skip
-    assert [table.title for table in bare.tables] == ["Error: a-board"]
+    assert [table.title for table in bare.tables[1:]] == ["What may be the case", "Error: a-board"]
     assert shown.remarks == (*NAMED.sentences, NEXT)
 
 
@@ -178,8 +279,11 @@ def test_before_and_after_in_one_csv():
     by_name = {row[0]: dict(zip(header, row, strict=True)) for row in rows}
 
     assert by_name["error in the fit, rms cents"] | {"quantity": ""} == {
-        "quantity": "", "before": "21.25", "after": "4.25", "shift_in_sd": "",
+        "quantity": "", "before": "21.25", "after": "4.25", "shift_in_sd": "", "averaged": "", "averaged_sd": "",
     }  # fmt: skip
+    assert float(by_name["E_x, GPa"]["averaged"]) == pytest.approx(10.25)
+    assert float(by_name["E_x, GPa"]["averaged_sd"]) == pytest.approx(1.025)
+    assert by_name["membrane tension tension, clamped, N/m"]["after"] == "120.0"
     assert float(by_name["E_x, GPa"]["before"]) == pytest.approx(10.25)
     assert float(by_name["E_x, GPa"]["shift_in_sd"]) == 2.5
 
@@ -198,8 +302,10 @@ def test_a_title_cannot_break_the_latex(payload):
 
 def test_the_latex_by_hand(tmp_path):
     undetectable = replace(DIAGNOSES["undetectable"], before=replace(BEFORE, log_score=None))
+    assert "after" not in before_after_tex(undetectable, "x").partition("\n")[2]
+    assert before_after_csv(undetectable).splitlines()[0] == "quantity,before,averaged,averaged_sd"
     assert r"$E_{x}$, GPa & 10.250 & 11.500 & $+2.5$ \\" in before_after_tex(NAMED, "x")
-    assert r"log score & -- & -24.75 &  \\" in before_after_tex(undetectable, "x")
+    assert r"log score & -- \\" in before_after_tex(undetectable, "x")
     assert [path.name for path in write_before_after(tmp_path, NAMED, "x")] == ["before-after.csv", "before-after.tex"]
     assert len(list(tmp_path.iterdir())) == 2
 
@@ -223,7 +329,7 @@ def test_it_shows_itself():
     assert repr(NAMED) == "<Diagnosis of a-board, named: membrane_tension, error reduced>"
     assert repr(DIAGNOSES["none needed"]) == "<Diagnosis of a-board, none needed>"
     page = _Tags(NAMED._repr_html_())
-    assert page.tags.count("table") == 3
+    assert page.tags.count("table") == 6
     for words in ("An effect was found", "point to membrane tension", "46.5", f"{AFTER.leave_one_out_rms_cents}", NEXT):
         assert words in page.text
 
