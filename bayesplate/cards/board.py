@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, PrivateAttr
 
-from bayesplate.cards.measures import QuantityReader
+from bayesplate.cards.measures import DENSITY, QuantityReader
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.repeated import CALIPER, FURTHEST_SIZES, RULE, SCALES
 from bayesplate.cards.schema import Section, place, validated
@@ -37,7 +37,6 @@ MOST_SETUPS = 20
 _LENGTH = Number(1, 100_000, "mm", too_small="in mm: 1 m is 1000 mm, 1 cm is 10 mm")
 _THICKNESS = Number(0.01, 1000, "mm")
 _MASS = Number(1e-3, 1e8, "g")
-_DENSITY = Number(1, 30_000, "kg/m3", "in kg/m3: 1 g/cm3 is 1000 kg/m3")
 _SIZE = partial(QuantityReader, furthest=FURTHEST_SIZES)
 _LENGTH_X = _SIZE(_LENGTH, places=("at_y_mm",), resolution=RULE)
 _LENGTH_Y = _SIZE(_LENGTH, places=("at_x_mm",), resolution=RULE)
@@ -52,7 +51,7 @@ class PlateSection(Section):
     length_y_mm: Annotated[Quantity, PlainValidator(_LENGTH_Y)] = Field(description="the length across the grain in mm")
     thickness_mm: Annotated[Quantity, PlainValidator(_THICKNESSES)] = Field(description="the thickness in mm")
     mass_g: Annotated[Quantity | None, PlainValidator(_SIZE(_MASS, resolution=SCALES))] = None
-    density_kg_m3: Annotated[Quantity | None, PlainValidator(_SIZE(_DENSITY))] = None
+    density_kg_m3: Annotated[Quantity | None, PlainValidator(_SIZE(DENSITY))] = None
 
 
 class MaterialSection(Section):

@@ -25,6 +25,9 @@ _COORDINATE = Number(-100_000, 100_000, "mm")
 _ROUNDING = "the number alone if it is exact; a reading rounded to r has sd = r / sqrt(12)"
 
 
+DENSITY = Number(1, 30_000, "kg/m3", "in kg/m3: 1 g/cm3 is 1000 kg/m3")
+
+
 @dataclass(frozen=True)
 class QuantityReader:
     """Reads a quantity: a number, { mean, sd }, a list of readings, or { readings, resolution, at_x_mm, at_y_mm }.

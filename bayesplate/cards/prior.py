@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator
 
 from bayesplate.cards.board import LARGEST_POISSON, name_faults
-from bayesplate.cards.measures import QuantityReader, read_factor, read_noise, read_whole_table
+from bayesplate.cards.measures import DENSITY, QuantityReader, read_factor, read_noise, read_whole_table
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.schema import Section, validated
 from bayesplate.cards.shelf import find
@@ -80,6 +80,7 @@ def _stated(value: object, read: Any) -> StatedPrior:
 _Elastic = Annotated[StatedPrior | None, PlainValidator(_ConstantReader("gpa"))]
 _Rigidity = Annotated[StatedPrior | None, PlainValidator(_ConstantReader("n_m"))]
 _POISSON = QuantityReader(Number(-LARGEST_POISSON, LARGEST_POISSON), "normal")
+_DENSITY = QuantityReader(DENSITY)
 
 
 class PriorCard(Section):
@@ -100,6 +101,9 @@ class PriorCard(Section):
     stated_poisson: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, _POISSON))] = Field(
         default=None, alias="poisson_xy"
     )
+    stated_density: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, _DENSITY))] = Field(
+        default=None, alias="density_kg_m3"
+    )
 
     @classmethod
     def from_quantities(
@@ -110,6 +114,7 @@ class PriorCard(Section):
         source: str | Mapping[str, str],
         noise: Quantity | None = None,
         poisson_xy: Quantity | None = None,
+        density: Quantity | None = None,
         title: str = "",
     ) -> PriorCard:
         """A prior from quantities.
@@ -120,11 +125,13 @@ class PriorCard(Section):
         constants : dict of Quantity
             E_x, E_y, G_xy in Pa, or D_x, D_y, D_s in N m; each from `Quantity.from_median` or `Quantity.from_range`.
         source : str or dict of str
-            Where the numbers come from: one text, or one per name (also of noise and poisson_xy).
+            Where the numbers come from: one text, or one per name (also of noise, poisson_xy, density).
         noise : Quantity, optional
             Relative noise of a frequency, from `Quantity.from_median`.
         poisson_xy : Quantity, optional
             Normal: `Quantity.from_mean(0.4, 0.08, "normal")`.
+        density : Quantity, optional
+            kg m^-3; no density is taken from it, but a board of another one is asked about.
         title : str
 
         Returns
@@ -149,6 +156,8 @@ class PriorCard(Section):
         if poisson_xy is not None and (poisson_xy.is_exact or poisson_xy.kind != "normal"):
             wanted = 'Quantity.from_mean(0.4, 0.08, "normal")'
             faults.append(Fault(f"{name} poisson_xy", wanted, "another kind of quantity"))
+        if density is not None and (density.is_exact or density.kind != "log-normal"):
+            faults.append(Fault(f"{name} density", "Quantity.from_mean(430, 60)", "another kind of quantity"))
         if faults:
             raise InputError(faults)
 
@@ -160,6 +169,8 @@ class PriorCard(Section):
             further["stated_noise"] = stated("noise", noise.scaled(100.0))
         if poisson_xy is not None:
             further["stated_poisson"] = stated("poisson_xy", poisson_xy)
+        if density is not None:
+            further["stated_density"] = stated("density", density)
         return read_prior_text(prior_text(cls.model_construct(format=1, name=name, title=title, **further)), name)
 
     def to_card(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
@@ -210,9 +221,18 @@ class PriorCard(Section):
         return self.stated_poisson.quantity if self.stated_poisson else None
 
     @property
+    def density(self) -> Quantity | None:
+        """Densities that such boards have, kg m^-3, if the card states them."""
+        return self.stated_density.quantity if self.stated_density else None
+
+    @property
     def sources(self) -> dict[str, str]:
         """Name of each stated prior to its source."""
-        stated = {"noise_percent": self.stated_noise, "poisson_xy": self.stated_poisson}
+        stated = {
+            "noise_percent": self.stated_noise,
+            "poisson_xy": self.stated_poisson,
+            "density_kg_m3": self.stated_density,
+        }
         return {
             **{name: one.source for name, one in (self.stated_constants | stated).items() if one},
         }

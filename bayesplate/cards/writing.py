@@ -42,10 +42,10 @@ def prior_text(prior: PriorCard) -> str:
         median, factor = density_numbers(prior.stated_noise.quantity, 1.0, Quantity.from_median)
         source = text(prior.stated_noise.source)
         lines += ["", "[noise_percent]", f"median = {median}", f"factor = {factor}", f"source = {source}"]
-    if prior.stated_poisson is not None:
-        stated = prior.stated_poisson
-        lines += ["", "[poisson_xy]", f"mean = {number(stated.quantity.mean)}", f"sd = {number(stated.quantity.sd)}"]
-        lines += [f"source = {text(stated.source)}"]
+    for key, one in (("poisson_xy", prior.stated_poisson), ("density_kg_m3", prior.stated_density)):
+        if one is not None:
+            lines += ["", f"[{key}]", f"mean = {number(one.quantity.mean)}", f"sd = {number(one.quantity.sd)}"]
+            lines += [f"source = {text(one.source)}"]
     return "\n".join(lines) + "\n"
 
 

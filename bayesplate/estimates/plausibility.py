@@ -322,7 +322,14 @@ def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ..
     elif ratio < 1.0 / _STIFFER_ACROSS:
         found.append(f"E_y comes out {1.0 / ratio:.3g} times as large as E_x: is x along the grain?")
     rho = float(density(values))
-    if rho < LIGHTEST_WOOD:
+    if prior.density is not None:
+        low, high = (float(prior.density.quantile(np.array(share))) for share in _USUAL)
+        if not low <= rho <= high:
+            found.append(
+                f"the density comes out as {rho:.3g} kg/m3, the prior '{prior.name}' is of boards of {low:.3g} to "
+                f"{high:.3g}: are the mass and the three lengths right?"
+            )
+    elif rho < LIGHTEST_WOOD:
         found.append(
             f"the density comes out as {rho:.3g} kg/m3, lighter than balsa: are the mass and the three lengths right?"
         )

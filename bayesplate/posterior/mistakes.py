@@ -44,6 +44,7 @@ _LEAST_LOG_SD = 0.7
 _OCTAVES, _DECIMALS = (2.0, 0.5), (10.0, 0.1)
 _ANYWHERE = np.log(16.0)
 """Width in ln f over which a reading of something else may lie: two octaves either way."""
+_LOG_MILLION = np.log(1e6)
 _NOISE_SDS = np.linspace(-3.0, 14.0, 69)
 
 
@@ -295,8 +296,10 @@ def _pair(readings: Readings, slip: Slip) -> str:
 
 
 def _times(log_odds: float) -> str:
-    odds = np.exp(min(log_odds, 25.0))
-    return f"{odds:.2g} times" if odds < 100 else f"10^{np.log10(np.exp(1.0)) * log_odds:.0f} times"
+    if log_odds > _LOG_MILLION:
+        return "more than a million times"
+    odds = float(np.exp(log_odds))
+    return f"{odds:.2g} times" if odds < 100 else f"{float(f'{odds:.1g}'):,.0f} times"
 
 
 def _apart(board: Board, reading: int) -> float:

@@ -112,4 +112,4 @@ def short_sentences(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:
 
 def page_warnings(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:
     """What stands beneath them: doubts of the diagnosis, then those of the fit."""
-    return [*(warnings(diagnosis) if diagnosis is not None else []), *summary.warnings]
+    return list(dict.fromkeys([*(warnings(diagnosis) if diagnosis is not None else []), *summary.warnings]))

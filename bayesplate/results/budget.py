@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesplate.cards import PriorCard
 from bayesplate.plate.board import Board
 from bayesplate.posterior.draws import Draws
 
@@ -23,6 +24,18 @@ def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
             name: float(np.corrcoef(log_modulus, column.ravel())[0, 1] ** 2) for name, column in draws.inputs.items()
         }
     return shares
+
+
+def prior_remarks(draws: Draws, prior: PriorCard) -> list[str]:
+    """One sentence on the constants whose posterior is more than half as wide as their prior, or none."""
+    drawn = {**draws.moduli, **draws.rigidities}
+    widths = {name: float(np.std(np.log(drawn[name]))) / one.log_sd for name, one in prior.constants.items()}
+    wide = [f"{name} ({width:.2f} times as wide)" for name, width in widths.items() if width > LARGE_SHARE]
+    if not wide:
+        return []
+    return [
+        f"the readings add little to the prior '{prior.name}' on {', '.join(wide)}: it decides much of what is shown"
+    ]
 
 
 def input_remarks(draws: Draws, board: Board) -> list[str]:

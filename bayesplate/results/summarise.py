@@ -17,7 +17,7 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
-from bayesplate.results.budget import input_remarks
+from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
 from bayesplate.results.modes import mode_rows, unlabelled_peaks
 from bayesplate.results.summary import (
@@ -116,7 +116,11 @@ def summarise(
             surrogate_worst_cents=finite(_worst(assessment.surrogate_errors)),
         ),
         sampler=sampler_health(inference.chains, inference.convergence),
-        identifiability=(*remarks(board, problem.identifiability), *input_remarks(draws, board)),
+        identifiability=(
+            *remarks(board, problem.identifiability),
+            *prior_remarks(draws, problem.prior),
+            *input_remarks(draws, board),
+        ),
         warnings=tuple(warnings_of(problem, assessment)),
     )
 

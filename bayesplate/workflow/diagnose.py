@@ -17,7 +17,6 @@ from bayesplate.diagnosis.decision.refits import excludes_zero, likely_forms, re
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, alternatives, answer_words, answers, decide
 from bayesplate.diagnosis.evidence.folds import nested
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
-from bayesplate.diagnosis.evidence.order import order_notes
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
@@ -162,7 +161,7 @@ def diagnose(
     stages.begin("the same search on simulated boards", _CONTROL)
     control = null_control(found, np.random.default_rng([seed, _NULL_LINE]), n_null)
     refits: dict[int, Fitted] = {}
-    notes = list(order_notes(found))
+    notes = list(problem.posed.doubts)
     for answer in finals:
         try:
             name = "-".join((*answer.members, str(answer.index)))

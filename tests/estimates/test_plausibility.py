@@ -233,6 +233,16 @@ def test_what_is_unusual_is_told_and_what_is_usual_is_not():
     assert "times as large as E_y" not in told(*of_spruce(E_y=11e9 / (0.98 * MOST_ORTHOTROPIC)))
     plate, board = of_spruce(E_y=22e9)
     assert "E_y comes out 2 times as large as E_x: is x along the grain?" in told(plate, board)
+    edges = [float(prior.density.quantile(np.array(share))) for share in (0.001, 0.999)]
+    for rho, is_told in (
+        (0.99 * edges[0], True),
+        (1.01 * edges[0], False),
+        (0.99 * edges[1], False),
+        (1.01 * edges[1], True),
+    ):
+        heavy = board.with_priors({"mass": Quantity.exact(rho * plate.L_x * plate.L_y * plate.h)})
+        assert ("the prior 'spruce' is of boards of" in told(plate, heavy)) is is_told
+    prior = load_prior("weakly-informative")
     for share, is_told in ((0.98, True), (1.02, False)):
         mass = share * LIGHTEST_WOOD * plate.L_x * plate.L_y * plate.h
         assert ("lighter than balsa" in told(plate, board.with_priors({"mass": Quantity.exact(mass)}))) is is_told

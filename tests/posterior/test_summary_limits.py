@@ -10,6 +10,7 @@ import pytest
 
 import bayesplate.frequencies.spectrum
 import bayesplate.posterior.assessment
+from bayesplate.cards import load_prior
 from bayesplate.estimates.identifiability import Identifiability, remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import sign_conflicts, spectrum
@@ -23,7 +24,7 @@ from bayesplate.posterior.inference import Inference, pose
 from bayesplate.posterior.reweighting import linearisation
 from bayesplate.posterior.sampling import Chains
 from bayesplate.posterior.target import linear_suffices
-from bayesplate.results.budget import input_remarks
+from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.summarise import summarise
 from bayesplate.workflow.prepare import prepare
 
@@ -128,6 +129,20 @@ def test_an_input_is_named_that_makes_half_of_the_variance(share, is_told):
 
     assert bool(said) is is_told
     assert all("51 % of the uncertainty (variance) of E_x comes from the thickness" in one for one in said)
+
+
+@pytest.mark.parametrize(("width", "is_told"), [(0.49, False), (0.51, True)])
+def test_a_prior_is_named_that_is_at_most_twice_as_wide_as_the_posterior(width, is_told):
+    """ln E_x spread evenly with so many times the standard deviation of its prior's logarithm."""
+    prior = load_prior("spruce")
+    even = np.linspace(-1.0, 1.0, 2001) * np.sqrt(3.0 * 2000 / 2002)
+    columns = {
+        name: np.exp((width if name == "E_x" else 0.1) * one.log_sd * even) for name, one in prior.constants.items()
+    }
+    said = prior_remarks(SimpleNamespace(moduli=columns, rigidities={}), prior)
+
+    assert bool(said) is is_told
+    assert all("little to the prior 'spruce' on E_x (0.51 times as wide):" in one for one in said)
 
 
 @pytest.mark.parametrize(("leverage", "is_told"), [(0.899, False), (0.901, True)])

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import bayesplate
+from bayesplate.cards.shelf import shelf_folder
 from bayesplate.cli import main
 from bayesplate.results.contract import as_json
 from bayesplate.workflow.prepare import default_folder
@@ -31,11 +32,21 @@ def test_a_forced_law_and_robust_noise_reach_the_summary(quick_fit, board, optio
     assert is_warned == (law == "linear")
 
 
-def test_robust_noise_changes_the_draws(quick_fit):
-    plain = quick_fit("fiemme-spruce-clamped", "--quiet").summary["elastic"]
-    robust = quick_fit("fiemme-spruce-clamped", "--quiet", "--robust", "--force").summary["elastic"]
+def test_robust_noise_sets_one_wrong_reading_apart(finnish, tmp_path):
+    """(2,1) an octave high: the constants and every error but its own are those of the board as it was read."""
+    text = (shelf_folder("boards") / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
+    card = tmp_path / "octave.toml"
+    card.write_text(text.replace('"(2,1)" = 398', '"(2,1)" = 796').replace(f'"{finnish.summary["name"]}"', '"octave"'))
+    found, plain = bayesplate.fit(card, robust=True).summary, finnish.summary
 
-    assert plain["E_x"]["mean"] != robust["E_x"]["mean"]
+    assert "(2,1) at 796 Hz" in found.warnings[0]
+    assert "an octave, or another mode?" in found.warnings[0]
+    for name, one in plain["elastic"].items():
+        assert abs(found.elastic[name].mean - one["mean"]) < 2.0 * one["sd"]
+    for row, before in zip(found.modes, plain["modes"], strict=True):
+        octave = 1200.0 * (row.label == "(2,1)")
+        assert abs(row.residual_cents - octave - before["residual_cents"]) < 40.0  # two sd of its own noise, 1.2 %
+        assert abs(row.left_out_cents - octave - before["left_out_cents"]) < 80.0  # and a leverage of up to one half
 
 
 def test_quiet_prints_nothing(quick_fit):

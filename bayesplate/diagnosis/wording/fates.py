@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, p_words
 from bayesplate.diagnosis.evidence.folds import NEEDED
-from bayesplate.diagnosis.evidence.order import ratio_words
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.wording.candidates import Fate
@@ -70,3 +71,10 @@ def _less_probable(found: Found, ranked: Sequence[Answer], name: str | None, ind
     mine, others = f"{own:.3f}", f"{best.support:.3f}"
     word = "less probable" if mine != others else "no more probable"
     return "less probable", f"{word} ({mine}) than {answer_words(found, best)} ({others})"
+
+
+def ratio_words(found: Found, index: int) -> str:
+    """How much likelier the readings are under a hypothesis that exchanges two labels than as they are called."""
+    gained = float(found.log_evidence[index] - found.log_evidence[0])
+    times = "more than a million" if abs(gained) > np.log(1e6) else f"{np.exp(abs(gained)):.3g}"
+    return f"with these labels exchanged the readings are {times} times {'likelier' if gained > 0 else 'less likely'}"

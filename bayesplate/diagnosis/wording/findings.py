@@ -13,7 +13,6 @@ from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, ans
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.null_control import NullControl, gain
-from bayesplate.diagnosis.evidence.order import ratio_words
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
 from bayesplate.diagnosis.wording.diagnosis import (
@@ -26,6 +25,7 @@ from bayesplate.diagnosis.wording.diagnosis import (
     PValues,
 )
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of, rms
+from bayesplate.diagnosis.wording.fates import ratio_words
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_names, joined
 from bayesplate.frequencies.laws import cents
