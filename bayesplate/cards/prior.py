@@ -125,7 +125,7 @@ class PriorCard(Section):
         constants : dict of Quantity
             E_x, E_y, G_xy in Pa, or D_x, D_y, D_s in N m; each from `Quantity.from_median` or `Quantity.from_range`.
         source : str or dict of str
-            Where the numbers come from: one text, or one per name (also of noise, poisson_xy, density).
+            Where the numbers come from: one text, or one per name (also of noise, poisson_xy, density_kg_m3).
         noise : Quantity, optional
             Relative noise of a frequency, from `Quantity.from_median`.
         poisson_xy : Quantity, optional
@@ -170,7 +170,7 @@ class PriorCard(Section):
         if poisson_xy is not None:
             further["stated_poisson"] = stated("poisson_xy", poisson_xy)
         if density is not None:
-            further["stated_density"] = stated("density", density)
+            further["stated_density"] = stated("density_kg_m3", density)
         return read_prior_text(prior_text(cls.model_construct(format=1, name=name, title=title, **further)), name)
 
     def to_card(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:

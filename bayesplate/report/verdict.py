@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.tables import (
     answers_table,
-    averaged_table,
     candidates_table,
     errors_table,
     shift_table,
@@ -32,7 +31,7 @@ class DiagnosisSection:
         Each word that a verdict may be, what it means, and whether it is the one given.
     sentences : tuple of str
     tables : tuple of Table
-        Constants to quote, probabilities, errors, shift of the constants, sizes.
+        Probabilities, errors, shift of the constants, sizes.
     explained : tuple of str
         What two words of these tables mean.
     model : str
@@ -63,7 +62,6 @@ _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviation
 def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     """The section of a diagnosis."""
     tables = (
-        averaged_table(diagnosis),
         answers_table(diagnosis),
         errors_table(diagnosis),
         shift_table(diagnosis),

@@ -10,7 +10,6 @@ import ritz
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
 from scipy.optimize import least_squares
 
-from bayesplate.estimates import least_squares as module
 from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
 from bayesplate.plate.material import moduli
 from bayesplate.quantities import Quantity
@@ -87,10 +86,9 @@ def test_steps_end_where_they_do_not_count_or_are_rounding(step, previous, settl
 
 
 @pytest.mark.parametrize("steps", [1, 2, 40])
-def test_an_estimate_is_where_its_models_were_solved_settled_or_not(monkeypatch, steps):
-    monkeypatch.setattr(module, "_MOST_STEPS", steps)
+def test_an_estimate_is_where_its_models_were_solved_settled_or_not(steps):
     board = prepare("finnish-spruce-cantilever").board
-    estimate = weighted_least_squares(board)
+    estimate = weighted_least_squares(board, steps)
     assert estimate.converged == (steps == 40)
     assert [float(estimate.values[name]) for name in ("D_x", "D_y", "D_s")] == estimate.rigidities.tolist()
     (model,) = models_at(board, estimate.rigidities)

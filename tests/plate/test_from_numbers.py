@@ -202,7 +202,13 @@ def test_a_shipped_prior_comes_back(name):
     card = load_prior(name)
     further = {"noise": None if card.noise_percent is None else card.noise_percent.scaled(0.01)}
     made = bayesplate.PriorCard.from_quantities(
-        name, card.constants, source=card.sources, poisson_xy=card.poisson_xy, title=card.title, **further
+        name,
+        card.constants,
+        source=card.sources,
+        poisson_xy=card.poisson_xy,
+        density=card.density,
+        title=card.title,
+        **further,
     )
     assert made == card
 
@@ -216,6 +222,7 @@ def test_a_shipped_prior_comes_back(name):
         (CONSTANTS | {"E_x": Q.from_mean(1e10, 1e9, "normal")}, {}, "mine E_x: wanted Quantity.from_median"),
         (CONSTANTS | {"E_x": Q.from_median(12.0, 1.3)}, {}, r"mine.toml \[E_x\] median_gpa: wanted a number from"),
         (CONSTANTS, {"noise": Q.from_range(0.001, 0.01)}, "mine noise: wanted Quantity.from_median"),
+        (CONSTANTS, {"density": Q.exact(430.0)}, r"mine density: wanted Quantity.from_mean\(430, 60\)"),
         (CONSTANTS, {"poisson_xy": Q.exact(0.4)}, r'mine poisson_xy: wanted Quantity.from_mean\(0.4, 0.08, "normal"\)'),
     ],
 )

@@ -214,8 +214,8 @@ def test_constants_averaged_over_the_effects_are_shown(clamped):
     found = replace(DIAGNOSES["named"], elastic_averaged=averaged)
     text = Read(clamped.page("A board", diagnosis=found)).text
 
-    assert "averaged over all explanations by their probability" in text
-    assert text.count("10.25 ± 0.50") == 3  # in short, of the verdict, and beside the older methods
+    assert "averaged over everything that may be the case" in text
+    assert text.count("10.25 ± 0.50") == 2  # in short, and beside the older methods
     assert "9.50 to 11.00" in text
 
 
@@ -261,7 +261,7 @@ def test_the_first_lines_are_of_the_constants_to_quote(clamped, verdict):
     assert "7.50 ± 0.75 GPa along the grain" in first
     assert ("averaged over everything that may be the case" in first) is (verdict != "unexplained")
     assert ("too narrow" in first) is (verdict == "unexplained")
-    assert ("by 4 cents" in first, "by 21 cents" in first) == (verdict == "named", verdict != "named")
+    assert ("by 4.2 cents" in first, "by 21 cents" in first) == (verdict == "named", verdict != "named")
 
 
 def test_a_page_says_which_member_of_a_group_the_rest_is_of(clamped):

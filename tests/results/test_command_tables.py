@@ -108,7 +108,9 @@ def test_modes_are_shown_with_their_reading_or_their_range():
         SheetRow("(1,0)", 51.44, 52.0, -18.7, None, EnergyShares(100.0, -0.3, 0.3, 0.0), 3.232, -0.3164, 0.01128),
         SheetRow("(1,3)", 818.1, None, None, (800.4, 836.2), EnergyShares(2.0, 91.0, 7.0, 0.0), 16.92, 14340.0, 315.7),
     )
-    report = ModesReport("made", "", "at the estimate", (SheetReport("bench", {}, "thin", rows, ()),), (), ("m.png",))
+    report = ModesReport(
+        "made", "", "at the estimate", (SheetReport("bench", {}, "thin", rows, ()),), (), (), ("m.png",)
+    )
     (table,) = sheet_tables(report)
 
     assert table.columns[2:4] == ("likely Hz", "% in D_x/D_y/D_s")

@@ -14,6 +14,7 @@ MEANS = dict.fromkeys(("E_x", "E_y", "G_xy", "D_x", "D_y", "D_s"), 1.5)
 
 def warned(*, law="linear", settled=True, enough=True, exact_worst=0.0, doubts=()):
     problem = SimpleNamespace(
+        doubts=(),
         board=SimpleNamespace(notes=("noted",)),
         estimate=SimpleNamespace(converged=settled),
         posterior=SimpleNamespace(law=law),
