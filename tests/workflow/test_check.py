@@ -55,16 +55,20 @@ def invoke(*arguments: str) -> Result:
     return CliRunner().invoke(main, arguments)
 
 
-@pytest.mark.parametrize("name", card_names("boards"))
-def test_every_shipped_board_can_be_checked(name, tmp_path, monkeypatch):
-    """Leverages sum to the number of constants, energy shares to the whole; the report printed is the one returned."""
+def test_the_report_printed_is_the_one_returned(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = invoke("check", name, "--json")
-    report = read_json(result.stdout)
+    result = invoke("check", "fiemme-spruce-clamped", "--json")
 
     assert result.exit_code == 0
-    assert report == as_json(bayesplate.check(name))
+    assert read_json(result.stdout) == as_json(bayesplate.check("fiemme-spruce-clamped"))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", card_names("boards"))
+def test_every_shipped_board_can_be_checked(name):
+    """Leverages sum to the number of constants, energy shares to the whole."""
+    report = as_json(bayesplate.check(name))
+
     assert sum(mode["leverage"] for mode in report["modes"]) == pytest.approx(3.0, abs=1e-9)
     for mode in report["modes"]:
         assert sum(mode["share_percent"]) == pytest.approx(100.0, abs=0.2)  # each is rounded to 0.1

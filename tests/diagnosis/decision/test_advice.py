@@ -69,7 +69,8 @@ def test_of_several_ways_the_one_that_shows_most_is_recommended(monkeypatch):
     assert recommendation(None, ("a", "b")) == recommendation(None, ()) == ""
 
 
-def test_the_recommendation_names_the_effects_and_what_to_measure(finnish):
+def test_the_recommendation_names_the_effects_and_what_to_measure(finnish, told, monkeypatch):
+    monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: told)
     sentence = recommendation(search(finnish.ground), ASKED)
     assert sentence.startswith("Measure ")
     assert "clamp rotation would then show" in sentence
