@@ -212,6 +212,15 @@ def test_a_plate_of_no_material_is_refused_under_any_prior_and_no_unit_is_blamed
     assert "ten times" not in told
 
 
+def test_a_plate_of_no_material_is_refused_also_where_no_exchange_mends_it():
+    """A square plate as stiff both ways, and a Poisson ratio above one: nothing to be exchanged."""
+    _, board = of_spruce(10e9, 9e9, L_x=0.3, L_y=0.3)
+
+    assert asked(board, "weakly-informative") == ""
+    told = asked(board.with_priors({"poisson_xy": Quantity.exact(1.3)}), "spruce")
+    assert told.endswith("(or a smaller poisson_xy)")
+
+
 @pytest.mark.parametrize(("factor", "question"), [(10.0, "is thickness_mm ten times too large?"),
                                                   (0.1, "is thickness_mm ten times too small?")])  # fmt: skip
 def test_a_thickness_off_by_ten_is_asked_about_where_the_mass_is_known(factor, question):

@@ -12,9 +12,11 @@ import ritz
 
 from bayesplate.cards import load_prior
 from bayesplate.estimates import proposals as proposed
-from bayesplate.estimates.proposals import MISSED, SPURIOUS, probabilities, proposals
+from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.estimates.proposals import MISSED, SPURIOUS, UNUSUAL, probabilities, proposals
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board
+from bayesplate.plate.material import moduli
 
 PLATE = ritz.Plate.from_moduli(10e9, 0.8e9, 0.75e9, 0.4, rho=430.0, h=3e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2))
@@ -59,6 +61,31 @@ def test_probabilities_of_a_peak_are_those_of_the_ways_that_give_it_a_label(foun
         assert sum(shares.values()) == pytest.approx(1.0)
         for label, share in shares.items():
             assert share == pytest.approx(sum(one.probability for one in ways if one.labels[i] == label))
+
+
+def test_the_weight_of_a_way_holds_the_prior_at_its_estimate_and_what_is_unusual(found, monkeypatch):
+    _, ways = found
+    estimate = weighted_least_squares(ways[0].board)
+    D_x, D_y, D_s = estimate.rigidities
+    elastic = moduli(D_x, D_y, D_s, estimate.values["thickness"], estimate.values["poisson_xy"])
+    modes = [(float(np.log(r.frequency.mean)), r.label) for r in ways[0].board.setups[0].readings]
+    spruce, weak = load_prior("spruce"), load_prior("weakly-informative")
+
+    def weight(prior):
+        return proposed._log_weight(ways[0].board, estimate, ways[0].labels, modes, prior)
+
+    def density(prior):
+        return sum(
+            float(one.log_density_of_log(np.log(elastic._asdict()[name]))) for name, one in prior.constants.items()
+        )
+
+    assert weight(spruce) - weight(weak) == pytest.approx(density(spruce) - density(weak))
+    usual, ratio = weight(weak), float(elastic.E_x / elastic.E_y)
+    monkeypatch.setattr(proposed, "MOST_ORTHOTROPIC", 1.01 * ratio)
+    assert weight(weak) == usual
+    monkeypatch.setattr(proposed, "MOST_ORTHOTROPIC", 0.99 * ratio)
+    assert weight(weak) - usual == pytest.approx(np.log(UNUSUAL))
+    assert UNUSUAL < 0.05
 
 
 def test_three_peaks_and_boards_with_a_label_are_left_alone():
