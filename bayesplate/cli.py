@@ -219,12 +219,13 @@ def compare(
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "force", "resume", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "report", "force", "resume", "json", "quiet", "debug")
 def diagnose(
     card: str,
     out: str | None,
     seed: int,
     effects: list[str] | None,
+    report: bool,
     force: bool,
     resume: bool,
     as_json: bool,
@@ -239,7 +240,9 @@ def diagnose(
             from bayesplate.workflow.prepare import default_folder
 
             folder = default_folder(card) if out is None else out
-            result = run(card, out=folder, seed=seed, effects=effects, force=force, resume=resume, progress=tell)
+            result = run(
+                card, out=folder, report=report, seed=seed, effects=effects, force=force, resume=resume, progress=tell
+            )
         if as_json:
             print_json(result.to_json())
         elif not quiet:
