@@ -20,7 +20,7 @@ CASES = [
     (CANTILEVER, "clamp_translation"),
     (CANTILEVER, "clamp_rotation clamp_translation"),
     (CANTILEVER, "support_stiffness"),
-    (CANTILEVER, "attached_mass"),
+    pytest.param(CANTILEVER, "attached_mass", marks=pytest.mark.slow),  # the free board has one too
     (CLAMPED, "clamp_rotation"),
     (CLAMPED, "clamp_translation"),
     (CLAMPED, "membrane_tension"),

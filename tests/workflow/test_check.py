@@ -64,7 +64,14 @@ def test_the_report_printed_is_the_one_returned(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", card_names("boards"))
+BOARDS = [
+    # profiles of the outline make their plates dear
+    pytest.param(name, marks=pytest.mark.slow) if name in ("spruce-free-1R", "spruce-free-3L") else name
+    for name in card_names("boards")
+]
+
+
+@pytest.mark.parametrize("name", BOARDS)
 def test_every_shipped_board_can_be_checked(name):
     """Leverages sum to the number of constants, energy shares to the whole."""
     report = as_json(bayesplate.check(name))
