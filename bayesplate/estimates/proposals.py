@@ -47,7 +47,7 @@ orthotropic."""
 
 _N_DRAWS = 6000
 _N_BEAMS = 8
-_N_FITTED, _MOST_FITTED, _MOST_STEPS = 5, 8, 8
+_N_FITTED, _MOST_FITTED, _MOST_STEPS = 10, 18, 8
 _WORTH_A_FIT = 15.0
 """ln of how many times less probable, by the rough frequencies, an assignment may be that is fitted."""
 _ROUGH_SD = 0.06

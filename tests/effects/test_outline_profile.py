@@ -37,9 +37,24 @@ def independent(plate, stations, widths):
     )
 
 
-@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("profile", [((0.0, 1.0), (1.01, 0.99)), BENT, CUT], ids=["taper", "bent", "cut"])
-@pytest.mark.parametrize("plate", [FINNISH, FREE], ids=["cantilever", "free"])
+PROFILES = {"taper": ((0.0, 1.0), (1.01, 0.99)), "bent": BENT, "cut": CUT}
+PLATES = {"cantilever": FINNISH, "free": FREE}
+QUICK = {("cantilever", "cut"), ("free", "bent")}
+CASES = [
+    pytest.param(
+        PLATES[plate],
+        PROFILES[profile],
+        is_sheared,
+        id=f"{plate}-{profile}-{'shear-flexible' if is_sheared else 'thin'}",
+        marks=pytest.mark.slow if is_sheared and (plate, profile) not in QUICK else (),
+    )
+    for plate in PLATES
+    for profile in PROFILES
+    for is_sheared in (False, True)
+]
+
+
+@pytest.mark.parametrize(("plate", "profile", "is_sheared"), CASES)
 def test_against_the_generator(plate, profile, is_sheared):
     effect = outline(plate, *profile)
     apart = hertz_apart(plate, [effect], {}, [independent(plate, *profile)], 6, is_sheared)
