@@ -13,7 +13,7 @@ def log_probability(residuals: Floats, constants: Floats, variances: Floats, inp
 
     Parameters
     ----------
-    residuals : (n_modes,) array
+    residuals : (n_modes,) or (n_sets, n_modes) array
         ln measured - ln predicted, at some constants and at the middle of the inputs' priors.
     constants : (n_modes, 3) array
         Sensitivities of ln f to the logarithms of the constants.
@@ -24,16 +24,16 @@ def log_probability(residuals: Floats, constants: Floats, variances: Floats, inp
 
     Returns
     -------
-    (n_levels,) array
+    (n_levels,) or (n_levels, n_sets) array
     """
-    covariance = variances[:, :, None] * np.eye(residuals.size)
+    covariance = variances[:, :, None] * np.eye(residuals.shape[-1])
     if inputs is not None:
         covariance = covariance + inputs @ inputs.T
-    n_constants = constants.shape[1]
-    weighted = np.linalg.solve(covariance, np.column_stack([constants, residuals])[None])
-    information = constants.T @ weighted[..., :n_constants]
-    seen = constants.T @ weighted[..., n_constants:]
-    explained = (np.swapaxes(seen, 1, 2) @ np.linalg.solve(information, seen))[:, 0, 0]
-    squares = weighted[..., n_constants] @ residuals - explained
+    precision = np.linalg.inv(covariance)
+    weighted = precision @ constants
+    information = constants.T @ weighted
+    seen = np.linalg.solve(information, np.swapaxes(weighted, 1, 2))
+    squares = np.stack([np.sum((residuals @ one) * residuals, axis=-1) for one in precision - weighted @ seen])
     volumes = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(information)[1]
-    return np.asarray(-0.5 * (squares + volumes + (residuals.size - n_constants) * np.log(2.0 * np.pi)))
+    volumes += (residuals.shape[-1] - constants.shape[1]) * np.log(2.0 * np.pi)
+    return np.asarray(-0.5 * (squares + volumes.reshape(-1, *[1] * (squares.ndim - 1))))

@@ -25,8 +25,8 @@ from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.doubts import slip_remarks
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
-from bayesplate.posterior.mistakes import slip_remarks
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate

@@ -13,9 +13,10 @@ from scipy import stats
 
 from bayesplate.cards import load_prior
 from bayesplate.plate.board import Board
-from bayesplate.posterior import mistakes
+from bayesplate.posterior import slips
+from bayesplate.posterior.doubts import LARGE_NOISE, noise_remarks, slip_remarks
 from bayesplate.posterior.inference import PosedProblem, pose
-from bayesplate.posterior.mistakes import LARGE_NOISE, RARITY, Readings, Slip, noise_remarks, slip_remarks
+from bayesplate.posterior.slips import RARITY, Slip, SlipSearch
 from bayesplate.quantities import Quantity
 
 PLATE = ritz.Plate.from_moduli(11e9, 0.95e9, 0.67e9, 0.4, rho=406.0, h=2.8e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
@@ -81,20 +82,20 @@ def test_a_board_without_a_slip_is_told_nothing():
 def test_a_reading_is_told_from_the_stated_rarity_on(monkeypatch):
     changed = {(3, 1): 1.08 * HERTZ[3, 1]}
     problem = posed(changed)
-    slip = Readings(problem.posterior, problem.centre).likeliest()
+    slip = SlipSearch(problem.posterior, problem.centre).likeliest()
 
     assert slip is not None
     assert slip.readings == (made_boards.FREE_LABELS.index((3, 1)),)
     assert slip.log_odds > np.log(RARITY)
-    monkeypatch.setattr(mistakes, "RARITY", 1.01 * np.exp(slip.log_odds))
-    assert Readings(problem.posterior, problem.centre).likeliest() is None
+    monkeypatch.setattr(slips, "RARITY", 1.01 * np.exp(slip.log_odds))
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
 
 
 def test_a_slip_has_to_explain_the_readings_after_a_refit_too(monkeypatch):
     problem = posed({(2, 1): 2 * HERTZ[2, 1]})
-    readings = Readings(problem.posterior, problem.centre)
+    readings = SlipSearch(problem.posterior, problem.centre)
     assert readings.likeliest() is not None
-    monkeypatch.setattr(Readings, "refitted", lambda self, _: self.as_read)
+    monkeypatch.setattr(SlipSearch, "refitted", lambda self, _: self.as_read)
     assert readings.likeliest() is None
 
 
@@ -105,9 +106,9 @@ def test_what_an_effect_may_do_to_all_readings_is_no_slip_however_well_the_noise
     changed = {label: hertz * factor for (label, hertz), factor in zip(HERTZ.items(), off, strict=True)}
     problem = posed(changed, noise=Quantity.from_median(0.003, 1.05))
 
-    assert Readings(problem.posterior, problem.centre).likeliest() is None
-    monkeypatch.setattr(mistakes, "_LEAST_LOG_SD", 0.05)
-    assert Readings(problem.posterior, problem.centre).likeliest() is not None
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
+    monkeypatch.setattr(slips, "_LEAST_LOG_SD", 0.05)
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is not None
 
 
 def test_too_few_readings_show_no_slip():
@@ -116,7 +117,7 @@ def test_too_few_readings_show_no_slip():
     board = made_boards.board_of(PLATE, [made_boards.setup_of(ritz.ALL_FREE, hertz)])
     problem = pose(board, load_prior("weakly-informative"))
 
-    assert Readings(problem.posterior, problem.centre).likeliest() is None
+    assert SlipSearch(problem.posterior, problem.centre).likeliest() is None
 
 
 def test_the_probability_of_the_readings_is_that_of_a_wide_normal_prior():
@@ -124,7 +125,7 @@ def test_the_probability_of_the_readings_is_that_of_a_wide_normal_prior():
     thickness = Quantity.from_mean(2.8e-3, 0.05e-3)
     setup = made_boards.setup_of(ritz.ALL_FREE, HERTZ)
     problem = pose(made_boards.board_of(PLATE, [setup], thickness=thickness), load_prior("weakly-informative"))
-    readings = Readings(problem.posterior, problem.centre)
+    readings = SlipSearch(problem.posterior, problem.centre)
     fit = readings.as_read
     levels = [0, 12, 30]
     wide = 1e2
@@ -137,7 +138,7 @@ def test_the_probability_of_the_readings_is_that_of_a_wide_normal_prior():
             covariance = np.diag(readings._variances[level][kept]) + fit.slopes[kept] @ prior @ fit.slopes[kept].T
             seen = fit.residuals[kept] + fit.slopes[kept, 3:] @ fit.inputs
             density = stats.multivariate_normal(np.zeros(kept.size), covariance).logpdf(seen)
-            expected.append(density + 1.5 * np.log(2 * np.pi * wide) - 0.5 * mistakes._NOISE_SDS[level] ** 2)
+            expected.append(density + 1.5 * np.log(2 * np.pi * wide) - 0.5 * slips._NOISE_SDS[level] ** 2)
         np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
@@ -180,7 +181,7 @@ def test_a_robust_problem_is_posed_where_most_readings_agree():
     assert "an octave, or another mode?" in told(robust)
     assert "--robust" not in told(robust)
     assert "do not trust" not in told(robust)
-    residuals = [Readings(one.posterior, one.centre).as_read.residuals for one in (robust, normal)]
+    residuals = [SlipSearch(one.posterior, one.centre).as_read.residuals for one in (robust, normal)]
     assert residuals[0] == pytest.approx(residuals[1], abs=0.05)  # slips are weighed from where normal errors would be
 
 

@@ -1,0 +1,149 @@
+"""What to doubt about readings before anything is sampled, in a sentence each: slips, order, too large a noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
+from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.board import Board
+from bayesplate.posterior.slips import DECIMALS, OCTAVES, Slip, SlipSearch
+from bayesplate.posterior.target import Posterior
+from bayesplate.quantities import Quantity
+
+LARGE_NOISE, LARGE_NOISE_SDS = 3.0, 3.0
+"""Noise that the residuals want, over the median of its prior, and in standard deviations of its logarithm, beyond
+which the reader is told."""
+
+_LOG_MILLION = np.log(1e6)
+
+
+def slip_remarks(posterior: Posterior, centre: NDArray[np.float64]) -> tuple[str, ...]:
+    """What a reader of the constants must know of the readings, a sentence each, the worst first.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Its models hold the exact law.
+    centre : (n_dim,) array
+        Where the readings are most likely.
+
+    Returns
+    -------
+    tuple of str
+        The likeliest slip, or else the two readings whose order is least like the plate's; and whether the noise that
+        the residuals want is far above its prior.
+    """
+    search = SlipSearch(posterior, centre)
+    found, slip = [], search.likeliest()
+    if slip is not None:
+        found.append(_exchange(search.board, slip) if slip.is_exchange else _stray(search, slip))
+    elif (slip := search.disordered()) is not None:
+        found.append(_disorder(search.board, slip))
+    return (*found, *noise_remarks(posterior.board, search.log_widening))
+
+
+def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
+    """That the readings scatter far more than the prior of the noise lets expect, if they do; a sentence.
+
+    Parameters
+    ----------
+    board : Board
+    log_widening : float
+        ln of the noise that the residuals want, over the median of its prior.
+    """
+    widest = max(setup.noise.log_sd for setup in board.setups)
+    if not log_widening >= max(np.log(LARGE_NOISE), LARGE_NOISE_SDS * widest):
+        return ()
+    levels = ", ".join(
+        f"{100.0 * setup.noise.median * np.exp(log_widening):.2g} % where about {100.0 * setup.noise.median:.2g} % is "
+        "expected" + (f" in setup {setup.name}" if len(board.setups) > 1 else "")
+        for setup in board.setups
+    )
+    return (
+        f"the readings scatter about the fitted plate by {levels}: no plate of these sizes and edges fits them, so do "
+        "not trust the constants before a label, a size or an edge is corrected, or an effect is found (bayesplate "
+        "diagnose)",
+    )
+
+
+def _stray(search: SlipSearch, slip: Slip) -> str:
+    (i,) = slip.readings
+    gap = _above_the_others(search.board, i)
+    apart = f"{abs(1200.0 * gap / np.log(2.0)):.0f} cents {'above' if gap > 0 else 'below'}"
+    measured = float(np.exp(search.target[i]))
+    kind = "an octave" if slip.factor in OCTAVES else "a decimal place" if slip.factor in DECIMALS else "misread"
+    advice = "" if search.is_robust else " --robust gives it less say"
+    return (
+        f"{_name(search.board, i)} at {measured:.5g} Hz is {apart} what the other modes expect, "
+        f"{measured * np.exp(-gap):.4g} Hz: {kind}, or another mode?{advice}"
+    )
+
+
+def _exchange(board: Board, slip: Slip) -> str:
+    frequencies = _frequencies(board)
+    one, other = slip.readings
+    frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
+    residuals = (weighted_least_squares(each).residuals for each in (board, _with_frequencies(board, frequencies)))
+    before, after = (cents(np.sqrt(np.mean(each**2))) for each in residuals)
+    return (
+        f"{_pair(board, slip)} fit far better exchanged, {after:.1f} cents rms in place of {before:.1f} "
+        f"({times(slip.log_odds)} as probable): have they each other's label?"
+    )
+
+
+def _disorder(board: Board, slip: Slip) -> str:
+    likelier = "exchanged" if slip.log_odds > 0 else "as they are"
+    return (
+        f"{_pair(board, slip)} stand in the other order than the modes of the fitted plate; {likelier} they are "
+        f"{times(abs(slip.log_odds))} as probable: their figures tell which is which"
+    )
+
+
+def times(log_odds: float) -> str:
+    """How many times as probable, in words; from the logarithm."""
+    if log_odds > _LOG_MILLION:
+        return "more than a million times"
+    odds = float(np.exp(log_odds))
+    return f"{odds:.2g} times" if odds < 100 else f"{float(f'{odds:.1g}'):,.0f} times"
+
+
+def _name(board: Board, reading: int) -> str:
+    labels = [str(label) for setup in board.setups for label in setup.labels]
+    return labels[reading] if len(board.setups) == 1 else board.reading_names[reading]
+
+
+def _pair(board: Board, slip: Slip) -> str:
+    hertz = np.exp(log_measured(board))
+    return " and ".join(f"{_name(board, i)} at {hertz[i]:.5g} Hz" for i in slip.readings)
+
+
+def _above_the_others(board: Board, reading: int) -> float:
+    """How far a reading lies above what the others expect: ln measured - ln predicted, by least squares without it."""
+    frequencies: list[Quantity | None] = [*_frequencies(board)]
+    frequencies[reading] = None
+    values = weighted_least_squares(_with_frequencies(board, frequencies)).values
+    models = (setup_model(system_of(board, setup), values) for setup in board.setups)
+    predicted = np.concatenate([model.log_frequencies(values, "linear")[0] for model in models])
+    return float(log_measured(board)[reading] - predicted[reading])
+
+
+def _frequencies(board: Board) -> list[Quantity]:
+    return [reading.frequency for setup in board.setups for reading in setup.readings]
+
+
+def _with_frequencies(board: Board, frequencies: Sequence[Quantity | None]) -> Board:
+    """The board with other frequencies of its readings, in their order; without those that are None."""
+    rest = iter(frequencies)
+    setups = []
+    for setup in board.setups:
+        pairs = [(reading, next(rest)) for reading in setup.readings]
+        kept = tuple(replace(reading, frequency=one) for reading, one in pairs if one is not None)
+        setups += [replace(setup, readings=kept)] if kept else []
+    return replace(board, setups=tuple(setups))
