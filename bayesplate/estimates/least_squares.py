@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.frequencies.terms import rigidity_columns
-from bayesplate.modes.naming import product_coefficients
-from bayesplate.modes.thin import thin_plate
+from bayesplate.frequencies.terms import rayleigh_coefficients, rigidity_columns
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
@@ -27,7 +25,6 @@ _LONGEST_STEP = 0.7
 _CONVERGED = 1e-9
 _SMALL = 1e-5
 """A hundredth of a cent; steps below it that no longer shrink are rounding errors of the eigen-solves."""
-_COARSE_MESH = 12
 _PULL = 1e-3
 
 
@@ -142,7 +139,6 @@ def starting_rigidities(board: Board) -> NDArray[np.float64]:
 
 
 def _rayleigh_rows(setup: Setup, inputs: Values) -> NDArray[np.float64]:
-    plate = thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH)
-    products = product_coefficients(plate)
+    products = rayleigh_coefficients(setup)
     columns = rigidity_columns(inputs, setup)
     return np.stack([products[:, i, j] for i, j in (reading.beams for reading in setup.readings)]) @ columns

@@ -13,13 +13,11 @@ from bayesplate.cards import PriorCard
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import log_measured, starting_rigidities
 from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
-from bayesplate.frequencies.terms import term_weights
+from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.line import N_BEAMS
-from bayesplate.modes.naming import product_coefficients
-from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board, density
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.setup import Reading
 
 Floats = NDArray[np.float64]
@@ -97,14 +95,6 @@ SUSPECTS = (
 """What makes all frequencies wrong by one mistake, and lengths and constants that one mistake exchanges."""
 
 _AS_STATED = Suspect("")
-MOST_ORTHOTROPIC = 100.0
-"""E_x over E_y that no plate reaches: 10 to 20 in spruce, up to 70 in balsa."""
-
-LIGHTEST_WOOD = 90.0
-"""Density in kg m^-3 below which only foams and honeycombs lie."""
-
-_STIFFER_ACROSS = 1.5
-_USUAL = (0.001, 0.999)
 
 _SLACK = 0.1
 """Relative error of a Rayleigh quotient, of the noise, and of what an effect that is not modelled does, in all."""
@@ -115,7 +105,6 @@ _N_DRAWS = 4000
 _FEWEST_POSSIBLE = 0.05
 """Share of the draws that must be of a material: elsewhere those few say nothing of the others."""
 
-_COARSE_MESH = 12
 _WITHIN = (0.025, 0.975)
 
 
@@ -172,7 +161,7 @@ def prior_predictive(
         One per suspect; None where a label would name no mode, or no draw is a material.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
-    products = [product_coefficients(thin_plate(s.ends_x, s.ends_y, _COARSE_MESH, _COARSE_MESH)) for s in board.setups]
+    products = [rayleigh_coefficients(setup) for setup in board.setups]
     return [_predicted(board, products, values, suspect) for suspect in suspects]
 
 
@@ -216,7 +205,7 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
     """
     if not all(setup.readings for setup in board.setups):  # refused later, or still to be measured
         return
-    speed, ratio = plate_speed(board), _ratio(board)
+    speed, ratio = _speed_and_ratio(board)
     is_material = bool(board.nominal()["poisson_xy"] ** 2 * ratio < 1.0)
     fault = _contradiction(board, prior, speed, rng) if is_material else _no_material(board, ratio)
     if fault is None:
@@ -244,12 +233,6 @@ def _likeliest(board: Board, prior: PriorCard, suspects: Sequence[Suspect], rng:
     if chdtrc(measured.size, nearest) < _PROBABLE:
         return []
     return [one for one, distance in zip(suspects, distances, strict=True) if distance < nearest + _AS_NEAR]
-
-
-def _ratio(board: Board) -> float:
-    """E_y over E_x that the readings imply, 0.01 to 100; a rough one."""
-    D_x, D_y, _ = starting_rigidities(board)
-    return float(D_y / D_x)
 
 
 def _no_material(board: Board, ratio: float) -> Fault:
@@ -280,57 +263,11 @@ def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.
 
 def plate_speed(board: Board) -> float:
     """Speed of sound in the stiffer direction that the readings imply, sqrt(12 D / rho h^3), m/s; a rough one."""
+    return _speed_and_ratio(board)[0]
+
+
+def _speed_and_ratio(board: Board) -> tuple[float, float]:
+    """The same, and D_y / D_x that the readings imply, from 0.01 to 100."""
     values = board.nominal()
     D_x, D_y, _ = starting_rigidities(board)
-    return float(np.sqrt(12.0 * max(D_x, D_y) / (density(values) * values["thickness"] ** 3)))
-
-
-def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
-    """What is unusual about a board's density and about the constants that its readings imply, a sentence each.
-
-    Parameters
-    ----------
-    board : Board
-    prior : PriorCard
-    rigidities : (3,) array, N m
-        D_x, D_y, D_s, as by least squares.
-
-    Returns
-    -------
-    tuple of str
-    """
-    values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
-    elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-    by_name = values | elastic._asdict()
-    found, outside = [], []
-    for name, one in prior.constants.items():
-        low, high = (float(one.quantile(np.array(share))) for share in _USUAL)
-        if not low <= by_name[name] <= high:
-            unit, factor = ("GPa", 1e9) if name in MODULI else ("N m", 1.0)
-            expected = f"{low / factor:.3g} to {high / factor:.3g}"
-            outside.append(f"{name} comes out as {by_name[name] / factor:.3g} {unit}, expected were {expected}")
-    if outside:
-        found.append(
-            f"out of reach of the prior '{prior.name}': {'; '.join(outside)}; are sizes, labels and prior right?"
-        )
-    ratio = float(elastic.E_x / elastic.E_y)
-    if ratio > MOST_ORTHOTROPIC:
-        found.append(
-            f"E_x comes out {ratio:.3g} times as large as E_y, more than in any wood: are length_x_mm and length_y_mm, "
-            "or all labels, exchanged?"
-        )
-    elif ratio < 1.0 / _STIFFER_ACROSS:
-        found.append(f"E_y comes out {1.0 / ratio:.3g} times as large as E_x: is x along the grain?")
-    rho = float(density(values))
-    if prior.density is not None:
-        low, high = (float(prior.density.quantile(np.array(share))) for share in _USUAL)
-        if not low <= rho <= high:
-            found.append(
-                f"the density comes out as {rho:.3g} kg/m3, the prior '{prior.name}' is of boards of {low:.3g} to "
-                f"{high:.3g}: are the mass and the three lengths right?"
-            )
-    elif rho < LIGHTEST_WOOD:
-        found.append(
-            f"the density comes out as {rho:.3g} kg/m3, lighter than balsa: are the mass and the three lengths right?"
-        )
-    return tuple(found)
+    return float(np.sqrt(12.0 * max(D_x, D_y) / (density(values) * values["thickness"] ** 3))), float(D_y / D_x)

@@ -17,14 +17,12 @@ from scipy.special import logsumexp
 from bayesplate.cards import PriorCard
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
-from bayesplate.estimates.plausibility import MOST_ORTHOTROPIC
+from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
 from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.spectrum import spectrum
-from bayesplate.frequencies.terms import term_weights
+from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
-from bayesplate.modes.naming import product_coefficients
 from bayesplate.modes.plate import is_rigid
-from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
 from bayesplate.plate.readings import reading_sd
@@ -52,7 +50,6 @@ _WORTH_A_FIT = 15.0
 """ln of how many times less probable, by the rough frequencies, an assignment may be that is fitted."""
 _ROUGH_SD = 0.06
 """Relative error of a Rayleigh quotient of beam functions."""
-_COARSE_MESH = 12
 _N_FIRST = 3
 _NOISE_SDS = np.linspace(-2.0, 8.0, 21)
 _NEVER = 1e6
@@ -138,7 +135,7 @@ def _labelled(board: Board, setup: Setup, labels: Assignment) -> Board:
 def _rough_assignments(board: Board, setup: Setup, prior: PriorCard, rng: np.random.Generator) -> list[Assignment]:
     """Assignments by Rayleigh quotients at draws from the prior, the likeliest first."""
     values = prior_draws(board, prior, rng, _N_DRAWS)
-    products = product_coefficients(thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH))
+    products = rayleigh_coefficients(setup)
     beams = [b for b in np.ndindex(_N_BEAMS, _N_BEAMS) if not is_rigid(b, setup.ends_x, setup.ends_y)]
     squared = term_weights(values, setup).stiffness @ np.stack([products[:, i, j] for i, j in beams], axis=1)
     possible = np.all(np.isfinite(squared) & (squared > 0), axis=1)

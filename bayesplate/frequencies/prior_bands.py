@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
-from bayesplate.frequencies.terms import term_weights
+from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.line import N_BEAMS
-from bayesplate.modes.naming import product_coefficients
-from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
 from bayesplate.plate.setup import Setup
@@ -21,7 +19,6 @@ WITHIN = (1 / 6, 5 / 6)
 """Two times in three."""
 
 _N_DRAWS = 4000
-_COARSE_MESH = 12
 
 
 def prior_medians(board: Board, prior: PriorCard) -> dict[str, NDArray[np.float64]]:
@@ -52,7 +49,7 @@ def prior_bands(
         By label; labels beyond the beam functions are left out.
     """
     values = prior_draws(board, prior, rng, _N_DRAWS)
-    products = product_coefficients(thin_plate(setup.ends_x, setup.ends_y, _COARSE_MESH, _COARSE_MESH))
+    products = rayleigh_coefficients(setup)
     middle = term_weights(prior_medians(board, prior), setup).stiffness[0]
     weights = term_weights(values, setup).stiffness
     bands = {}

@@ -19,7 +19,7 @@ from bayesplate.estimates.identifiability import (
     require_labels,
 )
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
-from bayesplate.estimates.plausibility import unusual
+from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint

@@ -14,15 +14,13 @@ from bayesplate.cards import PriorCard, card_names, load_board, load_prior
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.plausibility import (
     FASTEST,
-    LIGHTEST_WOOD,
-    MOST_ORTHOTROPIC,
     SLOWEST,
     PriorPredictive,
     plate_speed,
     prior_predictive,
     require_plausible,
-    unusual,
 )
+from bayesplate.estimates.unusual import LIGHTEST_WOOD, MOST_ORTHOTROPIC, unusual
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board, density, made_board
 from bayesplate.plate.from_card import board_from_card

@@ -41,8 +41,8 @@ def before_after_csv(diagnosis: Diagnosis) -> str:
     rows += [[one.title, one.of(diagnosis.before), one.of(diagnosis.after), None, None, None] for one in MERITS]
     for name, one in diagnosis.elastic_shift.items():
         averaged = diagnosis.elastic_averaged[name]
-        values = (one.before, one.after, one.shift_in_sd / _GPA, averaged.mean, averaged.sd)
-        rows.append([f"{name}, GPa", *(value * _GPA for value in values)])
+        before, after, mean, sd = (value * _GPA for value in (one.before, one.after, averaged.mean, averaged.sd))
+        rows.append([f"{name}, GPa", before, after, one.shift_in_sd, mean, sd])
     if added:
         rows += [[name, None, mean, None, None, None] for name, mean in _sizes(diagnosis)]
         return csv_text(rows)

@@ -1,0 +1,72 @@
+"""What is unusual about a board: constants out of their prior's reach, an extreme ratio, a density of another wood."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import PriorCard
+from bayesplate.plate.board import Board, density
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+
+Floats = NDArray[np.float64]
+
+MOST_ORTHOTROPIC = 100.0
+"""E_x over E_y that no plate reaches: 10 to 20 in spruce, up to 70 in balsa."""
+
+LIGHTEST_WOOD = 90.0
+"""Density in kg m^-3 below which only foams and honeycombs lie."""
+
+_STIFFER_ACROSS = 1.5
+_USUAL = (0.001, 0.999)
+
+
+def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ...]:
+    """What is unusual about a board's density and about the constants that its readings imply, a sentence each.
+
+    Parameters
+    ----------
+    board : Board
+    prior : PriorCard
+    rigidities : (3,) array, N m
+        D_x, D_y, D_s, as by least squares.
+
+    Returns
+    -------
+    tuple of str
+    """
+    values = board.nominal() | dict(zip(RIGIDITIES, rigidities, strict=True))
+    elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    by_name = values | elastic._asdict()
+    found, outside = [], []
+    for name, one in prior.constants.items():
+        low, high = (float(one.quantile(np.array(share))) for share in _USUAL)
+        if not low <= by_name[name] <= high:
+            unit, factor = ("GPa", 1e9) if name in MODULI else ("N m", 1.0)
+            expected = f"{low / factor:.3g} to {high / factor:.3g}"
+            outside.append(f"{name} comes out as {by_name[name] / factor:.3g} {unit}, expected were {expected}")
+    if outside:
+        found.append(
+            f"out of reach of the prior '{prior.name}': {'; '.join(outside)}; are sizes, labels and prior right?"
+        )
+    ratio = float(elastic.E_x / elastic.E_y)
+    if ratio > MOST_ORTHOTROPIC:
+        found.append(
+            f"E_x comes out {ratio:.3g} times as large as E_y, more than in any wood: are length_x_mm and length_y_mm, "
+            "or all labels, exchanged?"
+        )
+    elif ratio < 1.0 / _STIFFER_ACROSS:
+        found.append(f"E_y comes out {1.0 / ratio:.3g} times as large as E_x: is x along the grain?")
+    rho = float(density(values))
+    if prior.density is not None:
+        low, high = (float(prior.density.quantile(np.array(share))) for share in _USUAL)
+        if not low <= rho <= high:
+            found.append(
+                f"the density comes out as {rho:.3g} kg/m3, the prior '{prior.name}' is of boards of {low:.3g} to "
+                f"{high:.3g}: are the mass and the three lengths right?"
+            )
+    elif rho < LIGHTEST_WOOD:
+        found.append(
+            f"the density comes out as {rho:.3g} kg/m3, lighter than balsa: are the mass and the three lengths right?"
+        )
+    return tuple(found)
