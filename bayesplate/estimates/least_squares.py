@@ -22,7 +22,7 @@ from bayesplate.plate.setup import Setup
 
 MOST_STEPS = 40
 _LONGEST_STEP = 0.7
-_CONVERGED = 1e-9
+_CONVERGED = 1e-8
 _SMALL = 1e-5
 """A hundredth of a cent; steps below it that no longer shrink are rounding errors of the eigen-solves."""
 _PULL = 1e-3
@@ -114,11 +114,13 @@ def _is_material(log_rigidities: NDArray[np.float64], inputs: Values) -> bool:
 
 
 def has_settled(step: float, previous: float) -> bool:
-    """Whether steps of ln D end here: too small to count, or small and no smaller than the one before.
+    """Whether steps of ln D end here: what they leave is too small to count, or they are small and shrink no more.
 
+    They shrink evenly, so that after one of them there remains about as much of it as there was of the one before.
     Stiff shear strains and fields of thickness cost the eigen-solves half their digits, so that steps stay at 1e-6.
     """
-    return step < _CONVERGED or previous <= step < _SMALL
+    remaining = step * min(1.0, step / previous) if np.isfinite(previous) else step
+    return remaining < _CONVERGED or previous <= step < _SMALL
 
 
 def starting_rigidities(board: Board) -> NDArray[np.float64]:

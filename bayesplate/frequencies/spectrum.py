@@ -17,6 +17,8 @@ from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.plate.setup import Setup
 
 _NODAL_LINE = 0.05
+_FURTHER = 1.1
+"""Than where the modes of a plate would reach if they were evenly spaced, which they nearly are."""
 _FEWEST_MODES, _MOST_MODES = 12, 96
 _SPARE = 1.5
 """Modes solved for each measured peak: some peaks are missed on the bench."""
@@ -96,8 +98,9 @@ def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Mod
             continue
         n_modes = max(_FEWEST_MODES, 2 * len(setup.readings), round(_SPARE * len(setup.readings + setup.unlabelled)))
         found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
-        while found[setup.name][1][-1].frequency < max(setup.unlabelled, default=0.0) and n_modes < _MOST_MODES:
-            n_modes *= 2
+        highest = max(setup.unlabelled, default=0.0)
+        while (reached := found[setup.name][1][-1].frequency) < highest and n_modes < _MOST_MODES:
+            n_modes = min(int(n_modes * _FURTHER * highest / reached) + 1, _MOST_MODES)
             found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
     return found
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 
 _SPARE_FOR_PROJECTED = 8
+_TOLERANCE = 1e-8
+"""Of the solver's own values. Those of the modes come from Ritz quotients of its vectors, which are good to its square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,7 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
         OPinv=LinearOperator(stiffness.shape, matvec=factors.solve, dtype=float),
         v0=start,
         ncv=min(block.n_dof, max(2 * n_wanted + 1, 20)),
+        tol=_TOLERANCE,
     )
     values, vectors = _ritz(block, weights, stiffness, mass, vectors)
     n_last = block.n_rigid + n_modes

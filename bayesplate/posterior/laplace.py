@@ -164,7 +164,7 @@ def exact_models(
         At the centre.
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
     is_rough : bool
-        Two opposite corners and one check will do: near the centre the error is small all the same.
+        Two opposite corners, one end per effect and one check will do: near the centre the error is small all the same.
     """
     parameters = Parameters(board)
     ratios = np.eye(N_RIGIDITIES)[:2] - np.eye(N_RIGIDITIES)[2]
@@ -187,7 +187,7 @@ def exact_models(
     for row, i in enumerate(alone):
         ends[2 * row, [*boxed, i]] = [*corners[row % len(corners), boxed], 1.0]
         ends[2 * row + 1, [*boxed, i]] = [*-corners[row % len(corners), boxed], -1.0]
-    corners = np.concatenate([corners[[0, -1]] if is_rough else corners, ends])
+    corners = np.concatenate([corners[[0, -1]], ends[::2]] if is_rough else [corners, ends])
     n_held_out = 1 if is_rough else _N_HELD_OUT
     held_out = np.random.default_rng(0).uniform(-1.0, 1.0, (n_held_out, parameters.n_dim))
 

@@ -76,6 +76,7 @@ def test_a_reading_s_own_uncertainty_weighs_it():
         (1e-10, 1e-4, True),
         (1e-6, 4e-7, True),
         (1e-6, 1.5e-6, False),  # shrinking slowly
+        (1e-6, 1e-3, True),  # a thousandth of it remains
         (1e-6, 1e-5, False),
         (1e-3, 1e-3, False),  # two solutions that swap
         (1e-6, np.inf, False),
