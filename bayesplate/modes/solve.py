@@ -13,7 +13,7 @@ from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 
 _SPARE_FOR_PROJECTED = 8
 _TOLERANCE = 1e-8
-"""Of the solver's own values. Those of the modes come from Ritz quotients of its vectors, which are good to its square."""
+"""Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
 
 
 @dataclass(frozen=True, eq=False)
