@@ -35,7 +35,7 @@ Record = dict[str, Any]
 
 HALF_WIDTH = 0.6
 """Of the shared laws in ln D_x / D_s and ln D_y / D_s: boards of a design spread by 0.17 and 0.18."""
-N_DRAWS = 2000
+N_DRAWS = 800
 SOLID_DENSITY, SOLID_GYRATION = 5000.0, 1.0 / 16.0 + 1.0 / 3.0
 """kg/m3, and squared radius of gyration of a cylinder as high as wide about a diameter of its base."""
 
