@@ -130,7 +130,7 @@ CONDITIONS: dict[ConditionName, ConditionWords] = {
     "probability of none": ConditionWords(
         "probability that nothing is lacking, at its largest with the sizes' priors halved or doubled",
         "below {limit}",
-        "that nothing is lacking is too probable",
+        "the probability that nothing is lacking is too large",
         "{:.3f}",
     ),
     "prior predictive": ConditionWords(
