@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -31,13 +31,16 @@ class Truth:
     size : dict
         Name -> multiple of the design's nominal size.
     noise_cents : float
-        Standard deviation of the readings.
+        Standard deviation of the readings; where it was drawn, the median of what it was drawn from.
+    drawn_noise : dict
+        Setup name -> standard deviation of its readings, cents, where it was drawn; empty where it was not.
     """
 
     constants: dict[str, float]
     effects: dict[str, dict[str, Any]]
     size: dict[str, float]
     noise_cents: float
+    drawn_noise: dict[str, float] = field(default_factory=dict)
 
     @property
     def is_in_library(self) -> bool:
@@ -67,7 +70,9 @@ class PlantedBoard:
     sensor : (float, float) or None, m
         Place of a sensor that the card mentions, without its mass, whether or not it weighs anything.
     noise_factor : float
-        Of the noise prior that the card states around the true noise.
+        Of the noise prior that the card states.
+    resolution : float, Hz
+        Readings are rounded to this, and the card says so; 0 if they are not.
     """
 
     name: str
@@ -80,6 +85,7 @@ class PlantedBoard:
     prior: str = ""
     sensor: tuple[float, float] | None = None
     noise_factor: float = NOISE_FACTOR
+    resolution: float = 0.0
 
     def card_text(self, stated: Mapping[str, str] = NOTHING) -> str:
         """The board card, which tells nothing of the truth but the noise and the place of an attached mass.
@@ -94,6 +100,7 @@ class PlantedBoard:
             self.readings,
             noise_cents=self.truth.noise_cents,
             noise_factor=self.noise_factor,
+            resolution=self.resolution,
             places=places,
             outline=self.truth.effects.get("outline_profile"),
             prior=self.prior,
@@ -125,6 +132,8 @@ def plant(
     sensor: tuple[float, float] | None = None,
     noise_factor: float = NOISE_FACTOR,
     constants: Mapping[str, float] | None = None,
+    noise_is_drawn: bool = False,
+    resolution: float = 0.0,
 ) -> PlantedBoard:
     """Simulate a board.
 
@@ -155,9 +164,14 @@ def plant(
     sensor : (float, float), optional, m
         Place on the whole board of a sensor that the card mentions in any case; a planted mass sits there.
     noise_factor : float
-        Of the noise prior on the card, whose median is the true noise.
+        Of the noise prior on the card, whose median is the true noise unless that is drawn.
     constants : mapping, optional
         E_x, E_y, G_xy, Pa, if they are not to be drawn.
+    noise_is_drawn : bool
+        Whether the true noise of each setup is drawn from the prior on the card, whose median is `noise_cents`.
+    resolution : float, Hz
+        Readings are rounded to this, and the card says so; 0: neither. Readings of one setup that would come closer to
+        each other than this are drawn again, as a laboratory could not tell such modes apart.
 
     Returns
     -------
@@ -186,18 +200,34 @@ def plant(
             drawn["attached_mass"]["places"] += tuple(more)
         drawn = {effect: values | settled.get(effect, {}) for effect, values in drawn.items()}
         exact, correlation = _frequencies(design, true, drawn)
-        if correlation >= LEAST_CORRELATION:
-            truth = Truth(true, drawn, sizes, noise)
-            readings = {setup: _read(rng, hertz, noise) for setup, hertz in exact.items()}
+        if correlation < LEAST_CORRELATION:
+            continue
+        levels = _noise_levels(rng, design, noise, noise_factor) if noise_is_drawn else {}
+        readings = {setup: _read(rng, hertz, levels.get(setup, noise), resolution) for setup, hertz in exact.items()}
+        if all(_are_apart(list(hertz.values()), resolution) for hertz in readings.values()):
+            truth = Truth(true, drawn, sizes, noise, levels)
             return PlantedBoard(
-                name, design, truth, readings, exact, n_draws, places_known, prior, sensor, noise_factor
+                name, design, truth, readings, exact, n_draws, places_known, prior, sensor, noise_factor, resolution
             )
     raise RuntimeError(f"{design.name} with {', '.join(planted)}: wanted a board with clear labels, got none")
 
 
-def _read(rng: np.random.Generator, hertz: Mapping[Label, float], noise_cents: float) -> dict[Label, float]:
-    """Frequencies with relative normal noise."""
-    return {label: hz * 2.0 ** (noise_cents * float(rng.standard_normal()) / 1200.0) for label, hz in hertz.items()}
+def _noise_levels(rng: np.random.Generator, design: Design, median: float, factor: float) -> dict[str, float]:
+    """Noise of each setup, cents, drawn from the log-normal prior of a card."""
+    return {setup.name: median * factor ** float(rng.standard_normal()) for setup in design.setups}
+
+
+def _read(
+    rng: np.random.Generator, hertz: Mapping[Label, float], noise_cents: float, resolution: float
+) -> dict[Label, float]:
+    """Frequencies with relative normal noise, rounded to a resolution (Hz) unless that is 0."""
+    noisy = {label: hz * 2.0 ** (noise_cents * float(rng.standard_normal()) / 1200.0) for label, hz in hertz.items()}
+    return {label: resolution * round(hz / resolution) for label, hz in noisy.items()} if resolution else noisy
+
+
+def _are_apart(hertz: Sequence[float], resolution: float) -> bool:
+    """Whether no two rounded readings show the same figure; readings that are not rounded never do."""
+    return not resolution or len(hertz) < 2 or float(np.diff(np.sort(hertz)).min()) > 0.5 * resolution
 
 
 def _frequencies(

@@ -24,6 +24,7 @@ def card_text(
     *,
     noise_cents: float,
     noise_factor: float = NOISE_FACTOR,
+    resolution: float = 0.0,
     places: Sequence[tuple[float, float]] = (),
     outline: Mapping[str, Any] | None = None,
     prior: str = "",
@@ -41,6 +42,8 @@ def card_text(
         Stated as the median of the noise prior.
     noise_factor : float
         Of the noise prior: 1.65 says little about the noise.
+    resolution : float, Hz
+        To which readings are rounded; 0: the card says nothing of it.
     places : sequence of (float, float), m
         Of an accelerometer whose mass is not stated; several if it roved.
     outline : mapping, optional
@@ -62,6 +65,8 @@ def card_text(
     shear = {key: f"{{ mean = {mean / 1e9:.6g}, sd = {sd / 1e9:.6g} }}" for key, (mean, sd) in SHEAR_MEANS.items()}
     noise = f"{{ median = {noise_percent(noise_cents):.6g}, factor = {noise_factor:g} }}"
     of_setups = {"noise_percent": noise} | {key: stated[key] for key in _OF_SETUPS if key in stated}
+    if resolution:
+        of_setups["resolution_hz"] = f"{resolution:g}"
     lines = [
         "format = 1",
         f'name = "{name}"',
@@ -103,6 +108,7 @@ def _setup_lines(
         *([f"clamped_mm = {{ x0 = {_mm(setup.covered)} }}"] if setup.covered else []),
         f"first_label = [{setup.first_label[0]}, {setup.first_label[1]}]",
         f"noise_percent = {stated['noise_percent']}",
+        *([f"resolution_hz = {stated['resolution_hz']}"] if "resolution_hz" in stated else []),
         *([f"air = {stated['air']}"] if "air" in stated else []),
         "",
         "[setup.frequencies_hz]",

@@ -70,6 +70,46 @@ def test_noise_is_what_the_truth_says(rng: np.random.Generator) -> None:
     assert all(shift == 0.0 for shift in quiet.shifts()["cantilever"].values())
 
 
+def test_a_drawn_noise_is_log_normal_about_the_one_stated(rng: np.random.Generator) -> None:
+    """Mean and variance of ln noise over 60 boards of two setups within four standard errors; the card states neither."""
+    boards = [
+        plant(rng, "cantilever-6-free-6", [], noise_cents=5.0, noise_factor=1.65, noise_is_drawn=True)
+        for _ in range(60)
+    ]
+    levels = np.array([[board.truth.drawn_noise[name] for name in ("cantilever", "free")] for board in boards])
+    z = np.log(levels / 5.0) / np.log(1.65)
+
+    assert z.mean() == pytest.approx(0.0, abs=4.0 / np.sqrt(z.size))
+    assert np.mean(z**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / z.size))
+    assert np.corrcoef(z.T)[0, 1] == pytest.approx(0.0, abs=4.0 / np.sqrt(len(z)))
+    scatter = [
+        1200.0 * np.log2(hz / board.exact[name][label]) / board.truth.drawn_noise[name]
+        for board in boards
+        for name, readings in board.readings.items()
+        for label, hz in readings.items()
+    ]
+    assert np.mean(np.square(scatter)) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(scatter)))
+    cards = [tomllib.loads(board.card_text()) for board in boards]
+    assert {setup["noise_percent"]["median"] for card in cards for setup in card["setup"]} == {0.289228}
+    assert plant(rng, "cantilever-6", []).truth.drawn_noise == {}
+
+
+def test_rounded_readings_are_stated_and_can_be_told_apart(rng: np.random.Generator) -> None:
+    """To 8 Hz modes often meet; those boards are drawn again, and the package reads the rest."""
+    draws = []
+    for _ in range(12):
+        board = plant(rng, "cantilever-9", [], resolution=8.0)
+        card = board.card_text()
+        read, exact = board.readings["cantilever"], board.exact["cantilever"]
+        draws.append(board.n_draws)
+
+        assert tomllib.loads(card)["setup"][0]["resolution_hz"] == 8
+        assert all(hz % 8.0 == 0.0 for hz in read.values())
+        assert all(abs(hz - exact[label]) < 4.0 + 0.02 * exact[label] for label, hz in read.items())
+        assert not list(physical_faults(read_board_text(card, "planted.toml")))
+    assert max(draws) > 1
+
+
 def test_card_says_what_a_laboratory_would_know(rng: np.random.Generator) -> None:
     board = plant(rng, "cantilever-6-free-6", ["attached_mass", "outline_profile"], noise_cents=5.0, n_places=2)
     card = tomllib.loads(board.card_text())

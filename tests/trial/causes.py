@@ -35,17 +35,18 @@ def overlooked(records: Sequence[Record]) -> str:
     return "overlooked most: " + ", ".join(f"{name} {missing[name]} of {carried[name]}" for name in found)
 
 
-def narrowest(records: Sequence[Record], found: Share) -> str:
-    """Classes whose intervals hold the truth least often; and whether only the number of boards is at fault."""
+def narrowest(records: Sequence[Record], found: Share, low: float, high: float) -> str:
+    """Classes whose intervals hold the truth least often; and whether only the bounds leave the band."""
     shares = {}
     for name in sorted({_joined(truth(r)) for r in records}):
         own = [r for r in records if _joined(truth(r)) == name]
         shares[name] = 100.0 * sum(holds(r, "averaged") for r in own) / len(own)
     lowest = sorted(shares, key=lambda name: shares[name])[:2]
     text = "least: " + ", ".join(f"{name} {shares[name]:.0f} %" for name in lowest)
-    return f"the estimate lies inside, its bounds do not; {text}" if 0.85 <= found.value <= 0.95 else text
+    only_bounds = low <= found.value <= high and not (low <= found.low and found.high <= high)
+    return f"the estimate lies inside, its bounds do not; {text}" if only_bounds else text
 
 
 def _joined(names: object) -> str:
     assert isinstance(names, (list, tuple, set, frozenset))
-    return " and ".join(sorted(names))
+    return " and ".join(sorted(names)) or "nothing"

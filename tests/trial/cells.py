@@ -14,9 +14,19 @@ import numpy as np
 from generator.designs import DESIGNS, Design
 
 Kind = Literal["null", "one", "two", "outside"]
+Noise = Literal["median", "drawn", "known", "rounded"]
 
 UNKNOWN, KNOWN = 1.65, 1.05
-"""Factor of the noise prior that a card states around the true noise: hardly known, and nearly known."""
+"""Factor of the noise prior that a card states: hardly known, and nearly known."""
+
+NOISES: dict[Noise, str] = {
+    "median": "noise at its prior's median",
+    "drawn": "noise drawn from its prior",
+    "known": "noise known",
+    "rounded": "readings rounded",
+}
+ROUNDED_TO = 1.0
+"""Hz."""
 
 SENSORS = {
     "cantilever-6": (0.9 * 0.223, 0.75 * 0.114),
@@ -32,6 +42,31 @@ KINDS = dict.fromkeys(SENSORS, "accelerometer") | {"clamped-9": "shaker"}
 
 
 @dataclass(frozen=True)
+class Setting:
+    """What the boards of a cell have in common before anything is drawn: null simulations depend on nothing else.
+
+    Attributes
+    ----------
+    design : str
+    noise_cents : float
+        Median of the noise prior on the card.
+    noise_factor : float
+        Of that prior.
+    resolution : float, Hz
+        To which readings are rounded; 0 if they are not.
+    """
+
+    design: str
+    noise_cents: float
+    noise_factor: float
+    resolution: float
+
+    def rng(self) -> np.random.Generator:
+        """Random numbers of the null simulations."""
+        return np.random.default_rng(zlib.crc32(repr(self).encode()))
+
+
+@dataclass(frozen=True)
 class Cell:
     """Boards that are alike but for what is drawn.
 
@@ -43,9 +78,12 @@ class Cell:
     n : int
         Boards.
     noise_cents : float
+        Median of the noise prior on the card, and the true noise unless that is drawn.
     size : float
         Multiple of the nominal size; air and shear keep theirs, which nature sets.
-    noise_factor : float
+    noise : str
+        "median": true noise at the median of the prior on the card; "drawn": drawn from that prior, for each setup;
+        "known": at the median of a narrow prior; "rounded": at the median, and readings rounded to `ROUNDED_TO`.
     """
 
     kind: Kind
@@ -53,14 +91,20 @@ class Cell:
     n: int
     noise_cents: float = 5.0
     size: float = 1.0
-    noise_factor: float = UNKNOWN
+    noise: Noise = "median"
+
+    @property
+    def setting(self) -> Setting:
+        """What its boards have in common with those of other cells."""
+        factor = KNOWN if self.noise == "known" else UNKNOWN
+        return Setting(self.design, self.noise_cents, factor, ROUNDED_TO if self.noise == "rounded" else 0.0)
 
     @property
     def name(self) -> str:
         """Kind, design, noise, size."""
         size = "" if self.kind == "null" else f" {self.size:g}x"
-        known = " known" if self.noise_factor == KNOWN else ""
-        return f"{self.kind} {self.design} {self.noise_cents:g}c{size}{known}"
+        noise = "" if self.noise == "median" else f" {self.noise}"
+        return f"{self.kind} {self.design} {self.noise_cents:g}c{size}{noise}"
 
     @property
     def of(self) -> Design:
@@ -80,16 +124,18 @@ class Cell:
 
 
 _SIX, _NINE, _FREE, _CLAMPED, _BOTH = DESIGNS
+_OTHER_NOISES: tuple[Noise, ...] = ("drawn", "known", "rounded")
 
 CELLS: tuple[Cell, ...] = (
-    *(Cell("null", _SIX, 200, noise) for noise in (2.0, 5.0, 17.0)),
-    *(Cell("null", design, 200) for design in (_NINE, _FREE, _CLAMPED, _BOTH)),
+    *(Cell("null", _SIX, 200, cents) for cents in (2.0, 5.0, 17.0)),
+    *(Cell("null", _SIX, 600, noise=noise) for noise in _OTHER_NOISES),
+    *(Cell("null", design, 300, noise=noise) for design in (_NINE, _FREE, _CLAMPED, _BOTH) for noise in NOISES),
     Cell("one", _SIX, 1200, size=2.0),
     Cell("one", _SIX, 200, size=1.0),
     Cell("one", _SIX, 200, size=0.5),
     Cell("one", _SIX, 200, 2.0, size=1.0),
     Cell("one", _SIX, 200, 17.0, size=1.0),
-    Cell("one", _SIX, 200, size=2.0, noise_factor=KNOWN),
+    Cell("one", _SIX, 200, size=2.0, noise="known"),
     *(Cell("one", design, 600, size=2.0) for design in (_NINE, _FREE, _CLAMPED)),
     Cell("one", _BOTH, 200, size=1.0),
     Cell("one", _BOTH, 600, size=2.0),
@@ -99,7 +145,7 @@ CELLS: tuple[Cell, ...] = (
 
 
 _DECIDING = ("bayesplate/diagnosis", "bayesplate/effects", "tests/generator")
-_OWN = ("judge.py", "amplitudes.py")
+_OWN = ("judge.py", "shared.py", "amplitudes.py")
 
 
 def jobs(cells: Sequence[Cell], most: int | None = None) -> list[tuple[Cell, int]]:
@@ -136,7 +182,7 @@ def fingerprint() -> str:
 def identity(cells: Sequence[Cell], base_seed: int) -> dict[str, Any]:
     """What a file of records must agree in before more are added to it; how many boards a cell has may change."""
     return {
-        "format": 1,
+        "format": 2,
         "base_seed": base_seed,
         "cells": {cell.name: {**asdict(replace(cell, n=0)), "n": None} for cell in cells},
         "code": fingerprint(),

@@ -131,8 +131,8 @@ def is_answered(record: Record) -> bool:
 
 
 def is_wrong_name(record: Record) -> bool:
-    """Uniquely named, and not what is planted."""
-    return is_named(record) and frozenset(record["effects"]) != truth(record)
+    """Uniquely named, and something of the name is not planted. One of two planted effects is a part, not wrong."""
+    return is_named(record) and not frozenset(record["effects"]) <= truth(record)
 
 
 def is_right_name(record: Record) -> bool:
@@ -140,9 +140,29 @@ def is_right_name(record: Record) -> bool:
     return is_named(record) and frozenset(record["effects"]) == truth(record)
 
 
+def is_part_name(record: Record) -> bool:
+    """Uniquely named, and less than what is planted: one of two."""
+    return is_named(record) and frozenset(record["effects"]) < truth(record)
+
+
+def most_probable(record: Record) -> frozenset[str]:
+    """The most probable answer, whatever the verdict; empty where nothing is more probable than the best effect."""
+    return frozenset(record["best"]) if record["support"] > record["none"] else frozenset()
+
+
 def is_best(record: Record) -> bool:
-    """Whether the most probable answer is what is planted, whatever the verdict."""
-    return frozenset(record["best"]) == truth(record)
+    """Whether the most probable answer, nothing included, is what is planted."""
+    return most_probable(record) == truth(record)
+
+
+def is_not_needed(record: Record) -> bool:
+    """Whether the verdict is that nothing is lacking."""
+    return bool(record["word"] == "none needed")
+
+
+def is_claimed(record: Record) -> bool:
+    """Whether it is claimed that an effect reduces the error."""
+    return bool(record["claim"])
 
 
 def is_covered(record: Record) -> bool:

@@ -11,22 +11,24 @@ from typing import Any
 
 from trial.cells import CELLS, Cell
 from trial.counts import CONSTANTS, Record
-from trial.summary import COLUMNS, summarise
+from trial.history import CHANGED
+from trial.published import publish_records
+from trial.summary import COLUMNS, CONDITIONS, summarise
 
 WAYS = {
     "without": "without tracing",
     "after": "by the hypothesis of the verdict",
     "averaged": "averaged over all hypotheses",
 }
-
-
 SHORT = "trial-short.md"
 
 
 def write(records: Sequence[Record], base_seed: int, folder: Path, cells: Sequence[Cell] = CELLS) -> dict[str, Any]:
-    """Summarise, write the files, the short one of a whole trial, and return the summary."""
-    summary: dict[str, Any] = _plain(summarise(records, base_seed, cells))
+    """Summarise, write the files, of a whole trial the short one and the records too, and return the summary."""
+    summary: dict[str, Any] = plain(summarise(records, base_seed, cells))
     folder.mkdir(parents=True, exist_ok=True)
+    is_whole = cells == CELLS and len(records) == summary["boards"]["wanted"]
+    summary["records"] = publish_records(records, base_seed, folder) if is_whole else None
     (folder / "trial.json").write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n")
     (folder / "trial.md").write_text("\n".join(page(summary)) + "\n")
     if cells == CELLS:
@@ -44,11 +46,11 @@ def in_short(summary: Mapping[str, Any]) -> str:
         return "a share not known yet" if known is None else f"{100 * known:.1f} %"
 
     six, both = "cantilever-6", "cantilever-6-free-6"
-    right, wrong = "top-1, {}, 5 cents, 2x, further classes too", "one {} 5c 2x: unique and wrong"
+    right, wrong = "top-1, {}, 5 cents, 2x", "one {} 5c 2x: unique and wrong"
     sentences = (
         f"Of {sum(bar['n'] for bar in nothing)} planted boards that lack nothing, an effect was named on "
         f"{sum(bar['count'] for bar in nothing):.0f}.",
-        "With one large effect and six modes of a cantilever, read to 5 cents, the most probable effect is the right "
+        "With one large effect and six modes of a cantilever, read to 5 cents, the most probable answer is the right "
         f"one on {share(right.format(six))} of the boards, and a wrong one alone is named on "
         f"{share(wrong.format(six))};",
         f"with six modes of the free board as well, on {share(right.format(both))} and {share(wrong.format(both))}.",
@@ -62,12 +64,12 @@ def in_short(summary: Mapping[str, Any]) -> str:
     return textwrap.fill(" ".join(sentences), 118, break_on_hyphens=False)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """The same with six digits and None for what is not a number, as JSON wants it."""
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [plain(one) for one in value]
     if isinstance(value, float):
         return float(f"{value:.6g}") if math.isfinite(value) else None
     return value
@@ -81,33 +83,22 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         "",
         "Written by `make trial`; do not edit. Boards are planted by an independent generator (a Ritz solver with "
         "other formulations and quadratures than the package's), read from their cards, and judged as `diagnose` "
-        "would. Every board carries a sensor of unstated mass at the same place of its design, so that a card does "
-        "not tell what is planted. Sizes are multiples of a nominal size; air and transverse shear keep theirs. "
-        "Bounds in brackets are "
-        "exact 95 % bounds (Clopper and Pearson). A bar is met if the bound that could break it does not; one that is "
-        "missed stays here as missed.",
+        "judges them: the same search, verdict and claim, which need no draws of the sampler. Null simulations are "
+        "made once for all boards of a design whose cards state the same noise. Every board carries a sensor of "
+        "unstated mass at the same place of its design, so that a card does not tell what is planted. Sizes are "
+        "multiples of a nominal size; air and transverse shear keep theirs.",
         "",
-        "Two runs with other base seeds came first. After a pilot of 340 boards the grain was planted at most "
-        "five degrees off, for six is where its prior ends; the card of the clamped board calls its sensor a "
-        "shaker; and the bar on the constants is put on intervals averaged over all hypotheses, with those of "
-        "the verdict alone beside them. A run that was stopped after 1000 boards showed that modes must be "
-        "followed by their shapes, not by their ranks, where an effect breaks the symmetry (boards that veer "
-        "ended as unexplained); that the planted sensor lacked the rotary inertia which the card promises; "
-        "and that a Poisson ratio leaves no visible trace on a board clamped all round, where it is no longer "
-        "planted.",
+        "Bounds in brackets are exact 95 % bounds (Clopper and Pearson). A bar is met if the bound that could break it "
+        "does not; one that is missed stays here as missed. A bar counts all classes of effects that are planted. The "
+        "most probable answer may be that nothing is lacking. A name is wrong if it holds an effect that is not "
+        "planted; one of two planted effects is counted by itself.",
         "",
-        "A first summary of this run had 4600 boards and bounds too wide to judge several bars. All cells of "
-        "size 2x at 5 cents of unknown level, those of two effects and those outside the library were then "
-        "made three times as large (the first of them twice), with the same seeds going on; every board "
-        "counts.",
-        "",
-        "The bars on the best answer and on two effects were set for seven classes: clamp rotation, attached mass, "
-        "air, shear, grain, taper and Poisson ratio. The trial plants further ones; rows that say so in their names "
-        "count all. That split was made when the numbers were known, so both rows are shown.",
+        *CHANGED,
         "",
         f"{boards['judged']} boards of {boards['wanted']} judged, {boards['failed']} gave no answer, base seed "
         f"{summary['base_seed']}.",
         *(f"- no answer: {one['cell']}, board {one['index']}: {one['error']}" for one in summary["failures"]),
+        *_records(summary),
         "",
         "## Bars",
         "",
@@ -116,7 +107,18 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         *_cells(summary),
         *_constants(summary),
         *_amplitudes(summary),
+        *_claims(summary),
     ]
+
+
+def _records(summary: Mapping[str, Any]) -> Iterable[str]:
+    """Where the records are, or how they are made again and known to be the same."""
+    kept = summary["records"]
+    if not kept:
+        return
+    lines = f"{kept['lines']} lines of JSON, SHA-256 of the text `{kept['sha256']}`"
+    where = f"in [{kept['file']}]({kept['file']})" if kept["file"] else f"made by `{kept['command']}`"
+    yield from ("", f"The records of all boards: {lines}, {where}.")
 
 
 def _bar_row(bar: Mapping[str, Any]) -> tuple[str, ...]:
@@ -148,12 +150,15 @@ def _cells(summary: Mapping[str, Any]) -> Iterable[str]:
             *(str(cell["words"].get(word, 0)) for word in words),
             _percent(cell.get("top_1")),
             _percent(cell.get("wrong_name")),
+            _percent(cell.get("part_name")) if name.startswith("two") else "",
+            _percent(cell["claimed"]),
             _percent(cell.get("covered")),
             _number(cell.get("set_size")),
         )
         for name, cell in summary["cells"].items()
     ]
-    head = ("cell", "boards", *words, "best is right", "unique and wrong", "in the set given", "mean size of the set")
+    head = ("cell", "boards", *words, "best is right", "unique and wrong", "one of two named", "claimed",
+            "in the set given", "mean size of the set")  # fmt: skip
     yield from _table(head, body)
 
 
@@ -173,6 +178,20 @@ def _amplitudes(summary: Mapping[str, Any]) -> Iterable[str]:
         for effect, one in summary["amplitudes"].items()
     ]
     yield from _table(("effect", "boards", "median relative error", "90 % intervals that hold the truth"), body)
+
+
+def _claims(summary: Mapping[str, Any]) -> Iterable[str]:
+    yield from ("", "## How often an effect is claimed to reduce the error, and each condition is met", "")
+    body = [
+        (
+            name,
+            str(one["claimed"]["n"]),
+            _percent(one["claimed"]),
+            *(_percent(one["conditions"][condition]) for condition in CONDITIONS),
+        )
+        for name, one in summary["claims"].items()
+    ]
+    yield from _table(("boards that are", "boards", "claimed", *CONDITIONS), body)
 
 
 def _percent(found: Mapping[str, Any] | None, key: str = "share") -> str:

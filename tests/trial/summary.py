@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,17 @@ from trial.counts import (
     holds,
     is_answered,
     is_best,
+    is_claimed,
     is_covered,
     is_flagged,
     is_named,
+    is_part_name,
     is_right_name,
     is_wrong_name,
     listed,
     mean,
     median,
+    most_probable,
     share,
     truth,
 )
@@ -30,6 +33,8 @@ from trial.sizes import errors
 
 COLUMNS = ("named right", "named wrong", "group with it", "group without it", "none needed", "undetectable",
            "unexplained")  # fmt: skip
+CONDITIONS = ("chance selection", "log score", "probability of none", "prior predictive")
+"""Of a claim, by the names that the package gives them."""
 MATRICES = ("one cantilever-6 5c 2x", "one cantilever-6-free-6 5c 2x")
 """Cells whose classes are shown one by one in full."""
 
@@ -49,7 +54,7 @@ def summarise(records: Sequence[Record], base_seed: int, cells: Sequence[Cell] =
     wanted = sum(cell.n for cell in cells)
     by_cell = {cell.name: [r for r in good if r["cell"] == cell.name] for cell in cells}
     return {
-        "format": 1,
+        "format": 2,
         "base_seed": base_seed,
         "boards": {"judged": len(good), "failed": len(failed), "wanted": wanted},
         "failures": [{key: r[key] for key in ("cell", "index", "error")} | r["truth"] for r in failed],
@@ -57,7 +62,7 @@ def summarise(records: Sequence[Record], base_seed: int, cells: Sequence[Cell] =
         "cells": {cell.name: _cell(cell, by_cell[cell.name]) for cell in cells if by_cell[cell.name]},
         "confusion": {name: confusion(by_cell[name]) for name in MATRICES if by_cell.get(name)},
         "amplitudes": _amplitudes(by_cell),
-        "median_seconds": float(np.median([r["seconds"] for r in good])) if good else None,
+        "claims": claims(cells, by_cell),
     }
 
 
@@ -77,7 +82,7 @@ def confusion(records: Sequence[Record]) -> dict[str, Any]:
         own = [record for record in records if record["truth"]["effects"] == [effect]]
         counted = Counter(column(record) for record in own)
         wrong = Counter(" + ".join(sorted(record["effects"])) for record in own if is_wrong_name(record))
-        best = Counter(" + ".join(sorted(record["best"])) or "nothing" for record in own)
+        best = Counter(" + ".join(sorted(most_probable(record))) or "nothing" for record in own)
         result[effect] = {
             "n": len(own),
             **{name: counted[name] for name in COLUMNS},
@@ -96,18 +101,20 @@ def _cell(cell: Cell, records: Sequence[Record]) -> dict[str, Any]:
         "words": dict(sorted(words.items())),
         "named": share(records, is_named).as_json(),
         "flagged": share(records, is_flagged).as_json(),
+        "claimed": share(records, is_claimed).as_json(),
         "gate_of_the_ideal_board": share(records, lambda r: r["gate"]["bare"] >= 0.05).as_json(),
         "constants": _coverage(records),
     }
     if cell.kind == "outside":
         return result
+    result["top_1"] = share(records, is_best).as_json()
     if cell.kind != "null":
         answered = [record for record in records if is_answered(record)]
         named = [record for record in records if is_named(record)]
         result |= {
-            "top_1": share(records, is_best).as_json(),
             "right_name": share(records, is_right_name).as_json(),
             "wrong_name": share(records, is_wrong_name).as_json(),
+            "part_name": share(records, is_part_name).as_json(),
             "wrong_of_named": share(named, is_wrong_name).as_json(),
             "covered": share(answered, is_covered).as_json(),
             "set_size": mean([len(listed(record)) for record in answered]).as_json(),
@@ -116,6 +123,32 @@ def _cell(cell: Cell, records: Sequence[Record]) -> dict[str, Any]:
         result["confusion"] = confusion(records)
         result["constants_by_class"] = by_class(records)
     return result
+
+
+def claims(cells: Sequence[Cell], by_cell: Mapping[str, Sequence[Record]]) -> dict[str, Any]:
+    """How often an effect is claimed and each condition of a claim met, by what is planted and what is said of it."""
+    nothing = [record for cell in cells if cell.kind == "null" for record in by_cell[cell.name]]
+    something = [record for cell in cells if cell.kind != "null" for record in by_cell[cell.name]]
+    outside = [record for cell in cells if cell.kind == "outside" for record in by_cell[cell.name]]
+    groups = {
+        "nothing planted": nothing,
+        "named right": [record for record in something if is_right_name(record)],
+        "named one of two": [record for record in something if is_part_name(record)],
+        "named wrong": [record for record in something if is_wrong_name(record)],
+        "of these outside the library": [record for record in outside if is_wrong_name(record)],
+        "group with everything planted": [r for r in something if not is_named(r) and is_answered(r) and is_covered(r)],
+        "group without": [r for r in something if not is_named(r) and is_answered(r) and not is_covered(r)],
+    }
+    return {
+        name: {
+            "claimed": share(records, is_claimed).as_json(),
+            "conditions": {
+                one: share(records, lambda r, one=one: r["conditions"][one]).as_json() for one in CONDITIONS
+            },
+        }
+        for name, records in groups.items()
+        if records
+    }
 
 
 def _coverage(records: Sequence[Record]) -> dict[str, Any]:

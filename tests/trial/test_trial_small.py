@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import hashlib
 import json
 import math
 import multiprocessing
@@ -15,13 +17,15 @@ import pytest
 from generator.boards import plant
 from scipy import stats
 from trial.amplitudes import MEANINGS, quantiles
-from trial.bars import bars
-from trial.cells import CELLS, KINDS, SENSORS, Cell, identity, jobs
-from trial.counts import Share, is_covered, listed, mean, median
-from trial.judge import baseline_of_card, judge_one, plant_board
-from trial.page import in_short, page, write
+from trial.cells import CELLS, KINDS, NOISES, SENSORS, Cell, identity, jobs
+from trial.counts import Share, is_best, is_covered, listed, mean, median
+from trial.judge import judge_one, plant_board
+from trial.made_records import made
+from trial.page import in_short, page, plain, write
+from trial.published import as_text, publish_records, published_records
 from trial.run import BASE_SEED, run
-from trial.summary import by_class, confusion, summarise
+from trial.shared import baseline_of_card, control_of
+from trial.summary import CONDITIONS, by_class, confusion, summarise
 
 FEW = (Cell("one", "cantilever-6", 2, size=2.0), Cell("null", "cantilever-6", 2))
 
@@ -38,10 +42,13 @@ def few():
 
 def test_cells_are_those_that_were_asked_for():
     by_kind = {kind: sum(cell.n for cell in CELLS if cell.kind == kind) for kind in ("null", "one", "two", "outside")}
-    assert by_kind == {"null": 1400, "one": 4800, "two": 600, "outside": 1200}
+    assert by_kind == {"null": 7200, "one": 4800, "two": 600, "outside": 1200}
     assert len({cell.name for cell in CELLS}) == len(CELLS)
     assert min(cell.n for cell in CELLS) >= 200
-    assert sum(cell.n for cell in CELLS if cell.kind == "null" and cell.design == "cantilever-6") >= 600
+    for design in SENSORS:
+        for noise in NOISES:
+            n = sum(c.n for c in CELLS if (c.kind, c.design, c.noise) == ("null", design, noise))
+            assert n == (600 if design == "cantilever-6" else 300), (design, noise)
     assert "outline_profile" not in {name for cell in CELLS for name in cell.of.drawn}
 
 
@@ -70,10 +77,42 @@ def test_a_card_does_not_tell_what_is_planted(design):
 
 
 def test_the_stated_noise_is_the_true_one():
-    cell = Cell("null", "cantilever-6", 1, 17.0, noise_factor=1.05)
-    (setup,) = baseline_of_card(plant_board(np.random.default_rng(1), cell, ())).board.setups
-    assert setup.noise.median == pytest.approx(2.0 ** (17.0 / 1200.0) - 1.0, rel=1e-5)
-    assert setup.noise.log_sd == pytest.approx(math.log(1.05))
+    for noise, factor, resolution in (("median", 1.65, 0.0), ("drawn", 1.65, 0.0), ("known", 1.05, 0.0),
+                                      ("rounded", 1.65, 1.0)):  # fmt: skip
+        cell = Cell("null", "cantilever-6", 1, 17.0, noise=noise)
+        planted = plant_board(np.random.default_rng(1), cell, ())
+        (setup,) = baseline_of_card(planted).board.setups
+        assert setup.noise.median == pytest.approx(2.0 ** (17.0 / 1200.0) - 1.0, rel=1e-5)
+        assert setup.noise.log_sd == pytest.approx(math.log(factor))
+        assert setup.resolution == resolution
+        assert all(hz == round(hz) for hz in setup.measured) == bool(resolution)
+        assert bool(planted.truth.drawn_noise) == (noise == "drawn")
+
+
+def test_the_shared_law_is_that_of_the_board():
+    """At the fit of another board of the design, the ideal plate's frequencies to a hundredth of a cent.
+
+    That is a five-hundredth of the noise; on a board whose constants are a tenth larger they are others.
+    """
+    planted = plant_board(np.random.default_rng(2), Cell("null", "cantilever-6", 1), ())
+    baseline = baseline_of_card(planted)
+    assert baseline.predict is not None
+    predicted = baseline.predict(baseline.log_rigidities[None, :])[0]
+    assert 1200.0 / math.log(2.0) * (predicted - baseline.log_frequency) == pytest.approx(np.zeros(6), abs=1e-2)
+    larger = baseline.predict(baseline.log_rigidities[None, :] + math.log(1.1))[0]
+    assert larger - predicted == pytest.approx(np.full(6, 0.5 * math.log(1.1)))  # f goes with the root of D
+
+
+def test_null_simulations_are_shared_by_boards_of_a_setting():
+    """Kinds of boards and of effects do not matter, what the card says of the noise does."""
+    cell = Cell("null", "cantilever-6", 1)
+    assert Cell("one", "cantilever-6", 3, size=2.0).setting == Cell("null", "cantilever-6", 1, noise="drawn").setting
+    others = {Cell("null", "cantilever-6", 1, noise=noise).setting for noise in NOISES}
+    assert len(others | {Cell("null", "cantilever-6", 1, 2.0).setting, Cell("null", "free-12", 1).setting}) == 5
+    assert control_of(cell.setting) is control_of(Cell("null", "cantilever-6", 9).setting)
+    assert control_of(cell.setting).gain.shape == (2000,)
+    assert cell.setting.rng().random() == cell.setting.rng().random()
+    assert len({one.rng().random() for one in others}) == 3
 
 
 def test_a_record_tells_everything(few):
@@ -81,6 +120,10 @@ def test_a_record_tells_everything(few):
         assert "error" not in record
         assert 0.0 <= record["none"] <= 1.0
         assert set(record["gate"]) == {"bare", "best"}
+        assert set(record["conditions"]) == set(CONDITIONS)
+        assert record["claim"] <= all(record["conditions"].values())
+        assert 0.0 <= record["gain_percentile"] <= 100.0
+        assert record["support"] == record["set"][0][1]
         assert frozenset(record["best"]) == frozenset(record["set"][0][0])
         for intervals in record["constants"].values():
             for one in intervals.values():
@@ -169,29 +212,6 @@ def test_compliances_by_hand():
     assert MEANINGS["clamp_translation"][1]({"stiffness": 2.5e7}, 25.0, 0.2) == pytest.approx(1.25e-4)
 
 
-def made(cell, index, planted, word, effects=(), near=(), best=None, holds=(True, True, True), averaged=None):
-    """A record made by hand; intervals without tracing never hold."""
-    by_way = {"without": (False, False, False), "after": holds, "averaged": averaged or holds}
-    constants = {
-        name: {way: {"q05": 1.0, "q95": 2.0, "holds": held[i]} for way, held in by_way.items()}
-        for i, name in enumerate(("E_x", "E_y", "G_xy"))
-    }
-    return {
-        "cell": cell.name,
-        "index": index,
-        "truth": {"effects": sorted(planted)},
-        "word": word,
-        "effects": list(effects),
-        "best": list(best if best is not None else effects[:1]),
-        "set": [[[name], 0.5] for name in near],
-        "none": 0.01,
-        "gate": {"bare": 0.01, "best": 0.5},
-        "amplitudes": {},
-        "constants": constants,
-        "seconds": 1.0,
-    }
-
-
 ONE = Cell("one", "cantilever-6", 5, size=2.0)
 NULL = Cell("null", "cantilever-6", 4)
 
@@ -201,16 +221,17 @@ def by_hand():
     """Five boards with one effect, four without."""
     group = "indistinguishable group"
     return [
-        made(ONE, 0, ["air"], "named", ["air"], ["air", "mass"]),
+        made(ONE, 0, ["air"], "named", ["air"], ["air", "mass"], claim=True),
         made(ONE, 1, ["air"], "named", ["mass"], ["mass"], holds=(True, False, False)),
         made(ONE, 2, ["mass"], group, ["air", "mass", "clamp"], ["air", "mass", "clamp"]),
-        made(ONE, 3, ["mass"], group, ["air", "clamp"], ["air", "clamp"]),
-        made(ONE, 4, ["mass"], "none needed", best=["mass"], near=["mass"], holds=(False,) * 3, averaged=(True,) * 3),
-        made(NULL, 0, [], "none needed"),
-        made(NULL, 1, [], "undetectable"),
-        made(NULL, 2, [], "unexplained"),
-        made(NULL, 3, [], "named", ["air"], ["air"]),
-    ]
+        made(ONE, 3, ["mass"], group, ["air", "clamp"], ["air", "clamp"], none=0.6),
+        made(ONE, 4, ["mass"], "none needed", best=["mass"], near=["mass"], none=0.4, holds=(False,) * 3,
+             averaged=(True,) * 3),
+        made(NULL, 0, [], "none needed", none=0.9),
+        made(NULL, 1, [], "undetectable", none=0.9),
+        made(NULL, 2, [], "unexplained", none=0.9),
+        made(NULL, 3, [], "named", ["air"], ["air"], claim=True),
+    ]  # fmt: skip
 
 
 def test_sums_by_hand(by_hand):
@@ -219,6 +240,14 @@ def test_sums_by_hand(by_hand):
     found = {bar["quantity"]: bar for bar in summary["bars"]}
 
     assert one["top_1"]["count"] == 2  # boards 0 and 4: the verdict does not matter
+    assert null["top_1"]["count"] == 3  # nothing is an answer, and the right one
+    assert not is_best(by_hand[4] | {"none": 0.5})
+    assert is_best(by_hand[8] | {"none": 0.5})
+    assert (one["claimed"]["count"], null["claimed"]["count"]) == (1, 1)
+    assert {name: (c["claimed"]["count"], c["claimed"]["n"]) for name, c in summary["claims"].items()} == {
+        "nothing planted": (1, 4), "named right": (1, 1), "named wrong": (0, 1),
+        "group with everything planted": (0, 1), "group without": (0, 1),
+    }  # fmt: skip
     assert (one["right_name"]["count"], one["wrong_name"]["count"], one["named"]["count"]) == (1, 1, 2)
     assert (one["wrong_of_named"]["count"], one["wrong_of_named"]["n"]) == (1, 2)
     assert (one["covered"]["count"], one["covered"]["n"]) == (2, 4)  # boards 0 and 2 of the four with a set
@@ -227,7 +256,7 @@ def test_sums_by_hand(by_hand):
     assert one["constants"]["after"]["all"]["value"] == pytest.approx((3 + 1 + 3 + 3 + 0) / 15)
     assert one["constants"]["without"]["all"]["value"] == 0.0
     assert (null["named"]["count"], null["flagged"]["count"]) == (1, 2)
-    assert found["null, cantilever-6: flagged at all"]["share"] == 0.5
+    assert found["null, cantilever-6, noise at its prior's median: flagged at all"]["share"] == 0.5
     assert by_class(by_hand[:5])["air"]["after"] == pytest.approx((1 + 1 / 3) / 2)
     assert by_class(by_hand[:5])["mass"]["after"] == pytest.approx(2 / 3)
     title = "constants after tracing, cantilever-6, 2x: 90 % intervals"
@@ -240,7 +269,7 @@ def test_confusion_by_hand(by_hand):
     assert list(rows) == ["air", "mass"]
     assert (rows["air"]["named right"], rows["air"]["named wrong"], rows["air"]["wrong_names"]) == (1, 1, {"mass": 1})
     assert [rows["mass"][key] for key in ("group with it", "group without it", "none needed")] == [1, 1, 1]
-    assert rows["mass"]["best"] == {"air": 2, "mass": 1}
+    assert rows["mass"]["best"] == {"air": 1, "nothing": 1, "mass": 1}
     assert not is_covered(by_hand[4])
     assert listed(by_hand[4]) == frozenset()
 
@@ -256,21 +285,42 @@ def test_boards_without_an_answer_are_listed(by_hand, tmp_path):
     assert text == "\n".join(page(summary)) + "\n"
 
 
-def test_shuffled_truth_misses_the_bars():
-    """Records that would meet every bar of their cell do not any more if the truths are dealt out anew."""
-    cell = Cell("one", "cantilever-6", 300, size=2.0)
-    classes = cell.of.drawn
-    right = [
-        made(cell, i, [name], "named", [name], [name], holds=[i % 10 > 0] * 3)
-        for i, name in enumerate(classes[i % len(classes)] for i in range(cell.n))
-    ]
-    rng = np.random.default_rng(0)
-    shuffled = [one | {"truth": right[i]["truth"]} for one, i in zip(right, rng.permutation(len(right)), strict=True)]
-    about_truth = ("unique and wrong", "in the set given", "top-1")
-    for records, met in ((right, True), (shuffled, False)):
-        found = [bar for bar in bars((cell,), {cell.name: records}) if any(t in bar["quantity"] for t in about_truth)]
-        assert len(found) == 4  # the best answer twice: of the classes that were planned, and of all
-        assert [bar["met"] for bar in found] == [met] * 4
+def test_published_records_are_the_same_bytes_and_add_up_to_the_same(by_hand, tmp_path):
+    """Without the seconds; where they would take too many bytes there is their digest alone, and no old file stays."""
+    slower = [record | {"seconds": 7.0} for record in by_hand]
+    kept, again = (publish_records(records, 4, tmp_path) for records in (by_hand, slower))
+    packed = (tmp_path / "trial-records.jsonl.gz").read_bytes()
+    assert kept == again
+    assert packed[4:8] == bytes(4)  # the time of a gzip file
+    assert hashlib.sha256(gzip.decompress(packed)).hexdigest() == kept["sha256"]
+    cells = (ONE, NULL)
+    assert summarise(published_records(tmp_path), 4, cells) == summarise(by_hand, 4, cells)
+    digest = publish_records(by_hand, 4, tmp_path, most_bytes=len(packed))
+    assert digest == kept | {"file": None}
+    assert not (tmp_path / "trial-records.jsonl.gz").exists()
+
+
+def test_the_page_says_where_the_records_are(by_hand):
+    summary = summarise(by_hand, 4, (ONE, NULL))
+    kept = {"file": "trial-records.jsonl.gz", "lines": 9, "sha256": "abc", "command": "python make"}
+    for records, words in (
+        (kept, "in [trial-records.jsonl.gz](trial-records.jsonl.gz)"),
+        (kept | {"file": None}, "made by `python make`"),
+    ):
+        assert words in "\n".join(page(summary | {"records": records}))
+    assert "SHA-256" not in "\n".join(page(summary | {"records": None}))
+
+
+def test_records_in_the_repository_are_those_of_the_page():
+    """Once a whole trial has been published: its records add up to every number of its summary."""
+    root = Path(__file__).parents[2] / "docs" / "validation"
+    shown = json.loads((root / "trial.json").read_text(encoding="utf-8"))
+    if not shown.get("records") or not shown["records"]["file"]:
+        pytest.skip("the records of this trial are not in the repository")
+    records = published_records(root)
+    assert hashlib.sha256(as_text(records)).hexdigest() == shown["records"]["sha256"]
+    again = plain(summarise(records, shown["base_seed"]))
+    assert again == {key: value for key, value in shown.items() if key != "records"}
 
 
 def test_the_readme_says_in_short_what_the_trial_found():
