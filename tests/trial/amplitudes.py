@@ -52,7 +52,7 @@ def recovered(found: Found, verdict: Verdict, planted: PlantedBoard) -> dict[str
             continue
         parameter, read, nothing = MEANINGS[name]
         laws = found.ground.candidates[name].laws
-        (place,) = (i for i, free in enumerate(laws[0].form.free) if free.key == parameter)
+        place = next(i for i, free in enumerate(laws[0].form.free) if free.key == parameter)  # of the first setup
         values, shares = _sizes(found, verdict.index, member, place, laws[0].form.free[place].prior)
         true = read(planted.truth.effects[name], *_rigidity_and_length(planted.design, planted.truth.constants))
         low, middle, high = (float(f"{q:.6g}") for q in quantiles(values, shares, (0.05, 0.5, 0.95)))

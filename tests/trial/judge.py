@@ -130,7 +130,7 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         },
         "below_sight": [name for name in found.ground.candidates if found.ground.is_below_detection_limit(name)],
         "amplitudes": recovered(found, verdict, planted) if verdict.word == "named" else {},
-        "constants": _constants(found, verdict, planted.truth.constants, rng),
+        "constants": _constants(found, verdict, planted.truth.constants, rng) if planted.truth.effects else {},
     }
 
 

@@ -23,8 +23,8 @@ from bayesplate.diagnosis.evidence.search import Found
 
 Floats = NDArray[np.float64]
 
-_N_DRAWS = 256
-_WORTH = 1e-3
+_N_DRAWS = 128
+_WORTH = 0.01
 """Probability beside the largest below which an explanation is corrected as no effect is."""
 _OVERSAMPLED = 2
 """Draws for each that is kept by its weight."""

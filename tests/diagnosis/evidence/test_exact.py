@@ -96,13 +96,13 @@ def test_draws_and_evidence_are_those_of_the_bent_law(found, index):
 
 
 def test_odds_are_those_of_the_bent_law(found):
-    """Of the effect against none: the grid's, to the error of 256 draws."""
+    """Of the effect against none: the grid's, to the error of 128 draws."""
     exact = under_exact_law(found)
     none, effect = (quadrature(found, law)[2] for law in (None, found.ground.candidates["a"].laws[0]))
     wanted = effect - none
     told = exact.log_evidence[1] - exact.log_evidence[0]
     spread = [log_weights_of(found, draw_terms(found, i, np.random.default_rng(3), 4000)).std() for i in (0, 1)]
-    assert abs(told - wanted) < 4.0 * np.hypot(*spread) / np.sqrt(256) + 0.05
+    assert abs(told - wanted) < 4.0 * np.hypot(*spread) / np.sqrt(128) + 0.05
     assert exact.probability.sum() == pytest.approx(1.0)
     assert np.exp(exact.log_evidence[1] - exact.log_evidence[0]) == pytest.approx(
         exact.probability[1] / exact.probability[0] * 0.5 / 0.2
