@@ -75,6 +75,11 @@ def test_confusion_by_hand(by_hand):
     assert rows["mass"]["best"] == {"air": 1, "nothing": 1, "mass": 1}
     assert not is_covered(by_hand[4])
     assert listed(by_hand[4]) == frozenset()
+    assert listed(made(ONE, 5, ["air"], "indistinguishable group", ["air", "clamp"], ["mass"])) == {
+        "air",
+        "clamp",
+        "mass",
+    }
 
 
 def test_boards_without_an_answer_are_listed(by_hand, tmp_path):
