@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+from bayesplate.diagnosis.decision.claim import Condition
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import (
@@ -42,6 +44,12 @@ SHIFT = {
     "E_y": ElasticShift(before=1.0e9, after=0.75e9, shift_in_sd=-1.25),
     "G_xy": ElasticShift(before=0.5e9, after=0.5e9, shift_in_sd=0.0),
 }
+CONDITIONS = (
+    Condition("chance selection", 0.25, 0.75, True),
+    Condition("log score", 1.25, 2.5, False),
+    Condition("probability of none", 0.03, 0.05, True),
+    Condition("prior predictive", 0.5, 0.05, True),
+)
 NEXT = "Weigh a second accelerometer onto the board and measure (1,0) again."
 
 
@@ -68,6 +76,7 @@ def candidate(name: str, setup: str = "clamped", **changed: Any) -> EffectEntry:
             "log_bayes_factor": 1.25,
             "ockham_log_factor": -2.25,
             "p_value": 0.375,
+            "learnt_bits": {"tension": 1.5},
             "amplitude": Amplitude(parameter="tension", form="", q05=10.0, q50=120.0, q95=230.0, unit="N/m"),
             "look_alikes": (),
             "rejected_because": "less probable (0.250) than something else (0.500)",
@@ -105,6 +114,7 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         card_sha256="0" * 64,
         verdict=word,
         claim=claim,
+        conditions=tuple(replace(one, is_met=claim or one.is_met) for one in CONDITIONS) if after else (),
         effects=effects,
         words=" or ".join(WORDS[name] for name in effects),
         refitted=refitted,
@@ -113,12 +123,15 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         sentences=tuple(EFFECTS[name].sentence for name in effects),
         declared=(),
         probability_of_none=0.02,
+        probability_of_none_with_halved_priors=0.02,
         probability_of_none_with_doubled_priors=0.03,
         p_value=PValues(before=0.01, after=0.5),
         before=BEFORE,
         after=after or BEFORE,
         gain_null_percentile=99.0 if after else 40.0,
-        null_control=NullControlSummary(n_sets=500, flagged_percent=2.0, nested_ratio=0.25, nested_ratio_to_beat=0.75),
+        null_control=NullControlSummary(
+            n_sets=500, flagged_percent=2.0, nested_ratio=0.25, nested_ratio_to_beat=0.75, nested_ratio_percentile=99.0
+        ),
         elastic_shift=SHIFT if after else still,
         finalists=(finalist,) if after else (),
         elastic_averaged={name: spread(one.before) for name, one in SHIFT.items()},

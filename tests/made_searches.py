@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 from made_boards import setup_of
 
+from bayesplate.diagnosis.decision.verdict import Verdict, decide
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid
-from bayesplate.diagnosis.evidence.search import Candidate, Ground
+from bayesplate.diagnosis.evidence.null_control import NullControl
+from bayesplate.diagnosis.evidence.search import Candidate, Found, Ground
+from bayesplate.diagnosis.evidence.sensitivity import Variant
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.diagnosis.shifts.laws import FormLaw
@@ -85,6 +88,7 @@ def table(
         moved_slopes=0.5 * size * rng.standard_normal((n_cells, 3, n_tangents)),
         form=np.zeros(n_cells, dtype=np.intp),
         z=np.zeros((n_cells, max(n_tangents, 1))),
+        z_slopes=np.zeros((n_cells, max(n_tangents, 1))),
     )
 
 
@@ -139,6 +143,7 @@ def _along(base: Baseline, name: str, direction: np.ndarray, prior: Quantity, n:
         moved_slopes=-(slope[:, None] * (base.absorbing @ direction))[:, :, None],
         form=np.zeros(n, dtype=np.intp),
         z=z[:, None],
+        z_slopes=np.full((n, 1), 0.5 * width),
     )
 
 
@@ -150,3 +155,12 @@ def with_readings(base: Baseline, *, labels: Sequence[tuple[int, int]]) -> Basel
     )
     changed: Setup = replace(setup, readings=readings)
     return replace(base, board=replace(base.board, setups=(changed,)))
+
+
+CERTAIN = NullControl(against=np.full(100, 50.0), ratio=np.full(100, 0.9))
+"""A null control that leaves so much to chance that only certainty calls for an effect, as a probability below 0.1."""
+
+
+def decided(found: Found, control: NullControl = CERTAIN, others: Sequence[Variant] = ()) -> Verdict:
+    """The verdict by the given probabilities alone, which need not be those of the readings."""
+    return decide(found, control, others)

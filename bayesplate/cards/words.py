@@ -23,6 +23,7 @@ EFFECT_NAMES = (
     "thickness_profile",
     "outline_profile",
     "density_gradient",
+    "stiffness_gradient",
     "grain_angle",
     "poisson_ratio",
 )

@@ -209,7 +209,10 @@ class Effect(ABC):
         return None
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """Fields that the plate's own terms follow instead of being uniform, by group of terms."""
+        """Fields that the plate's own terms follow instead of being uniform, by group of terms.
+
+        The part of E_x alone follows the fields of "along" where there are any, and those of "bending" otherwise.
+        """
         return {}
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -221,5 +224,5 @@ class Effect(ABC):
         return ()
 
     def reweigh(self, base: Weights, values: Values, setup: Setup) -> Weights:
-        """Weights of the plate's own terms in the presence of the effect, before they spread over fields."""
+        """Weights of the plate's own terms in the presence of the effect, linear in them, before they take fields."""
         return base

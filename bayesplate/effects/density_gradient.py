@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, Floats, Scope, Variation
-from bayesplate.effects.part import WHOLE, Part, vibrating_part
+from bayesplate.effects.base import Effect, Scope, Variation
+from bayesplate.effects.part import WHOLE, Part, growing_along_x, vibrating_part
 from bayesplate.modes.fields import Group
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter
@@ -54,13 +54,6 @@ class DensityGradient(Effect):
         return False, True
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """Inertia as at the middle of the vibrating part, and growing along x from there, both relative to the mean."""
-        inertia = (
-            Variation(None, lambda values: 1.0 + self.value(values, "gradient") * self.part.middle),
-            Variation(_along_x, lambda values: self.value(values, "gradient") * self.part.share),
-        )
+        """Inertia that grows along x."""
+        inertia = growing_along_x(self.part, lambda values: self.value(values, "gradient"))
         return dict.fromkeys(("mass", "rotary"), inertia)
-
-
-def _along_x(x: Floats, y: Floats) -> Floats:
-    return x - 0.5 + 0.0 * y

@@ -1,13 +1,15 @@
-"""Which part of the whole board vibrates: the strip that each side's clamps leave."""
+"""Which part of the whole board vibrates: the strip that each side's clamps leave, and what grows along it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.board import Board
+from bayesplate.effects.base import Variation
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
@@ -45,3 +47,28 @@ def vibrating_part(board: Board, setup: Setup, axis: str) -> Part:
     low, high = covered.get(f"{axis}0", 0.0), covered.get(f"{axis}1", 0.0)
     side = board.inputs[f"length_{axis}"].mean
     return Part(low / side, (side - low - high) / side)
+
+
+def growing_along_x(part: Part, gradient: Callable[[Values], Floats]) -> tuple[Variation, Variation]:
+    """A property 1 + g (s - 1/2) times its mean over the whole board, s from 0 to 1 along x.
+
+    Parameters
+    ----------
+    part : Part
+        What vibrates of the side x.
+    gradient : callable
+        From the values to g, a number or an (n_draws,) array.
+
+    Returns
+    -------
+    tuple of Variation
+        The property as at the middle of the vibrating part, and what grows along x from there.
+    """
+    return (
+        Variation(None, lambda values: 1.0 + gradient(values) * part.middle),
+        Variation(_from_middle, lambda values: gradient(values) * part.share),
+    )
+
+
+def _from_middle(x: Floats, y: Floats) -> Floats:
+    return x - 0.5 + 0.0 * y

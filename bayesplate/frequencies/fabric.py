@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, reduce
 from itertools import product
 
@@ -10,16 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.effects.base import Effect, Theory, Variation
+from bayesplate.frequencies.terms import along_grain
 from bayesplate.modes.fields import Fabric, Field, Group, layout
 from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import shear_groups
 from bayesplate.modes.thin import thin_groups
 from bayesplate.plate.board import Values
+from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
 
-_GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")
+_GROUPS: tuple[Group, ...] = ("along", "bending", "shear", "mass", "rotary")
 
+_UNIFORM = (Variation(None),)
 
 Joined = tuple[Variation, ...]
 """One field of a property where several effects vary it: the product of one variation per effect."""
@@ -29,13 +32,14 @@ Joined = tuple[Variation, ...]
 def _joined(effects: tuple[Effect, ...]) -> dict[Group, list[Joined]]:
     """Every variation of one effect with every one of the others, by group; empty where no effect varies anything.
 
-    Fields and weights are both read from this one list.
+    Fields and weights are both read from this one list. What an effect does to bending it does along the grain too,
+    unless it says otherwise.
     """
     varying = [variations for effect in effects if (variations := effect.variations())]
     if not varying:
         return {}
-    uniform = (Variation(None),)
-    return {group: list(product(*(each.get(group, uniform) for each in varying))) for group in _GROUPS}
+    whole = [{"along": each.get("bending", _UNIFORM), **each} for each in varying]
+    return {group: list(product(*(each.get(group, _UNIFORM) for each in whole))) for group in _GROUPS}
 
 
 def fabric_of(effects: Sequence[Effect]) -> Fabric:
@@ -54,17 +58,20 @@ def fabric_of(effects: Sequence[Effect]) -> Fabric:
     )
 
 
-def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values: Values) -> Weights:
-    """Weights of the plate's own terms, once for each field that they take.
+def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values: Values, setup: Setup) -> Weights:
+    """Weights of the plate's own terms in the presence of effects, once for each field that they take.
+
+    The part of the modulus along the grain takes fields of its own, and is turned with the grain as all the rest.
 
     Parameters
     ----------
     base : Weights
-        (n_draws, n_own) arrays, of the plate's own terms once each.
+        (n_draws, n_own) arrays, of the plate's own terms once each, without effects.
     effects : sequence of Effect
         As given to `fabric_of`.
     theory : "thin" or "shear-flexible"
     values : dict of array
+    setup : Setup
 
     Returns
     -------
@@ -72,18 +79,39 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
         In the order of `bayesplate.modes.fields.layout`.
     """
     varying = _joined(tuple(effects))
+    whole = _reweighed(base, effects, values, setup)
     if not any(one.weight for each in varying.values() for joined in each for one in joined):
-        return base
+        return whole
+    along = _reweighed(along_grain(base, values, setup), effects, values, setup).stiffness
     weights = {group: [_weight(joined, values) for joined in each] for group, each in varying.items()}
+    others = dict(zip(map(_fields, varying["bending"]), weights["bending"], strict=True))
+    # On each field along the grain, what all other moduli weigh on it: nothing where it is no field of theirs.
+    rest = [others.get(_fields(joined), np.zeros(1)) for joined in varying["along"]]
     counts = {group: len(made) for group, made in weights.items()}
     is_turned = any(effect.turns_grain for effect in effects)
     groups = thin_groups(is_turned) if theory == "thin" else shear_groups(is_turned)
 
-    def spread(own: Floats, group: Sequence[Group]) -> Floats:
-        columns = [own[:, term] * weights[group[term]][k] for term, k in layout(group, counts)]
-        return np.stack(np.broadcast_arrays(*columns), axis=-1)
+    def stiffness(term: int, k: int) -> Floats:
+        own, group = whole.stiffness[:, term], groups[0][term]
+        if group == "along":
+            return along[:, term] * weights[group][k] + (own - along[:, term]) * rest[k]
+        return own * weights[group][k]
 
-    return Weights(*(spread(own, group) for own, group in zip(base, groups, strict=True)))
+    def mass(term: int, k: int) -> Floats:
+        return whole.mass[:, term] * weights[groups[1][term]][k]
+
+    def spread(weight: Callable[[int, int], Floats], group: Sequence[Group]) -> Floats:
+        return np.stack(np.broadcast_arrays(*(weight(*each) for each in layout(group, counts))), axis=-1)
+
+    return Weights(spread(stiffness, groups[0]), spread(mass, groups[1]))
+
+
+def _reweighed(base: Weights, effects: Sequence[Effect], values: Values, setup: Setup) -> Weights:
+    return reduce(lambda weights, effect: effect.reweigh(weights, values, setup), effects, base)
+
+
+def _fields(joined: Joined) -> tuple[Field | None, ...]:
+    return tuple(one.field for one in joined)
 
 
 def _weight(joined: Joined, values: Values) -> Floats:

@@ -70,9 +70,7 @@ class System:
         """What every term weighs: (n_draws, n_terms) and (n_draws, n_masses) arrays."""
         values = self.adjusted(values)
         base = (shear_term_weights if self.theory == "shear-flexible" else term_weights)(values, self.setup)
-        for effect in self.effects:
-            base = effect.reweigh(base, values, self.setup)
-        base = over_fields(base, self.effects, self.theory, values)
+        base = over_fields(base, self.effects, self.theory, values, self.setup)
         added = self.contributions
         stiffness = [one.weight(values, self.setup) for one in added.stiffness]
         masses = [one.weight(values, self.setup) for one in added.masses]

@@ -48,6 +48,29 @@ def term_weights(values: Values, setup: Setup) -> Weights:
     return Weights(stiffness, np.ones((stiffness.shape[0], 1)))
 
 
+def along_grain(base: Weights, values: Values, setup: Setup) -> Weights:
+    """What the modulus along the grain alone gives to the weights: E_x h^3 / 12 = D_x - nu_xy^2 D_y in K_xx.
+
+    Parameters
+    ----------
+    base : Weights
+        Of the plate's own terms, those of `term_weights` first.
+    values : dict of array
+        As given to `term_weights`.
+    setup : Setup
+
+    Returns
+    -------
+    Weights
+        Arrays of the shapes of `base`, zero in all other terms.
+    """
+    length_x, length_y = vibrating_lengths(values, setup)
+    xx, _, mix, *_ = np.moveaxis(base.stiffness, -1, 0)
+    along = np.zeros_like(base.stiffness)
+    along[:, 0] = xx - values["poisson_xy"] * mix * (length_y / length_x) ** 2
+    return Weights(along, np.zeros_like(base.mass))
+
+
 def rayleigh_coefficients(setup: Setup) -> NDArray[np.float64]:
     """Rayleigh quotients of all products of a setup's beam functions, by term: (4, n_beams_x, n_beams_y) array.
 

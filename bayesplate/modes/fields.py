@@ -7,7 +7,7 @@ a smooth one a few.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -26,8 +26,8 @@ Field = Callable[[Floats, Floats], Floats]
 Outline = Callable[[Floats], tuple[Floats, Floats]]
 """Where the plate begins and ends along y, as fractions of its widest width, at points x of [0, 1]."""
 
-Group = Literal["bending", "shear", "mass", "rotary"]
-"""Terms of a plate that take the same field."""
+Group = Literal["along", "bending", "shear", "mass", "rotary"]
+"""Terms of a plate that take the same field; "along" is the bending that the modulus along the grain resists."""
 
 Measure = tuple[tuple[Products, Products], ...]
 """Integrals along x and along y by orders of derivatives, on the functions of the free lines; summed over the pairs."""
@@ -36,7 +36,7 @@ _POINTS = 6
 """Gauss points per element: a product of two cubics with a field of degree five is exact."""
 _NEGLIGIBLE = 1e-12
 
-_GHOST: dict[Group, float] = {"bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
+_GHOST: dict[Group, float] = {"along": 1e-5, "bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
 """What is left of the plate outside its outline: soft enough to carry nothing, far lighter still than it is soft."""
 
 
@@ -57,9 +57,11 @@ class Fabric:
     outline: Outline | None = None
     is_turned: bool = False
 
-    def measures(self, group: Group, x: Line, y: Line) -> list[Measure]:
-        """The measures of a group's terms, in the order of its fields."""
-        return [self._measure(field, _GHOST[group], x, y) for field in self.fields.get(group, (None,))]
+    def measures(self, groups: Iterable[Group], x: Line, y: Line) -> dict[Group, list[Measure]]:
+        """The measures of each group's terms, in the order of its fields; a field of two groups is integrated once."""
+        taken = {group: [(field, _GHOST[group]) for field in self.fields.get(group, (None,))] for group in groups}
+        made = {each: self._measure(*each, x, y) for each in {each for pairs in taken.values() for each in pairs}}
+        return {group: [made[each] for each in pairs] for group, pairs in taken.items()}
 
     def _measure(self, factor: Field | None, ghost: float, x: Line, y: Line) -> Measure:
         uniform = (products(tuple(x.nodes)), products(tuple(y.nodes)))

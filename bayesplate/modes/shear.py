@@ -36,7 +36,7 @@ from bayesplate.modes.plate import (
     kron_sum,
 )
 from bayesplate.modes.sparse import on_one_pattern
-from bayesplate.modes.thin import THIN_TERMS
+from bayesplate.modes.thin import THIN_TERMS, thin_groups
 from bayesplate.plate.setup import Ends
 
 SHEAR_TERMS = (*THIN_TERMS, "shear_x", "shear_y")
@@ -153,7 +153,7 @@ def assemble_shear_flexible(
     PlateMatrices
     """
     groups = shear_groups(fabric.is_turned)
-    measures = {group: fabric.measures(group, x, y) for group in {*groups[0], *groups[1]}}
+    measures = fabric.measures({*groups[0], *groups[1]}, x, y)
     on_deflections = tuple(partial(term, x, y) for term in projected)
     blocks = tuple(
         _block(Parity(i, j), x, y, measures, groups, stiffness, masses, on_deflections)
@@ -168,9 +168,10 @@ def shear_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Grou
 
     Where the grain runs at an angle, the terms that couple bending with twist and the two shear strains come last.
     """
-    stiffness: tuple[Group, ...] = ("bending", "bending", "bending", "bending", "shear", "shear")
-    coupling: tuple[Group, ...] = ("bending", "bending", "shear") if is_turned else ()
-    return stiffness + coupling, ("mass", "rotary", "rotary")
+    bending, _ = thin_groups(is_turned)
+    own, coupling = bending[: len(THIN_TERMS)], bending[len(THIN_TERMS) :]
+    strains: tuple[Group, ...] = ("shear",) if is_turned else ()
+    return (*own, "shear", "shear", *coupling, *strains), ("mass", "rotary", "rotary")
 
 
 def _block(

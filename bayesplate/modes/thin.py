@@ -29,6 +29,17 @@ from bayesplate.plate.setup import Ends
 
 THIN_TERMS = ("xx", "yy", "mix", "xy")
 
+_DERIVATIVES: tuple[tuple[Beams, Beams, float], ...] = (
+    ((2, 0), (2, 0), 1.0),
+    ((0, 2), (0, 2), 1.0),
+    ((2, 0), (0, 2), 1.0),
+    ((1, 1), (1, 1), 1.0),
+    ((2, 0), (1, 1), 2.0),
+    ((0, 2), (1, 1), 2.0),
+)
+"""Two derivatives of the deflection, orders along x and y, whose product each term integrates, and a factor; twice
+where they differ, so that the matrix is symmetric. The last two couple bending with twist."""
+
 
 @lru_cache(maxsize=16)
 def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> PlateMatrices:
@@ -55,10 +66,11 @@ def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> PlateMatrices:
 
 
 def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
-    """Group of each stiffness and of each mass term that is the thin plate's own."""
-    stiffness: tuple[Group, ...] = ("bending", "bending", "bending", "bending")
-    coupling: tuple[Group, ...] = ("bending", "bending") if is_turned else ()
-    return stiffness + coupling, ("mass",)
+    """Group of each stiffness and of each mass term that is the thin plate's own.
+
+    Where the grain runs at an angle, the modulus along it has a part in every term.
+    """
+    return (("along",) * 6 if is_turned else ("along", "bending", "bending", "bending")), ("mass",)
 
 
 def thin_terms(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
@@ -75,30 +87,21 @@ def thin_terms(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...
     tuple of KronSum
         The four of `THIN_TERMS`; 4 int w_xx w_xy and 4 int w_yy w_xy follow where the grain runs at an angle.
     """
-    measures = fabric.measures("bending", x, y)
     stiffness, _ = thin_groups(fabric.is_turned)
+    measures = fabric.measures(set(stiffness), x, y)
+    counts = {group: len(each) for group, each in measures.items()}
 
-    def both(measure: Measure, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:
-        """Integral of the product of two derivatives of the deflection, symmetric."""
-        return (*_integral(measure, x, y, a, b, factor), *_integral(measure, x, y, b, a, factor))
+    def own(term: int, measure: Measure) -> KronSum:
+        a, b, factor = _DERIVATIVES[term]
+        once = _integral(measure, x, y, a, b, factor)
+        return once if a == b else (*once, *_integral(measure, x, y, b, a, factor))
 
-    def own(measure: Measure) -> tuple[KronSum, ...]:
-        return (
-            _integral(measure, x, y, (2, 0), (2, 0)),
-            _integral(measure, x, y, (0, 2), (0, 2)),
-            both(measure, (2, 0), (0, 2)),
-            _integral(measure, x, y, (1, 1), (1, 1)),
-            both(measure, (2, 0), (1, 1), 2.0),
-            both(measure, (0, 2), (1, 1), 2.0),
-        )
-
-    made = [own(measure) for measure in measures]
-    return tuple(made[k][term] for term, k in layout(stiffness, {"bending": len(measures)}))
+    return tuple(own(term, measures[stiffness[term]][k]) for term, k in layout(stiffness, counts))
 
 
 def thin_masses(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
     """The board's own mass, once for each field that it takes."""
-    return tuple(_integral(measure, x, y, (0, 0), (0, 0)) for measure in fabric.measures("mass", x, y))
+    return tuple(_integral(measure, x, y, (0, 0), (0, 0)) for measure in fabric.measures(("mass",), x, y)["mass"])
 
 
 def _integral(measure: Measure, x: Line, y: Line, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:

@@ -8,6 +8,7 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.tables import (
     answers_table,
     candidates_table,
+    claim_table,
     errors_table,
     shift_table,
     sizes_table,
@@ -31,7 +32,7 @@ class DiagnosisSection:
         Each word that a verdict may be, what it means, and whether it is the one given.
     sentences : tuple of str
     tables : tuple of Table
-        Probabilities, errors, shift of the constants, sizes.
+        Probabilities, errors, conditions of the claim, shift of the constants, sizes.
     explained : tuple of str
         What two words of these tables mean.
     model : str
@@ -64,6 +65,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     tables = (
         answers_table(diagnosis),
         errors_table(diagnosis),
+        claim_table(diagnosis),
         shift_table(diagnosis),
         sizes_table(diagnosis),
     )

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from bayesplate.diagnosis.decision.advice import recommendation
+from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
-from bayesplate.diagnosis.decision.refits import excludes_zero, likely_forms, refit_board
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, alternatives, answer_words, answers, decide
-from bayesplate.diagnosis.evidence.folds import nested
+from bayesplate.diagnosis.decision.refits import refit_board
+from bayesplate.diagnosis.decision.verdict import Verdict, answer_words, answers, decide
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
@@ -155,11 +155,11 @@ def diagnose(
     before = run(problem, BEFORE, "fit without further effects")
     stages.begin("search for effects", _SEARCH)
     found = search(prepare_search(baseline_of(before.inference.problem), tell=stages.reached))
-    verdict = decide(found)
-    finals = finalists(found, verdict)
-    stages.left = _CONTROL + _FIT * len(finals)
     stages.begin("the same search on simulated boards", _CONTROL)
-    control = null_control(found, np.random.default_rng([seed, _NULL_LINE]), n_null)
+    control = null_control(found.ground, np.random.default_rng([seed, _NULL_LINE]), n_null)
+    verdict = decide(found, control)
+    finals = verdict.stands_for[:_MOST_FINALISTS]
+    stages.left = _FIT * len(finals)
     refits: dict[int, Fitted] = {}
     notes = list(problem.posed.doubts)
     for answer in finals:
@@ -183,11 +183,6 @@ def diagnose(
     return DiagnoseResult(begun.path, diagnosis, before, after)
 
 
-def finalists(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
-    """Explanations to fit again by the sampler: the one that is named, or the first few alternatives of a group."""
-    return accepted(found, verdict)[:_MOST_FINALISTS]
-
-
 def _case(
     found: Found,
     verdict: Verdict,
@@ -198,17 +193,17 @@ def _case(
 ) -> Case:
     after = refits.get(verdict.index, before)
     is_refitted = after is not before
-    clear = is_refitted and excludes_zero(after.problem.prepared.board, likely_forms(found, verdict.index), after.draws)
+    folded = nested_of(found, control)
     return Case(
         found=found,
         verdict=verdict,
         control=control,
-        folded=nested(found.ground, found.residual[None, :]),
+        folded=folded,
         before=Side(0, before.summary, before.draws),
         after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
-        is_clear_of_zero=clear,
+        claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
         recommendation=advice(found, verdict),
-        finalists=[(one, refits[one.index].summary) for one in finalists(found, verdict) if one.index in refits],
+        finalists=[(one, refits[one.index].summary) for one in verdict.stands_for if one.index in refits],
         drawn={index: one.draws for index, one in refits.items()},
         notes=notes,
     )
@@ -224,7 +219,7 @@ def advice(found: Found, verdict: Verdict) -> str:
 def asked_about(found: Found, verdict: Verdict) -> tuple[str, ...]:
     """Effects that the next measurement should tell apart: the alternatives, or what is most probable so far."""
     ranked = answers(found)
-    near = alternatives(found, ranked) if verdict.index else ranked[:3]
+    near = verdict.stands_for if verdict.index else ranked[:3]
     if verdict.index and len(near) == 1:
         return ()
     names = dict.fromkeys(name for one in near for name in one.members if name in found.ground.candidates)

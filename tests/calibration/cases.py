@@ -76,6 +76,7 @@ CASES: dict[str, Case] = {
         "cantilever-9", lambda v, p, at: planted.ThicknessProfile(v["taper_x"], v["taper_y"]), "taper_x"
     ),
     "density_gradient": Case("cantilever-9", lambda v, p, at: planted.DensityGradient(v["gradient"]), "gradient"),
+    "stiffness_gradient": Case("cantilever-9", lambda v, p, at: planted.StiffnessGradient(v["gradient"]), "gradient"),
     "grain_angle": Case("cantilever-9", lambda v, p, at: planted.GrainAngle(v["angle"]), "angle"),
     "poisson_ratio": Case(
         "cantilever-9", lambda v, p, at: planted.PoissonRatio(v["poisson_xy"]), "poisson_xy", {"poisson_xy": "0.4"}

@@ -6,16 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import HALF_NORMAL, bare, baseline, candidate, ground_of, one_level
+from made_searches import HALF_NORMAL, bare, baseline, candidate, decided, ground_of, one_level
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
-from bayesplate.diagnosis.decision.verdict import answers, at_limit, decide
+from bayesplate.diagnosis.decision.verdict import answers, at_limit
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import simulate_null
-from bayesplate.diagnosis.evidence.search import Found, search
-from bayesplate.diagnosis.evidence.terms import Terms
+from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.signatures import Signature, look_alikes, signatures
 from bayesplate.diagnosis.wording.entries import effect_entry
 from bayesplate.posterior.inference import pose
@@ -43,7 +42,7 @@ def found_of(base, directions, probability, residual, prior=HALF_NORMAL, n_cells
 
 def entry_of(found):
     """What diagnosis.json says of a candidate."""
-    return effect_entry(found, decide(found), answers(found), found.ground.candidates[A], 0.0)
+    return effect_entry(found, decided(found), answers(found), found.ground.candidates[A], 0.0)
 
 
 @pytest.mark.parametrize("index", [0, 1], ids=["the bare model", "the winner"])
@@ -58,7 +57,7 @@ def test_the_gate_lets_through_what_chance_gives_in_one_of_twenty_cases(base, in
 
     for wanted, word in ((0.049, "unexplained"), (0.051, "none needed" if index == 0 else "named")):
         scale = brentq(lambda s, w=wanted: with_misfit(s).p_value(index) - w, 1e-3, 10.0, xtol=1e-10)
-        assert decide(with_misfit(scale)).word == word
+        assert decided(with_misfit(scale)).word == word
 
 
 @pytest.mark.parametrize(("beyond", "is_limited"), [(0.0040, True), (0.0062, False)])
@@ -154,15 +153,14 @@ def test_simulated_nulls_are_rounded_and_have_the_spread_of_the_inputs(resolutio
     """Covariance of the sets: noise, a rounding of one Hz (variance 1/12 over f^2), and what the inputs do together."""
     rounded = baseline(np.random.default_rng(1), resolution=resolution, n_inputs=n_inputs)
     levels = noise_grid(rounded.board)
-    found = search(ground_of(rounded, bare(rounded, levels)), 0.01 * np.random.default_rng(4).standard_normal(6))
-    terms = Terms(found.ground.hypotheses[0].table, found.ground.whole, levels)
-    shares = np.exp(terms.log_densities(found.residual[None, :])[:, 0])
-    noise = float(shares @ levels.sd[:, 0] ** 2 / shares.sum())
+    ground = ground_of(rounded, bare(rounded, levels))
+    (setup,) = rounded.board.setups
+    noise = float(setup.noise.median**2 * np.exp(2.0 * setup.noise.log_sd**2))  # mean square of the noise prior
     hertz = np.exp(rounded.log_frequency)
     expected = np.diag(noise + resolution**2 / 12.0 / hertz**2) + rounded.input_slopes @ rounded.input_slopes.T
 
     n_sets = 40_000
-    simulated = simulate_null(found, np.random.default_rng(5), n_sets)
+    simulated = simulate_null(ground, np.random.default_rng(5), n_sets)
 
     products = np.einsum("ni,nj->nij", simulated, simulated)
     error = products.std(axis=0) / np.sqrt(n_sets)

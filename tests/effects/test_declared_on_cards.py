@@ -190,6 +190,9 @@ CASES: dict[str, Declared] = {
     "density_gradient": Declared(
         "density_gradient", ALL, _times("gradient"), values=lambda p, plate: {"gradient": p["gradient"]}
     ),
+    "stiffness_gradient": Declared(
+        "stiffness_gradient", ALL, _times("gradient"), values=lambda p, plate: {"gradient": p["gradient"]}
+    ),
     "grain_angle": Declared("grain_angle", ALL, _times("angle"), values=lambda p, plate: {"angle": p["angle"]}),
     "poisson_ratio": Declared("poisson_ratio", ALL, _half_poisson, values=lambda p, plate: {"nu_xy": p["nu_xy"]}),
 }  # fmt: skip

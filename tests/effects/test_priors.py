@@ -3,7 +3,8 @@
 A change of these changes what people are told, so it is made here as well, with a reason. The numbers are those of the
 literature on effects in wooden plates (shear moduli of spruce 0.5-0.75 GPa and 20-40 MPa; a clamp of k_R L / D = 30 and
 one with a lining of k_T L^3 / D = 1e4; tensions of 100-400 N/m in clamped boards; air of 1.2 kg/m^3; tapers and density
-gradients of 5 per cent end to end; grain within 6 degrees; nu_xy of 0.3-0.6) and those of data sheets of sensors.
+gradients of 5 per cent end to end, gradients of E_x of 8; grain within 6 degrees; nu_xy of 0.3-0.6) and those of data
+sheets of sensors.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ PRIORS = {
     ("thickness_profile", "taper_x"): ("1", "normal", 0.0, 0.05, ANY),
     ("thickness_profile", "taper_y"): ("1", "normal", 0.0, 0.05, ANY),
     ("density_gradient", "gradient"): ("1", "normal", 0.0, 0.05, ANY),
+    ("stiffness_gradient", "gradient"): ("1", "normal", 0.0, 0.08, ANY),
     ("grain_angle", "angle"): ("rad", "normal", 0.0, 3.0 * DEGREE, (0.0, 6.0 * DEGREE)),
     ("poisson_ratio", "nu_xy"): ("1", "normal", 0.4, 0.15, (0.0, 0.9)),
 }

@@ -47,6 +47,7 @@ NOTHING = {
     "thickness_profile": 0.0,
     "outline_profile": 0.0,
     "density_gradient": 0.0,
+    "stiffness_gradient": 0.0,
     "grain_angle": 0.0,
     "poisson_ratio": FREE.nu_xy,
 }
@@ -55,7 +56,7 @@ KINDS = {
     "stiffness": {"clamp_rotation", "clamp_translation", "membrane_tension", "support_stiffness"},
     "mass": {"attached_mass"},
     "projected mass": {"air_loading", "support_mass"},
-    "field": {"thickness_profile", "outline_profile", "density_gradient"},
+    "field": {"thickness_profile", "outline_profile", "density_gradient", "stiffness_gradient"},
     "theory": {"transverse_shear"},
     "material": {"grain_angle", "poisson_ratio"},
 }
@@ -124,10 +125,10 @@ PAIRS = {
 
 
 def test_every_effect_meets_every_other_that_an_edge_condition_allows():
-    """45 pairs on a cantilever, those of a stretched board and of its frame, those of a foundation."""
-    assert {edges: len(names) for edges, names in TOGETHER.items()} == {"CFFF": 10, "CCCC": 11, "FFFF": 9, "SSSS": 9}
+    """55 pairs on a cantilever, those of a stretched board and of its frame, those of a foundation."""
+    assert {edges: len(names) for edges, names in TOGETHER.items()} == {"CFFF": 11, "CCCC": 12, "FFFF": 10, "SSSS": 10}
     assert set().union(*TOGETHER.values()) == set(EFFECTS) == set(NOTHING) == set().union(*KINDS.values())
-    assert {edges: len(pairs) for edges, pairs in PAIRS.items()} == {"CFFF": 45, "CCCC": 9 + 10, "FFFF": 8, "SSSS": 0}
+    assert {edges: len(pairs) for edges, pairs in PAIRS.items()} == {"CFFF": 55, "CCCC": 10 + 11, "FFFF": 9, "SSSS": 0}
 
 
 @pytest.mark.parametrize("edges", ["CFFF", "CCCC", "FFFF"])

@@ -202,6 +202,17 @@ class DensityGradient(NoEffect):
 
 
 @dataclass(frozen=True)
+class StiffnessGradient(NoEffect):
+    """E_x that grows linearly along x by this fraction of its mean from end to end; E_y, G_xy, nu_xy, density stay."""
+
+    gradient: float
+
+    def changed(self, plate: Plate) -> Plate:
+        profile = LinearProfile(self.gradient, 0.0, plate.whole_length, plate.L_y)
+        return replace(plate, stiffness_x=(*plate.stiffness_x, profile))
+
+
+@dataclass(frozen=True)
 class GrainAngle(NoEffect):
     """The grain runs at an angle, rad, to the side x."""
 

@@ -1,13 +1,13 @@
-"""Effects that no library knows: a glued rib, a stiffness that varies along the board, a crack."""
+"""Effects that no library knows: a glued rib, a crack."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from generator.basis import Basis, Floats, gauss
-from generator.effects import LinearProfile, NoEffect
+from generator.effects import NoEffect
 from generator.plate import Plate
 
 
@@ -26,17 +26,6 @@ class Rib(NoEffect):
         bent, moved = basis.rotation(1, x, y, 0, 1), basis.deflection(x, y)
         along = weights[:, None]
         return stiffness + self.stiffness * bent.T @ (along * bent), mass + self.line_mass * moved.T @ (along * moved)
-
-
-@dataclass(frozen=True)
-class StiffnessGradient(NoEffect):
-    """E_x grows linearly along x by this fraction of its mean from end to end; the density does not."""
-
-    gradient: float
-
-    def changed(self, plate: Plate) -> Plate:
-        profile = LinearProfile(self.gradient, 0.0, plate.whole_length, plate.L_y)
-        return replace(plate, stiffness_x=(*plate.stiffness_x, profile))
 
 
 @dataclass(frozen=True)

@@ -141,6 +141,9 @@ LIBRARY: dict[str, Recipe] = {
         _outline, _make(effects.OutlineProfile), lambda setup: setup.edges["y0"] == setup.edges["y1"] == "free"
     ),
     "density_gradient": Recipe(_amplitude("gradient", "density_gradient", signed=True), _make(effects.DensityGradient)),
+    "stiffness_gradient": Recipe(
+        _amplitude("gradient", "stiffness_gradient", signed=True), _make(effects.StiffnessGradient)
+    ),
     "grain_angle": Recipe(_grain, _make(effects.GrainAngle)),
     "poisson_ratio": Recipe(_poisson, _make(effects.PoissonRatio)),
 }
@@ -148,9 +151,6 @@ LIBRARY: dict[str, Recipe] = {
 
 OUTSIDE: dict[str, Recipe] = {
     "rib": Recipe(_rib, _make(outside.Rib)),
-    "stiffness_gradient": Recipe(
-        _amplitude("gradient", "stiffness_gradient", signed=True), _make(outside.StiffnessGradient)
-    ),
     "crack": Recipe(_crack, _make(outside.Crack)),
 }
 """The effects that it does not know."""

@@ -28,6 +28,7 @@ MEANINGS: dict[str, tuple[str, Read, float]] = {
     "support_stiffness": ("stiffness", lambda p, D, L: p["stiffness"], 0.0),
     "thickness_profile": ("taper_x", lambda p, D, L: p["taper_x"], 0.0),
     "density_gradient": ("gradient", lambda p, D, L: p["gradient"], 0.0),
+    "stiffness_gradient": ("gradient", lambda p, D, L: p["gradient"], 0.0),
     "grain_angle": ("angle", lambda p, D, L: abs(p["angle"]), 0.0),
     "poisson_ratio": ("nu_xy", lambda p, D, L: p["nu_xy"], POISSON),
 }

@@ -19,14 +19,14 @@ from trial.shared import control_of, ground_of, shared_law
 from bayesplate.diagnosis.decision.claim import judge_claim
 from bayesplate.diagnosis.decision.constants import ConstantDraws, draw_constants
 from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answers, decide
-from bayesplate.diagnosis.evidence.null_control import NullControl, gain
+from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.errors import BayesplateError
 from bayesplate.plate.material import MODULI
 
 Record = dict[str, Any]
 
-N_DRAWS = 2000
+N_DRAWS = 800
 SOLID_DENSITY, SOLID_GYRATION = 5000.0, 1.0 / 16.0 + 1.0 / 3.0
 """kg/m3, and squared radius of gyration of a cylinder as high as wide about a diameter of its base."""
 
@@ -109,12 +109,11 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
     verdict = decide(found, control)
     claim = judge_claim(found, verdict, control)
     ranked = answers(found)
-    near = alternatives(found, ranked) if ranked else ()
+    near = verdict.stands_for or (alternatives(found, ranked) if ranked else ())
     best = verdict.best
-    priors = np.array([one.prior for one in found.ground.hypotheses])
-    gained = float(gain(found.log_evidence[:, None], priors)[0])
     return {
         "word": verdict.word,
+        "needed": verdict.is_needed,
         "effects": list(verdict.effects),
         "reason": verdict.reason,
         "claim": bool(claim.holds),
@@ -123,7 +122,7 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         "support": _probability(best.support) if best else 0.0,
         "set": [[list(answer.members), _probability(answer.support)] for answer in near],
         "none": _probability(found.none),
-        "gain_percentile": _rounded(control.percentile_of_gain(gained)),
+        "gain_percentile": _rounded(control.percentile_of(found.against_none)),
         "inclusion": {name: _probability(found.inclusion(name)) for name in found.ground.candidates},
         "gate": {
             "bare": _probability(found.p_value(0)),
@@ -140,7 +139,7 @@ def traced(found: Found, verdict: Verdict) -> list[int]:
     if verdict.word == "named":
         return [verdict.index]
     if verdict.word == "indistinguishable group":
-        return [answer.index for answer in alternatives(found, answers(found))]
+        return [answer.index for answer in verdict.stands_for]
     return [0]
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from trial.cells import KINDS, SENSORS, UNKNOWN, Setting
 
 from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
-from bayesplate.diagnosis.evidence.search import Ground, prepare_search, search
+from bayesplate.diagnosis.evidence.search import Ground, prepare_search
 from bayesplate.diagnosis.shifts.baseline import Baseline, baseline_at
 from bayesplate.diagnosis.shifts.forms import Form, forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
@@ -90,7 +90,7 @@ def law_without_effect(design: str, estimate: Estimate) -> Predict:
 def control_of(setting: Setting) -> NullControl:
     """Null simulations of a setting: the same for every board of it, whichever process makes them."""
     planted = _median_board(setting)
-    return null_control(search(ground_of(planted, shared_law)), setting.rng(), n_sets=N_NULL_SETS)
+    return null_control(ground_of(planted, shared_law), setting.rng(), n_sets=N_NULL_SETS)
 
 
 @cache

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.folds import NEEDED
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.sensitivity import Variant, variants
 from bayesplate.diagnosis.evidence.terms import normalised
-from bayesplate.effects.words import effect_name, effect_names
+from bayesplate.effects.words import effect_name, effect_names, joined
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.quantities import Quantity
 
@@ -25,6 +26,8 @@ CLEARLY = 3.0
 """How many times more probable the best must be than the next to be named, and a pair than its better member."""
 WITHIN = 10.0
 """Alternatives up to this factor below the best are listed with it."""
+_MOST_RIVALS = 3
+"""Of a name that does not survive another assumption: the best there are told."""
 AT_LIMIT = 0.005
 """Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
 
@@ -64,6 +67,10 @@ class Verdict:
     best : Answer or None
         The most probable answer, whatever the verdict.
     reason : str
+    is_needed : bool
+        Whether the odds against no effect are larger than the null simulations leave to chance.
+    stands_for : tuple of Answer
+        The one that is named, or the alternatives of a group, the most probable first.
     """
 
     word: Word
@@ -71,6 +78,8 @@ class Verdict:
     index: int
     best: Answer | None
     reason: str
+    is_needed: bool = False
+    stands_for: tuple[Answer, ...] = ()
 
 
 def answers(found: Found) -> tuple[Answer, ...]:
@@ -99,12 +108,16 @@ def answers(found: Found) -> tuple[Answer, ...]:
     return tuple(sorted(listed, key=lambda answer: -answer.support))
 
 
-def decide(found: Found) -> Verdict:
+def decide(found: Found, control: NullControl, others: Iterable[Variant] | None = None) -> Verdict:
     """The verdict on one set of readings.
 
     Parameters
     ----------
     found : Found
+    control : NullControl
+        What the search makes of boards without any effect.
+    others : iterable of Variant, optional
+        The searches that a name has to survive; by default those of `variants`, made only if there is a name.
 
     Returns
     -------
@@ -114,32 +127,50 @@ def decide(found: Found) -> Verdict:
     best = ranked[0] if ranked else None
     if not found.ground.n_directions:
         return Verdict("undetectable", (), 0, best, NOTHING_LEFT)
-    if found.none >= NEEDED or best is None:
+    if best is None or found.against_none <= control.needed_from:
         return _without(found, best)
     passed = found.p_value(best.index)
     if passed < PASSES:
-        return Verdict(
-            "unexplained",
-            (),
-            0,
-            best,
-            f"with {answer_words(found, best)} the misfit is still too large ({p_words(passed)})",
-        )
+        reason = f"with {answer_words(found, best)} the misfit is still too large ({p_words(passed)})"
+        return Verdict("unexplained", (), 0, best, reason, is_needed=True)
     limit = at_limit(found, best.index)
     if limit:
-        return Verdict(
-            "unexplained", (), 0, best, f"{answer_words(found, best)} fits only at the limit of its range: {limit}"
-        )
-    rivals = [one for one in ranked[1:] if one.support * WITHIN >= best.support]
-    nearest = max((one.support for one in rivals), default=0.0)
-    if best.support >= CLEARLY * nearest:
-        return Verdict(
-            "named", best.members, best.index, best, f"{answer_words(found, best)} has no rival within a factor 3"
-        )
-    group = tuple(dict.fromkeys(name for one in (best, *rivals) for name in one.members))
-    return Verdict(
-        "indistinguishable group", group, best.index, best, "several explanations are about equally probable"
-    )
+        reason = f"{answer_words(found, best)} fits only at the limit of its range: {limit}"
+        return Verdict("unexplained", (), 0, best, reason, is_needed=True)
+    near = alternatives(found, ranked)
+    if _stands_out(best, ranked):
+        turned = _turned(found, best, variants(found) if others is None else others)
+        if not turned:
+            reason = f"{answer_words(found, best)} has no rival within a factor 3, whatever is assumed"
+            return Verdict("named", best.members, best.index, best, reason, True, (best,))
+        words, rivals = turned
+        reason = f"{words} {joined([answer_words(found, one) for one in rivals], 'or')} may be as probable"
+        near = (best, *rivals)
+    else:
+        reason = "several explanations are about equally probable"
+    group = tuple(dict.fromkeys(name for one in near for name in one.members))
+    return Verdict("indistinguishable group", group, best.index, best, reason, True, near)
+
+
+def _stands_out(one: Answer, ranked: Sequence[Answer]) -> bool:
+    """Whether an answer is three times as probable as every other one."""
+    return all(one.support >= CLEARLY * other.support for other in ranked if other.index != one.index)
+
+
+def _turned(found: Found, best: Answer, others: Iterable[Variant]) -> tuple[str, tuple[Answer, ...]] | None:
+    """The first assumption under which a name no longer stands out, and what rivals it there; None if it always does.
+
+    A rival is told with the probability that it has without the change.
+    """
+    usual = {one.index: one for one in answers(found)}
+    for variant in others:
+        there = {one.index: one for one in answers(variant.found)}
+        own = there.get(best.index, Answer(best.members, best.index, 0.0))
+        rivals = [one for one in there.values() if one.index != best.index and one.support * CLEARLY > own.support]
+        if rivals:
+            first = sorted(rivals, key=lambda one: -one.support)[:_MOST_RIVALS]
+            return variant.words, tuple(usual.get(one.index, one) for one in first)
+    return None
 
 
 def _without(found: Found, best: Answer | None) -> Verdict:
@@ -214,13 +245,6 @@ def _is_extreme(prior: Quantity, z: float) -> bool:
     near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
     near_bottom = np.isfinite(low) and not starts_at_nothing and (ndtr(z) - ndtr(low)) / whole < AT_LIMIT
     return bool(near_top or near_bottom)
-
-
-def accepted(found: Found, verdict: Verdict) -> tuple[Answer, ...]:
-    """The answers that a verdict stands for: the one that is named, the alternatives of a group, or none."""
-    if not verdict.index or verdict.best is None:
-        return ()
-    return (verdict.best,) if verdict.word == "named" else alternatives(found, answers(found))
 
 
 def answer_words(found: Found, answer: Answer) -> str:

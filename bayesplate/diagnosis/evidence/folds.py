@@ -7,14 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.hypotheses import log_evidences, probabilities
+from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none, probabilities
 from bayesplate.diagnosis.evidence.search import Ground
 from bayesplate.diagnosis.evidence.terms import Fold
 
 Floats = NDArray[np.float64]
 
 NEEDED = 0.1
-"""Probability of no effect from which on none is added."""
+"""Probability of no effect below which one is needed, whatever the null simulations say."""
+CERTAINLY_NEEDED = float(np.log((1.0 - NEEDED) / NEEDED))
+"""The same as ln odds against no effect."""
+ALWAYS = -np.inf
+"""Odds from which on an effect is chosen by whoever is made to choose one."""
 FEWEST = 5
 """Readings without which a fold has no direction left to choose by."""
 
@@ -43,13 +47,15 @@ class Nested:
         return np.asarray(np.sqrt(np.mean(self.after**2, axis=1) / np.mean(self.before**2, axis=1)))
 
 
-def nested(ground: Ground, residuals: Floats) -> Nested | None:
+def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> Nested | None:
     """Leave each reading out in turn, search again without it, and predict it by what was chosen.
 
     Parameters
     ----------
     ground : Ground
     residuals : (n_sets, n_modes) array
+    needed_from : float
+        ln odds against no effect above which a fold adds the most probable one; `ALWAYS` makes every fold choose.
 
     Returns
     -------
@@ -63,7 +69,7 @@ def nested(ground: Ground, residuals: Floats) -> Nested | None:
     chosen = np.empty(residuals.shape, dtype=np.intp)
     for mode in range(n_modes):
         fold = Fold(ground.baseline, mode)
-        picked = choices(ground, fold, residuals)
+        picked = choices(ground, fold, residuals, needed_from)
         chosen[:, mode] = picked
         before[:, mode] = residuals @ fold.misses
         after[:, mode] = before[:, mode]
@@ -75,11 +81,13 @@ def nested(ground: Ground, residuals: Floats) -> Nested | None:
     return Nested(before, after, chosen)
 
 
-def choices(ground: Ground, fold: Fold, residuals: Floats) -> NDArray[np.intp]:
-    """The most probable hypothesis for each data set, or none where none is probable enough: (n_sets,) array."""
-    shares = probabilities(ground.hypotheses, log_evidences(ground.hypotheses, fold, residuals))
-    best = 1 + np.argmax(shares[1:], axis=0) if len(shares) > 1 else np.zeros(shares.shape[1], dtype=np.intp)
-    return np.where(shares[0] >= NEEDED, 0, best)
+def choices(ground: Ground, fold: Fold, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> NDArray[np.intp]:
+    """The most probable effect for each data set, or none where the odds against none are too low: (n_sets,) array."""
+    evidences = log_evidences(ground.hypotheses, fold, residuals)
+    if len(evidences) == 1:
+        return np.zeros(len(residuals), dtype=np.intp)
+    best = 1 + np.argmax(probabilities(ground.hypotheses, evidences)[1:], axis=0)
+    return np.where(odds_against_none(ground.hypotheses, evidences) > needed_from, best, 0)
 
 
 def left_out(ground: Ground, index: int, residual: Floats) -> Floats:
@@ -99,8 +107,30 @@ def log_score(ground: Ground, index: int, residual: Floats) -> float:
 
     A ratio of two restricted densities each, noise and sizes averaged.
     """
+    return float(sum(_log_score_of(ground, index, residual, mode) for mode in range(ground.baseline.n_modes)))
+
+
+def log_score_gains(ground: Ground, residual: Floats, chosen: NDArray[np.intp]) -> Floats:
+    """What each fold's choice adds to the log density of the reading that it left out: (n_modes,) array.
+
+    Parameters
+    ----------
+    ground : Ground
+    residual : (n_modes,) array
+    chosen : (n_modes,) array of int
+        Index of the hypothesis that each fold chose.
+    """
+    gains = np.zeros(len(residual))
+    for mode in np.flatnonzero(chosen):
+        one, none = (_log_score_of(ground, int(index), residual, int(mode)) for index in (chosen[mode], 0))
+        gains[mode] = one - none
+    return gains
+
+
+def _log_score_of(ground: Ground, index: int, residual: Floats, mode: int) -> float:
+    """Log density of one reading given the others, under one hypothesis."""
     hypothesis = ground.hypotheses[index]
     seen = hypothesis.seen(ground.baseline, residual[None, :])
-    whole = hypothesis.terms(ground.whole).log_evidence(seen)[0]
-    folds = (Fold(ground.baseline, mode) for mode in range(ground.baseline.n_modes))
-    return float(sum(whole - hypothesis.terms(fold).log_evidence(seen)[0] for fold in folds))
+    fold = Fold(ground.baseline, mode)
+    whole, without = (hypothesis.terms(one).log_evidence(seen)[0] for one in (ground.whole, fold))
+    return float(whole - without)

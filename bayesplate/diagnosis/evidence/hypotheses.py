@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
-from bayesplate.diagnosis.evidence.terms import Fold, Terms, normalised
+from bayesplate.diagnosis.evidence.terms import Fold, Terms, log_sum, normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.tables import Table, nothing, together
 
@@ -108,10 +108,10 @@ def hypotheses(
 
 
 def confusable(baseline: Baseline) -> tuple[Swap, ...]:
-    """Neighbouring readings of one setup that belong to different symmetry classes and lie close together.
+    """Neighbouring readings of one setup that lie close together and whose labels may be each other's.
 
-    Within a class exchanging two labels changes nothing: a label means the rank within its class, and the lower reading
-    is the lower mode whatever it is called.
+    Either they belong to different symmetry classes; or to one, and stand in the other order than the modes of the
+    fitted plate, which an effect that mixes the two may cause as well as a slip.
     """
     readings = baseline.residual + baseline.log_frequency
     swaps = []
@@ -120,7 +120,8 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
         ordered = members[np.argsort(readings[members])]
         for first, second in pairwise(ordered):
             differ = baseline.places[first].parity != baseline.places[second].parity
-            if differ and readings[second] - readings[first] < CLOSE:
+            crossed = baseline.log_frequency[first] > baseline.log_frequency[second]
+            if (differ or crossed) and readings[second] - readings[first] < CLOSE:
                 swaps.append(Swap(int(first), int(second)))
     return tuple(swaps)
 
@@ -132,6 +133,17 @@ def log_evidences(found: Sequence[Hypothesis], fold: Fold, residuals: Floats) ->
 
 def probabilities(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
     """Posterior probabilities, summing to one over the hypotheses: same shape as the evidences."""
+    return normalised(_joint(found, evidences))
+
+
+def odds_against_none(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
+    """ln of the odds that something is lacking against that nothing is: one per data set."""
+    total = _joint(found, evidences)
+    if len(total) == 1:
+        return np.full(total.shape[1:], -np.inf)
+    return np.asarray(log_sum(total[1:]) - total[0])
+
+
+def _joint(found: Sequence[Hypothesis], evidences: Floats) -> Floats:
     log_prior = np.log([one.prior for one in found])
-    total = evidences + log_prior.reshape(-1, *([1] * (evidences.ndim - 1)))
-    return normalised(total)
+    return np.asarray(evidences + log_prior.reshape(-1, *([1] * (evidences.ndim - 1))))

@@ -7,15 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.folds import NEEDED, nested
-from bayesplate.diagnosis.evidence.hypotheses import log_evidences, probabilities
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.terms import Terms, normalised
+from bayesplate.diagnosis.evidence.folds import ALWAYS, CERTAINLY_NEEDED, nested
+from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none
+from bayesplate.diagnosis.evidence.search import Ground
 
 Floats = NDArray[np.float64]
 
 N_SETS = 500
-CLAIM_QUANTILE = 0.05
+FALSE_ALARMS = 0.02
+"""Share of boards without any effect on which one is called needed."""
+BY_CHANCE = 0.05
+"""Share of such boards, each made to choose an effect, whose left-out error falls further than a claim needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,45 +26,47 @@ class NullControl:
 
     Attributes
     ----------
-    gain : (n_sets,) array
-        Log of the evidence for the best effect over that for none; the prior shares included.
+    against : (n_sets,) array
+        ln odds that something is lacking against that nothing is.
     ratio : (n_sets,) array or None
-        Nested leave-one-out rms after over before; None with too few readings.
-    flagged : float
-        Share of the sets in which no effect had a probability below one tenth.
+        Nested leave-one-out rms after over before, every fold made to choose its most probable effect; None with too
+        few readings.
     """
 
-    gain: Floats
+    against: Floats
     ratio: Floats | None
-    flagged: float
 
-    def percentile_of_gain(self, gain: float) -> float:
-        """Share of null sets whose gain is smaller, percent."""
-        return 100.0 * float(np.mean(self.gain < gain))
+    @property
+    def needed_from(self) -> float:
+        """ln odds against no effect above which one is needed: those of the false alarms, or of certainty if less."""
+        return min(float(np.quantile(self.against, 1.0 - FALSE_ALARMS)), CERTAINLY_NEEDED)
+
+    @property
+    def flagged(self) -> float:
+        """Share of the sets in which an effect would be called needed."""
+        return float(np.mean(self.against > self.needed_from))
 
     @property
     def ratio_to_beat(self) -> float | None:
-        """The nested ratio that chance selection stays above in 95 of 100 null sets."""
-        return None if self.ratio is None else float(np.quantile(self.ratio, CLAIM_QUANTILE))
+        """The nested ratio that an effect chosen by chance stays above in 95 of 100 null sets."""
+        return None if self.ratio is None else float(np.quantile(self.ratio, BY_CHANCE))
+
+    def percentile_of(self, against: float) -> float:
+        """Share of null sets with smaller odds against no effect, percent."""
+        return 100.0 * float(np.mean(self.against < against))
+
+    def place_of(self, ratio: float) -> float | None:
+        """Share of null sets with a larger nested ratio, percent."""
+        return None if self.ratio is None else 100.0 * float(np.mean(self.ratio > ratio))
 
 
-def gain(log_evidence: Floats, priors: Floats) -> Floats:
-    """Log posterior odds of the best effect against none: (n_sets,) array from (n_hypotheses, n_sets)."""
-    total = log_evidence + np.log(priors)[:, None]
-    if len(total) == 1:
-        return np.full(total.shape[1], -np.inf)
-    return np.asarray(total[1:].max(axis=0) - total[0])
-
-
-def null_control(found: Found, rng: np.random.Generator, n_sets: int = N_SETS) -> NullControl:
-    """Simulate readings from the fit without an effect and search each of them.
-
-    Noise levels are drawn from their posterior under that fit, inputs from their priors; the constants need no drawing,
-    for the search does not see them.
+def null_control(ground: Ground, rng: np.random.Generator, n_sets: int = N_SETS) -> NullControl:
+    """Simulate readings of a board without any effect and search each of them.
 
     Parameters
     ----------
-    found : Found
+    ground : Ground
+        What the board at hand says does not matter, only its sizes, its modes and its priors do.
     rng : numpy.random.Generator
     n_sets : int
 
@@ -70,25 +74,22 @@ def null_control(found: Found, rng: np.random.Generator, n_sets: int = N_SETS) -
     -------
     NullControl
     """
-    ground = found.ground
-    residuals = simulate_null(found, rng, n_sets)
-    evidences = log_evidences(ground.hypotheses, ground.whole, residuals)
-    shares = probabilities(ground.hypotheses, evidences)
-    folded = nested(ground, residuals)
+    residuals = simulate_null(ground, rng, n_sets)
+    folded = nested(ground, residuals, ALWAYS)
     return NullControl(
-        gain=gain(evidences, np.array([one.prior for one in ground.hypotheses])),
+        against=odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, residuals)),
         ratio=None if folded is None else folded.ratio,
-        flagged=float(np.mean(shares[0] < NEEDED)),
     )
 
 
-def simulate_null(found: Found, rng: np.random.Generator, n_sets: int) -> Floats:
-    """Residuals of readings without any effect: (n_sets, n_modes) array, ln f."""
-    ground, baseline = found.ground, found.ground.baseline
-    bare = ground.hypotheses[0]
-    terms = Terms(bare.table, ground.whole, bare.noise)
-    log_density = terms.log_densities(found.residual[None, :])[:, 0]
-    level = rng.choice(len(log_density), size=n_sets, p=normalised(log_density))
-    sd = np.sqrt(bare.noise.sd[level][:, baseline.setup_index] ** 2 + baseline.own_variance)
+def simulate_null(ground: Ground, rng: np.random.Generator, n_sets: int) -> Floats:
+    """Residuals of readings without any effect: (n_sets, n_modes) array, ln f.
+
+    Noise levels and inputs are drawn from their priors; the constants need no drawing, for the search does not see
+    them.
+    """
+    baseline = ground.baseline
+    noise = [setup.noise.value(rng.standard_normal(n_sets)) for setup in baseline.board.setups]
+    sd = np.sqrt(np.stack(noise, axis=1)[:, baseline.setup_index] ** 2 + baseline.own_variance)
     inputs = rng.standard_normal((n_sets, baseline.input_slopes.shape[1]))
     return np.asarray(sd * rng.standard_normal(sd.shape) + inputs @ baseline.input_slopes.T)

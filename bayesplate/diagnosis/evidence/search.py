@@ -126,6 +126,12 @@ class Found:
         """Probability that nothing is lacking."""
         return float(self.probability[0])
 
+    @property
+    def against_none(self) -> float:
+        """ln of the odds that something is lacking against that nothing is."""
+        with np.errstate(divide="ignore"):
+            return float(np.log(self.probability[1:].sum()) - np.log(self.probability[0]))
+
     def inclusion(self, name: str) -> float:
         """Probability that an effect is present, alone or with another."""
         present = [name in one.members for one in self.ground.hypotheses]

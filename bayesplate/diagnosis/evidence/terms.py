@@ -143,7 +143,7 @@ class Terms:
 
     def log_evidence(self, residuals: Floats) -> Floats:
         """Logarithm of the restricted marginal density of data sets: (n_sets,) array."""
-        return np.asarray(_log_sum(self.log_densities(residuals)) - self.fold.half_log_det)
+        return np.asarray(log_sum(self.log_densities(residuals)) - self.fold.half_log_det)
 
     def left_out_errors(self, residuals: Floats) -> Floats:
         """Reading that was left out less its mean prediction: (n_sets,) array, ln f."""
@@ -173,7 +173,8 @@ class Terms:
         return np.einsum("kdp,lkde->lkpe", spread, precision).reshape(n_levels, -1, p, d)
 
 
-def _log_sum(values: Floats) -> Floats:
+def log_sum(values: Floats) -> Floats:
+    """ln of the sum of exponentials over the first axis."""
     top = values.max(axis=0)
     return np.asarray(top + np.log(np.exp(values - top).sum(axis=0)))
 

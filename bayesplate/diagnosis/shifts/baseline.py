@@ -153,8 +153,16 @@ def weighted_rms(shift: Floats, scales: Floats) -> float:
     return float(np.sqrt(np.average(shift**2, weights=1.0 / scales**2)))
 
 
-def baseline_at(board: Board, estimate: Estimate) -> Baseline:
-    """The baseline of a board whose inputs are exact, at its least-squares estimate."""
+def baseline_at(board: Board, estimate: Estimate, predict: Predict | None = None) -> Baseline:
+    """The baseline of a board whose inputs are exact, at its least-squares estimate.
+
+    Parameters
+    ----------
+    board : Board
+    estimate : Estimate
+    predict : callable, optional
+        The exact law without effects: (n, n_modes) ln f (Hz) from (n, 3) ln D; by default it is linear.
+    """
     if Parameters(board).inputs:
         raise ValueError("wanted a board of exact inputs, got uncertain ones: pose the problem instead")
     return Baseline(
@@ -167,6 +175,7 @@ def baseline_at(board: Board, estimate: Estimate) -> Baseline:
         input_slopes=np.zeros((estimate.residuals.size, 0)),
         places=places_of(estimate.models),
         symmetry=symmetry_of(estimate.models),
+        predict=predict,
     )
 
 

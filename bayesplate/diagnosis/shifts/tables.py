@@ -53,6 +53,8 @@ class Table:
         Which form of the effect; of the first one where there are two.
     z : (n_cells, n_parameters) array
         Standard coordinates of the first effect's parameters.
+    z_slopes : (n_cells, n_parameters) array
+        Their change over one standard deviation of the cell.
     """
 
     members: tuple[str, ...]
@@ -63,6 +65,7 @@ class Table:
     moved_slopes: Floats
     form: NDArray[np.intp]
     z: Floats
+    z_slopes: Floats
 
     @property
     def n_cells(self) -> int:
@@ -98,6 +101,7 @@ def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: tupl
         moved_slopes=np.concatenate([part.moved_slopes for part in padded]),
         form=np.concatenate([part.form for part in padded]),
         z=np.concatenate([part.z for part in padded]),
+        z_slopes=np.concatenate([part.z_slopes for part in padded]),
     )
 
 
@@ -122,6 +126,7 @@ def together(one: Table, other: Table) -> Table:
         moved_slopes=joined(one.moved_slopes, other.moved_slopes),
         form=np.repeat(one.form, other.n_cells),
         z=np.repeat(one.z, other.n_cells, axis=0),
+        z_slopes=np.repeat(one.z_slopes, other.n_cells, axis=0),
     )
 
 
@@ -136,6 +141,7 @@ def nothing(n_modes: int) -> Table:
         moved_slopes=np.zeros((1, N_RIGIDITIES, 0)),
         form=np.zeros(1, dtype=np.intp),
         z=np.zeros((1, 0)),
+        z_slopes=np.zeros((1, 0)),
     )
 
 
@@ -207,11 +213,12 @@ def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: tup
         moved_slopes=moved_slopes,
         form=np.full(len(z), index),
         z=z,
+        z_slopes=np.tile([_OVERLAP * width for _, width in axes], (len(z), 1)),
     )
     return replace(table, **{key: getattr(table, key)[finite] for key in _PER_CELL})
 
 
-_PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z")
+_PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
 
 
 def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
@@ -245,5 +252,11 @@ def _padded(table: Table, n_tangents: int) -> Table:
     if not more:
         return table
     pad = ((0, 0), (0, 0), (0, more))
-    z = np.pad(table.z, ((0, 0), (0, n_tangents - table.z.shape[1])))
-    return replace(table, slopes=np.pad(table.slopes, pad), moved_slopes=np.pad(table.moved_slopes, pad), z=z)
+    flat = ((0, 0), (0, n_tangents - table.z.shape[1]))
+    return replace(
+        table,
+        slopes=np.pad(table.slopes, pad),
+        moved_slopes=np.pad(table.moved_slopes, pad),
+        z=np.pad(table.z, flat),
+        z_slopes=np.pad(table.z_slopes, flat),
+    )

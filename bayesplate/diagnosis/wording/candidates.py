@@ -59,6 +59,8 @@ class EffectEntry:
     p_value : float or None
     amplitude : Amplitude or None
         None if it has no size.
+    learnt_bits : dict of float
+        How far the posterior of each of its sizes left the prior, by parameter.
     look_alikes : tuple of str
     rejected_because : str or None
         None if it is part of the verdict.
@@ -79,6 +81,7 @@ class EffectEntry:
     ockham_log_factor: float
     p_value: float | None
     amplitude: Amplitude | None
+    learnt_bits: Mapping[str, float]
     look_alikes: tuple[str, ...]
     rejected_because: str | None
     fate: Fate = field(metadata=NOT_IN_JSON)

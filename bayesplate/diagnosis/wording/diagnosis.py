@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from bayesplate.diagnosis.decision.claim import Condition
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry
 from bayesplate.results.contract import NOT_IN_JSON, Spread, as_json
@@ -54,15 +55,19 @@ class NullControlSummary:
     ----------
     n_sets : int
     flagged_percent : float
-        Share of the sets in which no effect at all had a probability below one tenth.
+        Share of the sets in which an effect would be called needed.
     nested_ratio, nested_ratio_to_beat : float or None
-        Nested error after over before of these readings, and what chance alone stays above in 95 of 100 sets.
+        Nested error after over before of these readings, and what 95 of 100 sets stay above that are made to choose
+        their most probable effect.
+    nested_ratio_percentile : float or None
+        Share of the sets with a larger ratio than these readings, percent.
     """
 
     n_sets: int
     flagged_percent: float
     nested_ratio: float | None
     nested_ratio_to_beat: float | None
+    nested_ratio_percentile: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +135,8 @@ class Diagnosis:
         "none needed", "named", "indistinguishable group", "unexplained" or "undetectable".
     claim : bool
         Whether it may be said that the error is reduced.
+    conditions : tuple of Condition
+        What that rests on; empty where nothing was added.
     effects : tuple of str
         Named: all of them are present. Group: each is an alternative.
     words : str
@@ -143,13 +150,14 @@ class Diagnosis:
         What each of `effects` is.
     declared : tuple of str
         Effects that were part of the model from the beginning.
-    probability_of_none, probability_of_none_with_doubled_priors : float
+    probability_of_none : float
+    probability_of_none_with_halved_priors, probability_of_none_with_doubled_priors : float
     p_value : PValues
     before, after : Errors
         The same where nothing was added.
     gain_null_percentile : float or None
-        Share of simulated boards without any effect on which the search gains less, percent; None where no readings
-        are left to gain by.
+        Share of simulated boards without any effect with smaller odds against no effect, percent; None where no
+        readings are left to judge by.
     null_control : NullControlSummary
     elastic_shift : dict of ElasticShift
         By modulus.
@@ -171,6 +179,7 @@ class Diagnosis:
     card_sha256: str
     verdict: Word
     claim: bool
+    conditions: tuple[Condition, ...]
     effects: tuple[str, ...]
     words: str = field(metadata=NOT_IN_JSON)
     refitted: tuple[str, ...]
@@ -179,6 +188,7 @@ class Diagnosis:
     sentences: tuple[str, ...]
     declared: tuple[str, ...]
     probability_of_none: float
+    probability_of_none_with_halved_priors: float
     probability_of_none_with_doubled_priors: float
     p_value: PValues
     before: Errors

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, size_posterior
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
 from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
@@ -55,6 +55,7 @@ def effect_entry(
         ockham_log_factor=gained - best_fit,
         p_value=p_value_of(found, index),
         amplitude=_amplitude(found, index, one),
+        learnt_bits=_learnt(found, index, one),
         look_alikes=tuple(
             other
             for other in ground.candidates
@@ -68,7 +69,7 @@ def effect_entry(
 def exchange_entries(found: Found, verdict: Verdict, ranked: Sequence[Answer]) -> tuple[ExchangeEntry, ...]:
     """Exchanged labels, as one candidate each."""
     ground = found.ground
-    taken = {one.index for one in accepted(found, verdict)}
+    taken = {one.index for one in verdict.stands_for}
     labels = [f"{label}" for setup in ground.baseline.board.setups for label in setup.labels]
     entries = []
     for i, one in enumerate(ground.hypotheses):
@@ -134,15 +135,40 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
     """
     if not one.laws[0].form.free:
         return _fixed(one)
-    shares = [size_posterior(found, index, 0, form, 0) for form in range(len(one.laws))]
-    best = int(np.argmax([share.sum() for share, _ in shares]))
+    best = _likely_form(found, index, one)
     free = one.laws[best].form.free[0]
-    share, z = shares[best]
+    share, z = size_posterior(found, index, 0, best, 0)
     order = np.argsort(z)
     cumulated = np.cumsum(share[order]) - 0.5 * share[order]
     quantiles = np.interp([0.05, 0.5, 0.95], cumulated / share.sum(), z[order])
     low, middle, high = (float(free.prior.value(q)) for q in quantiles)
     return Amplitude(parameter=free.key, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit)
+
+
+def _likely_form(found: Found, index: int, one: Candidate) -> int:
+    """Which form of an effect is most probable."""
+    if not all(law.form.free for law in one.laws):
+        return 0
+    shares = [size_posterior(found, index, 0, form, 0)[0].sum() for form in range(len(one.laws))]
+    return int(np.argmax(shares))
+
+
+def _learnt(found: Found, index: int, one: Candidate) -> dict[str, float]:
+    """How far the posterior of each size left its prior, given that the effect is there: bits, by parameter.
+
+    Of the most probable form. A size of which nothing is learnt says nothing against its null value either.
+    """
+    table = found.ground.hypotheses[index].table
+    form = _likely_form(found, index, one)
+    prior = table.weights[table.form == form]
+    result = {}
+    for i, free in enumerate(one.laws[form].form.free):
+        share, z = size_posterior(found, index, 0, form, i)
+        _, cells = np.unique(z, return_inverse=True)
+        after, before = (np.bincount(cells, weights=part / part.sum()) for part in (share, prior))
+        seen = after > 0.0
+        result[free.key] = float(np.sum(after[seen] * np.log2(after[seen] / before[seen])))
+    return result
 
 
 def _fixed(one: Candidate) -> Amplitude | None:

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, p_words
-from bayesplate.diagnosis.evidence.folds import NEEDED
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.wording.candidates import Fate
+
+_LIKELY = 0.1
+"""Probability from which on an effect that is hardly visible by itself is told as any other."""
 
 Told = tuple[Fate, str | None]
 """What became of a candidate, and the reason; None for what was not rejected."""
@@ -31,10 +33,14 @@ def fate_of(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str,
     """
     if name in verdict.effects:
         return "in the verdict", None
-    is_needed = found.none < NEEDED
-    if is_needed and verdict.word == "unexplained" and verdict.best is not None and name in verdict.best.members:
+    if (
+        verdict.is_needed
+        and verdict.word == "unexplained"
+        and verdict.best is not None
+        and name in verdict.best.members
+    ):
         return "does not fit", verdict.reason
-    if found.ground.is_below_detection_limit(name) and not (is_needed and found.inclusion(name) >= NEEDED):
+    if found.ground.is_below_detection_limit(name) and not (verdict.is_needed and found.inclusion(name) >= _LIKELY):
         return "not detectable", "its visible part is below what these readings could show"
     return _without_need(found, verdict) or _misfit(found, index) or _less_probable(found, ranked, name, index)
 
@@ -50,7 +56,7 @@ def fate_of_exchange(
 
 
 def _without_need(found: Found, verdict: Verdict) -> Told | None:
-    if found.none < NEEDED:
+    if verdict.is_needed:
         return None
     fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
     return fate, f"{fate}: nothing lacking has a probability of {found.none:.2f}"

@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.diagnosis.decision.claim import Claim
 from bayesplate.diagnosis.decision.constants import draw_constants
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, accepted, answer_words, answers
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, answers
+from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
-from bayesplate.diagnosis.evidence.null_control import NullControl, gain
+from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
+from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, inclusion_with_width
 from bayesplate.diagnosis.wording.diagnosis import (
     Diagnosis,
     ElasticShift,
@@ -61,8 +63,8 @@ class Case:
     folded : Nested or None
     before, after : Side
         The same where nothing was added.
-    is_clear_of_zero : bool
-        Whether every effect that was added has a size whose 95 % interval excludes zero.
+    claim : Claim
+        Of the explanation that was fitted again.
     recommendation : str
     finalists : sequence of (Answer, Summary)
         Explanations that were fitted again, best first, each with the summary of its fit.
@@ -77,19 +79,11 @@ class Case:
     folded: Nested | None
     before: Side
     after: Side
-    is_clear_of_zero: bool
+    claim: Claim
     recommendation: str
     finalists: Sequence[tuple[Answer, Summary]] = ()
     drawn: Mapping[int, Draws] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-
-    @property
-    def claim(self) -> bool:
-        """Whether "error reduced" may be said: beyond chance selection, size clear of zero, p-value large enough."""
-        to_beat = self.control.ratio_to_beat
-        if self.verdict.index == 0 or self.folded is None or to_beat is None:
-            return False
-        return bool(float(self.folded.ratio[0]) < to_beat and self.is_clear_of_zero)
 
 
 def diagnosis_of(case: Case) -> Diagnosis:
@@ -104,19 +98,18 @@ def diagnosis_of(case: Case) -> Diagnosis:
     Diagnosis
     """
     found, verdict, control = case.found, case.verdict, case.control
-    priors = np.array([one.prior for one in found.ground.hypotheses])
-    observed = float(gain(found.log_evidence[:, None], priors)[0])
     ranked = answers(found)
-    doubled = inclusion_with_width(found, 2.0)
+    halved, doubled = (inclusion_with_width(found, WIDTHS[word]) for word in ("halved", "doubled"))
     effects = found.ground.candidates.values()
     averaged = _averaged(case)
-    taken = accepted(found, verdict)
+    taken = verdict.stands_for
     return Diagnosis(
         name=case.before.summary.name,
         seed=case.before.summary.seed,
         card_sha256=case.before.summary.card_sha256,
         verdict=verdict.word,
-        claim=case.claim,
+        claim=case.claim.holds,
+        conditions=case.claim.conditions,
         effects=verdict.effects,
         words=_words(case, taken),
         refitted=found.ground.hypotheses[case.after.index].members,
@@ -125,11 +118,12 @@ def diagnosis_of(case: Case) -> Diagnosis:
         sentences=_sentences(case, taken),
         declared=found.ground.baseline.board.effects,
         probability_of_none=found.none,
+        probability_of_none_with_halved_priors=halved[""],
         probability_of_none_with_doubled_priors=doubled[""],
         p_value=PValues(before=p_value_of(found, 0), after=p_value_of(found, verdict.index)),
         before=_errors(case, case.before),
         after=_errors(case, case.after),
-        gain_null_percentile=control.percentile_of_gain(observed) if found.ground.n_directions else None,
+        gain_null_percentile=control.percentile_of(found.against_none) if found.ground.n_directions else None,
         null_control=_null_control(case),
         elastic_shift=_elastic_shift(case),
         finalists=tuple(_finalist(answer, figures) for answer, figures in case.finalists),
@@ -164,11 +158,13 @@ def _errors(case: Case, side: Side) -> Errors:
 
 
 def _null_control(case: Case) -> NullControlSummary:
+    ratio = None if case.folded is None else float(case.folded.ratio[0])
     return NullControlSummary(
-        n_sets=int(case.control.gain.size),
+        n_sets=int(case.control.against.size),
         flagged_percent=100.0 * case.control.flagged,
-        nested_ratio=None if case.folded is None else float(case.folded.ratio[0]),
+        nested_ratio=ratio,
         nested_ratio_to_beat=case.control.ratio_to_beat,
+        nested_ratio_percentile=None if ratio is None else case.control.place_of(ratio),
     )
 
 
@@ -183,15 +179,17 @@ def _elastic_shift(case: Case) -> dict[str, ElasticShift]:
 def _averaged(case: Case) -> dict[str, Spread]:
     """The constants to quote, by name, Pa and N m.
 
-    Averaged over everything that may be the case: by the sampler's draws where a model was sampled, else in the linear
-    approximation of the search. Where nothing explains the readings there is nothing to average over but the first fit.
+    Averaged over everything that may be the case, each by its probability under the exact law: by the sampler's draws
+    where a model was sampled, else by those of the search, weighted for the exact law. Where nothing explains the
+    readings there is nothing to average over but the first fit.
     """
     summary, found = case.before.summary, case.found
     if case.verdict.word == "unexplained":
         return dict((*summary.elastic.items(), *summary.rigidity.items()))
     sampled = {0: case.before.draws, **case.drawn}
     rng = np.random.default_rng([summary.seed, _AVERAGE_LINE])
-    counts = rng.multinomial(_N_AVERAGED, found.probability / found.probability.sum())
+    shares = (under_exact_law(found) or found).probability
+    counts = rng.multinomial(_N_AVERAGED, shares / shares.sum())
     parts = [_constants(found, sampled.get(i), i, rng, int(n)) for i, n in enumerate(counts) if n]
     units = dict.fromkeys(MODULI, "Pa") | dict.fromkeys(RIGIDITIES, "N m")
     return {name: Spread.of(np.concatenate([part[name] for part in parts]), unit) for name, unit in units.items()}

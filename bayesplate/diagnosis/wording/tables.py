@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from bayesplate.diagnosis.wording.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.words import MERITS, MISSING, Merit, names_of, worth_showing
+from bayesplate.diagnosis.wording.words import CONDITIONS, MERITS, MISSING, Merit, names_of, worth_showing
 from bayesplate.effects.words import effect_name
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.tables import Table
@@ -32,6 +32,7 @@ def every_table(diagnosis: Diagnosis) -> tuple[Table, ...]:
         averaged_table(diagnosis),
         answers_table(diagnosis),
         errors_table(diagnosis),
+        claim_table(diagnosis),
         shift_table(diagnosis),
         sizes_table(diagnosis),
         candidates_table(diagnosis, narrow=True),
@@ -48,6 +49,20 @@ def errors_table(diagnosis: Diagnosis) -> Table:
         title, columns = "Error", {"as it is": diagnosis.before}
     rows = tuple((one.title, *(_merit(one, one.of(errors)) for errors in columns.values())) for one in MERITS)
     return Table(f"{title}: {diagnosis.name}", ("", *columns), rows)
+
+
+def claim_table(diagnosis: Diagnosis) -> Table | None:
+    """Each condition of the claim that the error is reduced; None where nothing was added."""
+    if not diagnosis.conditions:
+        return None
+    rows = []
+    for one in diagnosis.conditions:
+        words = CONDITIONS[one.name]
+        wanted = words.wanted.format(limit=words.shown(one.limit))
+        rows.append((words.title, words.shown(one.value), wanted, "yes" if one.is_met else "no"))
+    return Table(
+        "May a lower error be claimed? Only if every condition is met", ("", "found", "wanted", "met"), tuple(rows)
+    )
 
 
 def shift_table(diagnosis: Diagnosis) -> Table | None:

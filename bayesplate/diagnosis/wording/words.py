@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from bayesplate.diagnosis.decision.claim import ConditionName
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Errors
-from bayesplate.effects.words import effect_name
+from bayesplate.effects.words import effect_name, joined
 
 MISSING = "–"
 _UNLIKELY = 0.01
@@ -95,12 +96,47 @@ def claim_sentence(diagnosis: Diagnosis) -> str:
     change, is_gain = _change(diagnosis)
     if not is_gain:
         return f"The {change}. No improvement is claimed."
-    share = diagnosis.gain_null_percentile
-    boards = "of simulated boards without any effect"
-    chance = "" if share is None else f" The evidence gained is larger than on {share:.0f} % {boards}."
     if diagnosis.claim:
-        return f"The error of the prediction is reduced: the {change}.{chance}"
-    return f"The {change}, no more than chance selection may give.{chance} No improvement is claimed."
+        return f"The error of the prediction is reduced: the {change}, and every condition of that claim is met."
+    missed = joined([CONDITIONS[one.name].lacking for one in diagnosis.conditions if not one.is_met])
+    return f"The {change}. No improvement is claimed: {missed}."
+
+
+@dataclass(frozen=True)
+class ConditionWords:
+    """A condition of the claim in words: what it asks for, what to say where it is not met, and its numbers."""
+
+    title: str
+    wanted: str
+    lacking: str
+    digits: str = "{:.2f}"
+
+    def shown(self, value: float | None) -> str:
+        """A number of it as people read it."""
+        return MISSING if value is None else self.digits.format(value)
+
+
+CONDITIONS: dict[ConditionName, ConditionWords] = {
+    "chance selection": ConditionWords(
+        "left-out error after over before",
+        "below {limit}, what 95 of 100 simulated boards without any effect stay above",
+        "an effect chosen by chance may lower the left-out error as much",
+    ),
+    "log score": ConditionWords(
+        "gain in log score of readings left out",
+        "above {limit}, two standard errors",
+        "the readings left out are not predicted better beyond two standard errors",
+    ),
+    "probability of none": ConditionWords(
+        "probability that nothing is lacking, at its largest with the sizes' priors halved or doubled",
+        "below {limit}",
+        "the probability that nothing is lacking is too large",
+        "{:.3f}",
+    ),
+    "prior predictive": ConditionWords(
+        "p-value of the misfit that is left", "at least {limit}", "the misfit that is left is too large", "{:.3f}"
+    ),
+}
 
 
 def _change(diagnosis: Diagnosis) -> tuple[str, bool]:

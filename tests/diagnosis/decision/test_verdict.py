@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, ground_of
+from made_searches import bare, baseline, candidate, decided, ground_of
 
-from bayesplate.diagnosis.decision.verdict import alternatives, answers, at_limit, decide
+from bayesplate.diagnosis.decision.verdict import alternatives, answers, at_limit
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.sensitivity import Variant
 from bayesplate.diagnosis.shifts.tables import nothing, together
 from bayesplate.quantities import Quantity
 
@@ -52,41 +54,41 @@ def large(base):
 
 
 def test_none_needed(base):
-    verdict = decide(found_with(base, {(): 0.1, ("a",): 0.9}, residual=NOTHING))
+    verdict = decided(found_with(base, {(): 0.1, ("a",): 0.9}, residual=NOTHING))
     assert verdict.word == "none needed"
     assert (verdict.effects, verdict.index) == ((), 0)
     assert verdict.best.members == ("a",)
 
 
 def test_undetectable_if_every_effect_is_below_sight(base):
-    assert decide(found_with(base, {(): 0.5, ("a",): 0.5}, size=1e-4, residual=NOTHING)).word == "undetectable"
+    assert decided(found_with(base, {(): 0.5, ("a",): 0.5}, size=1e-4, residual=NOTHING)).word == "undetectable"
 
 
 def test_unexplained_if_the_bare_model_fails_and_no_effect_is_probable_enough(base):
-    verdict = decide(found_with(base, {(): 0.1, ("a",): 0.9}, residual=large(base)))
+    verdict = decided(found_with(base, {(): 0.1, ("a",): 0.9}, residual=large(base)))
     assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
 
 
 def test_the_bound_for_none_is_a_tenth(base):
-    assert decide(found_with(base, {(): 0.0999, ("a",): 0.9001})).word == "named"
-    assert decide(found_with(base, {(): 0.1, ("a",): 0.9})).word != "named"
+    assert decided(found_with(base, {(): 0.0999, ("a",): 0.9001})).word == "named"
+    assert decided(found_with(base, {(): 0.1, ("a",): 0.9})).word != "named"
 
 
 def test_unexplained_if_the_winner_fails_the_gate(base):
     found = found_with(base, {("a",): 1.0}, residual=large(base))
     assert found.p_value(1) < PASSES
-    verdict = decide(found)
+    verdict = decided(found)
     assert (verdict.word, verdict.effects, verdict.index) == ("unexplained", (), 0)
     assert "p < 0.001" in verdict.reason
 
 
 def test_named_from_three_times_the_next_on(base):
-    verdict = decide(found_with(base, {("a",): 0.75, ("b",): 0.25}))
+    verdict = decided(found_with(base, {("a",): 0.75, ("b",): 0.25}))
     assert (verdict.word, verdict.effects, verdict.index) == ("named", ("a",), 1)
 
 
 def test_a_group_below_three_times_the_next(base):
-    verdict = decide(found_with(base, {("a",): 0.70, ("b",): 0.27, ("c",): 0.03}))
+    verdict = decided(found_with(base, {("a",): 0.70, ("b",): 0.27, ("c",): 0.03}))
     assert verdict.word == "indistinguishable group"
     assert verdict.effects == ("a", "b")
     assert verdict.index == 1
@@ -95,13 +97,13 @@ def test_a_group_below_three_times_the_next(base):
 def test_a_group_holds_what_is_within_a_factor_ten(base):
     within = found_with(base, {("a",): 0.60, ("b",): 0.33, ("c",): 0.061})
     beyond = found_with(base, {("a",): 0.60, ("b",): 0.33, ("c",): 0.059})
-    assert decide(within).effects == ("a", "b", "c")
-    assert decide(beyond).effects == ("a", "b")
+    assert decided(within).effects == ("a", "b", "c")
+    assert decided(beyond).effects == ("a", "b")
     assert [one.members for one in alternatives(beyond, answers(beyond))] == [("a",), ("b",)]
 
 
 def test_a_pair_stands_for_itself_from_three_times_its_better_member_on(base):
-    verdict = decide(found_with(base, {("a",): 0.2, ("b",): 0.1, PAIR: 0.7}))
+    verdict = decided(found_with(base, {("a",): 0.2, ("b",): 0.1, PAIR: 0.7}))
     assert (verdict.word, verdict.effects, verdict.index) == ("named", PAIR, 5)
 
 
@@ -110,14 +112,14 @@ def test_a_pair_below_that_counts_for_its_better_member(base):
     best = answers(found)[0]
     assert (best.members, best.index) == (("a",), 1)
     assert best.support == pytest.approx(0.85)
-    assert decide(found).effects == ("a",)
+    assert decided(found).effects == ("a",)
     assert sum(one.support for one in answers(found)) == pytest.approx(1.0)
 
 
 def test_exchanged_labels_can_win(base):
     swap = Swap(1, 2)
     mixed = swap.applied(base, np.zeros((1, 6)))[0]
-    verdict = decide(found_with(base, {SWAPPED: 0.9, ("a",): 0.1}, residual=mixed))
+    verdict = decided(found_with(base, {SWAPPED: 0.9, ("a",): 0.1}, residual=mixed))
     assert (verdict.word, verdict.effects, verdict.index) == ("named", SWAPPED, 4)
 
 
@@ -128,7 +130,7 @@ def test_a_size_at_the_limit_of_its_range_is_never_named(base, z, limited):
     of_a = found.ground.candidates["a"]
     cell = int(np.argmin(np.abs(of_a.fine.z[:, 0] - z)))
     found = replace(found, residual=of_a.fine.shift[cell])
-    verdict = decide(found)
+    verdict = decided(found)
     assert bool(at_limit(found, 1)) is limited
     assert verdict.word == ("unexplained" if limited else "named")
     assert ("limit" in verdict.reason) is limited
@@ -149,9 +151,47 @@ def test_a_size_at_its_limit_is_found_in_a_pair_too(base):
 def test_without_candidates_there_is_nothing_to_name(base):
     ground = ground_of(base, bare(base, noise_grid(base.board)))
     calm = Found(ground, NOTHING, np.zeros(1), np.ones(1))
-    assert decide(calm).word == "none needed"
-    assert decide(calm).best is None
-    assert decide(replace(calm, residual=large(base))).word == "unexplained"
+    assert decided(calm).word == "none needed"
+    assert decided(calm).best is None
+    assert decided(replace(calm, residual=large(base))).word == "unexplained"
+
+
+def test_needed_is_what_the_null_simulations_do_not_reach(base):
+    """Odds against no effect of two to one: beyond 98 % of the null sets, or within them."""
+    found = found_with(base, {(): 1 / 3, ("a",): 2 / 3})
+    calm, loud = (NullControl(np.linspace(-4.0, top, 101), None) for top in (0.0, 2.0))
+    assert decided(found, calm).word == "named"
+    assert decided(found, calm).is_needed
+    assert decided(found, loud).word != "named"
+    assert not decided(found, loud).is_needed
+
+
+def turned(base, probability, words="if the noise is larger"):
+    return Variant(words, found_with(base, probability))
+
+
+def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_into(base):
+    """Unless it stays three times as probable as every other there."""
+    found = found_with(base, {("a",): 0.9, ("b",): 0.06, ("c",): 0.04})
+    stays = turned(base, {("a",): 0.75, ("b",): 0.25})
+    changes = turned(base, {("a",): 0.70, ("b",): 0.28, ("c",): 0.02})
+    assert decided(found, others=[stays]).word == "named"
+    assert decided(found, others=[stays]).stands_for == (answers(found)[0],)
+    told = decided(found, others=[stays, changes])
+    assert (told.word, told.effects, told.index) == ("indistinguishable group", ("a", "b"), 1)
+    assert [(one.members, round(one.support, 6)) for one in told.stands_for] == [(("a",), 0.9), (("b",), 0.06)]
+    assert told.reason == "if the noise is larger b may be as probable"
+    gone = turned(base, {(): 0.2, ("c",): 0.8})
+    assert decided(found, others=[gone]).effects == ("a", "c")
+
+
+def test_the_searches_that_a_name_has_to_survive_are_made_only_for_a_name(base):
+    def refused():
+        raise AssertionError("nothing is named")
+        yield
+
+    group = found_with(base, {("a",): 0.5, ("b",): 0.5})
+    assert decided(group, others=refused()).word == "indistinguishable group"
 
 
 def test_only_the_five_words(base):
@@ -159,6 +199,6 @@ def test_only_the_five_words(base):
     for _ in range(40):
         shares = rng.dirichlet(np.full(6, 0.3))
         members = [(), ("a",), ("b",), ("c",), SWAPPED, PAIR]
-        verdict = decide(found_with(base, dict(zip(members, shares, strict=True))))
+        verdict = decided(found_with(base, dict(zip(members, shares, strict=True))))
         assert verdict.word in WORDS
         assert bool(verdict.effects) == (verdict.word in ("named", "indistinguishable group")) == bool(verdict.index)

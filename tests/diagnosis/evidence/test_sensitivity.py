@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level
 
 from bayesplate.diagnosis.decision.constants import draw_constants
-from bayesplate.diagnosis.decision.refits import excludes_zero
+from bayesplate.diagnosis.evidence.folds import ALWAYS, nested
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.null_control import gain, null_control, simulate_null
+from bayesplate.diagnosis.evidence.null_control import FALSE_ALARMS, NullControl, null_control, simulate_null
 from bayesplate.diagnosis.evidence.search import Found, search
-from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
+from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width, variants, varied
 from bayesplate.diagnosis.evidence.terms import Fold, Terms
-from bayesplate.diagnosis.shifts.forms import Form
-from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.quantities import Quantity
 
 
@@ -92,50 +89,84 @@ def test_constants_are_those_of_a_direct_regression():
     assert abs(np.sqrt(row @ spread @ row) / sd[2] - 1.0) > 0.05
 
 
-def test_simulated_nulls_have_the_noise_of_the_fit(small):
+def test_simulated_nulls_have_the_noise_of_its_prior(small):
+    """Log-normal: ln of the mean square over a set is far wider than where the noise is known."""
     ground, _ = small
-    base = ground.baseline
-    found = search(ground, 0.02 * np.random.default_rng(4).standard_normal(6))
-    terms = Terms(ground.hypotheses[0].table, ground.whole, ground.hypotheses[0].noise)
-    shares = np.exp(terms.log_densities(found.residual[None, :])[:, 0])
-    levels = noise_grid(base.board).sd[:, 0]
-    expected = float(shares @ levels**2 / shares.sum())
-    simulated = simulate_null(found, np.random.default_rng(5), 20_000)
-    fourth = float(3.0 * shares @ levels**4 / shares.sum())
-    error = np.sqrt((fourth - expected**2) / 20_000)
-    assert np.abs(simulated.var(axis=0) - expected).max() < 4.0 * error
-    assert np.abs(simulated.mean(axis=0)).max() < 4.0 * np.sqrt(expected / 20_000)
+    (setup,) = ground.baseline.board.setups
+    n_sets = 20_000
+    simulated = simulate_null(ground, np.random.default_rng(5), n_sets)
+    squares = np.log(np.mean(simulated**2, axis=1))
+    known = np.log(np.mean(np.random.default_rng(6).standard_normal((n_sets, 6)) ** 2, axis=1))
+    variance = known.var() + (2.0 * setup.noise.log_sd) ** 2
+    assert squares.var() == pytest.approx(variance, rel=5.0 * np.sqrt(2.0 / n_sets))
+    assert known.var() < 0.7 * variance  # control
+    expected = setup.noise.median**2 * np.exp(2.0 * setup.noise.log_sd**2)
+    assert np.abs(simulated.mean(axis=0)).max() < 4.0 * np.sqrt(expected / n_sets)
 
 
 def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_there_is(small):
     ground, one = small
     rng = np.random.default_rng(6)
-    calm = null_control(search(ground, 0.005 * rng.standard_normal(6)), rng, 500)
-    assert calm.gain.shape == (500,)
-    assert calm.flagged < 0.1
-    assert calm.ratio_to_beat <= 1.0
-    priors = np.array([h.prior for h in ground.hypotheses])
+    calm = null_control(ground, rng, 1000)
+    assert calm.against.shape == calm.ratio.shape == (1000,)
+    assert calm.flagged <= FALSE_ALARMS
+    assert np.mean(calm.against > calm.needed_from) == pytest.approx(calm.flagged)
     there = search(ground, 1.5 * one.visible + 0.001 * rng.standard_normal(6))
-    strong = float(gain(there.log_evidence[:, None], priors)[0])
-    assert strong == pytest.approx(np.log(there.probability[1] / there.probability[0]))
-    assert calm.percentile_of_gain(strong) > 95.0
+    assert there.against_none == pytest.approx(np.log(there.probability[1] / there.probability[0]))
+    assert calm.percentile_of(there.against_none) > 95.0
+    assert calm.percentile_of(-np.inf) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("values", "clear"),
-    [
-        (np.abs(np.random.default_rng(7).standard_normal(4000)), False),
-        (5.0 + np.random.default_rng(7).standard_normal(4000), True),
-        (-5.0 + np.random.default_rng(7).standard_normal(4000), True),
-        (1.5 + np.random.default_rng(7).standard_normal(4000), False),
-    ],
-)
-def test_a_size_is_clear_of_zero_only_if_its_interval_is(values, clear):
-    size = Parameter("size", BOARD, Quantity.from_mean(0.0, 1.0, "normal"), "1", 0.0, effect="a")
-    form = Form("a", "", None, (size,))
-    draws = SimpleNamespace(inputs={"a.size": values.reshape(4, -1)})
-    assert excludes_zero(None, (form,), draws) is clear
+def test_what_is_needed_begins_at_the_false_alarm_rate_or_at_certainty():
+    """Of a hundred null sets two lie above; a control full of alarms does not ask for more than a tenth's odds."""
+    even = NullControl(np.linspace(-3.0, 0.0, 101), None)
+    assert np.sum(even.against > even.needed_from) == 2
+    assert NullControl(np.full(100, 9.0), None).needed_from == pytest.approx(np.log(9.0))
 
 
-def test_an_effect_of_known_size_cannot_be_zero():
-    assert excludes_zero(None, (Form("a", "", None, ()),), SimpleNamespace(inputs={}))
+def test_null_sets_are_made_to_choose(small):
+    """Else hardly any would, and the ratio of those that choose nothing is one."""
+    ground, _ = small
+    residuals = simulate_null(ground, np.random.default_rng(7), 400)
+    forced, free = nested(ground, residuals, ALWAYS), nested(ground, residuals)
+    assert np.all(forced.chosen == 1)
+    assert np.mean(free.chosen == 0) > 0.8
+    control = null_control(ground, np.random.default_rng(7), 400)
+    np.testing.assert_allclose(control.ratio, forced.ratio)
+    assert control.ratio_to_beat < 1.0 < np.quantile(control.ratio, 0.95)
+    assert control.ratio_to_beat == pytest.approx(np.quantile(forced.ratio, 0.05))
+    assert control.place_of(control.ratio_to_beat) == pytest.approx(95.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("change", "prior"), [({"width": 0.5}, "width"), ({"width": 2.0}, "width"),
+                                               ({"noise": 1.5}, "noise")])  # fmt: skip
+def test_a_variant_is_the_search_with_that_prior(change, prior):
+    """The same as a search whose candidate was made with the other prior, or whose card has another noise."""
+    base = baseline(np.random.default_rng(1))
+    direction = 0.03 * np.random.default_rng(2).standard_normal(6)
+    residual = 0.02 * np.random.default_rng(3).standard_normal(6)
+
+    def searched(sd: float, noise: float):
+        one = candidate(base, "a", direction, Quantity.from_mean(0.0, sd, "normal"), n_cells=99)
+        levels = noise_grid(base.board)
+        levels = replace(levels, sd=noise * levels.sd)
+        ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels), candidates={"a": one})
+        return search(ground, residual)
+
+    usual = searched(1.0, 1.0)
+    wanted = searched(change.get("width", 1.0), change.get("noise", 1.0))
+    found = varied(usual, **change)
+    assert found.none == pytest.approx(wanted.none, rel=0.02)
+    np.testing.assert_allclose(found.log_evidence, wanted.log_evidence, atol=0.05)
+    assert np.abs(found.log_evidence - usual.log_evidence).max() > 0.2  # control: the prior matters
+
+
+def test_a_name_has_to_survive_widths_and_noises(small):
+    ground, _ = small
+    found = search(ground, 0.01 * np.random.default_rng(3).standard_normal(6))
+    told = list(variants(found))
+    assert [one.words for one in told] == [
+        "with the priors of the sizes halved", "with the priors of the sizes doubled",
+        "if the noise is 1.5 times smaller", "if the noise is 1.5 times larger",
+    ]  # fmt: skip
+    assert len({round(one.found.none, 6) for one in told} | {round(found.none, 6)}) == 5

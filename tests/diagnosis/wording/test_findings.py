@@ -8,15 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from diagnoses import spread
-from made_searches import NOISE, bare, baseline, candidate, ground_of
+from made_searches import NOISE, bare, baseline, candidate, decided, ground_of
 from made_summaries import SUMMARY
 
-from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, answers, decide
+from bayesplate.diagnosis.decision.claim import Claim, Condition
+from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, answers
 from bayesplate.diagnosis.evidence.folds import Nested, nested
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, search
+from bayesplate.diagnosis.evidence.terms import Terms
 from bayesplate.diagnosis.shifts.tables import nothing
 from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
@@ -64,7 +66,7 @@ def made(probability, size=0.05, residual=None, n_modes=6):
 
 
 def entries(found: Found) -> dict[str, EffectEntry]:
-    verdict, ranked = decide(found), answers(found)
+    verdict, ranked = decided(found), answers(found)
     told = [effect_entry(found, verdict, ranked, one, 0.5) for one in found.ground.candidates.values()]
     return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict, ranked)[0]}
 
@@ -77,11 +79,11 @@ def draws_of(predictive: np.ndarray, E_x: float = 10e9) -> SimpleNamespace:
 
 
 def case_of(found: Found, control: NullControl, folded: Nested | None, **changed) -> Case:
-    verdict = decide(found)
+    verdict = decided(found)
     readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
     draws = draws_of(readings * np.linspace(0.99, 1.01, 21)[None, :, None])
     after = Side(verdict.index, MOVED, draws) if verdict.index else Side(0, FIGURES, draws)
-    case = Case(found, verdict, control, folded, Side(0, FIGURES, draws), after, True, "Measure on.")
+    case = Case(found, verdict, control, folded, Side(0, FIGURES, draws), after, Claim(), "Measure on.")
     return replace(case, **changed)
 
 
@@ -90,7 +92,7 @@ NAMED = {(): 0.01, (SHEAR,): 0.79, (AIR,): 0.15, (GRAIN,): 0.05}
 
 def control_of(found: Found, to_beat: float) -> NullControl:
     n = 101
-    return NullControl(np.linspace(-5.0, 1.0, n), np.full(n, to_beat), 0.02)
+    return NullControl(np.linspace(-5.0, 1.0, n), np.full(n, to_beat))
 
 
 def folds_of(found: Found, ratio: float) -> Nested:
@@ -133,14 +135,14 @@ def test_less_probable_is_only_what_is_so_and_would_fit():
         "less probable", "less probable (0.100) than transverse shear (0.600)",
     )  # fmt: skip
     assert told[RELABELLING].rejected_because.startswith("with it alone the misfit is still too large (p < 0.001); ")
-    alike = fate_of(quiet, replace(decide(quiet), effects=()), answers(quiet), SHEAR, 1)
+    alike = fate_of(quiet, replace(decided(quiet), effects=()), answers(quiet), SHEAR, 1)
     assert alike == ("less probable", "no more probable (0.600) than transverse shear (0.600)")
 
 
 def test_a_size_at_its_limit_is_told_so_and_not_as_less_probable():
     """Whatever the verdict rejects its winner for is told of the winner, though its probability is one."""
     found = made({(SHEAR,): 1.0})
-    verdict = replace(decide(found), word="unexplained", effects=(), index=0, reason="only at the limit of its range")
+    verdict = replace(decided(found), word="unexplained", effects=(), index=0, reason="only at the limit of its range")
     told = fate_of(found, verdict, answers(found), SHEAR, 1)
     assert told == ("does not fit", "only at the limit of its range")
 
@@ -164,7 +166,7 @@ def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():
     shares = np.array([*found.probability, 0.01])
     ground = replace(ground, hypotheses=(*ground.hypotheses, more))
     found = Found(ground, found.residual, np.log(shares + 1e-300), shares)
-    verdict, ranked = decide(found), answers(found)
+    verdict, ranked = decided(found), answers(found)
     assert verdict.effects == (SHEAR, RELABELLING)
     assert [one.fate for one in exchange_entries(found, verdict, ranked)] == ["in the verdict", "does not fit"]
     told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
@@ -287,29 +289,6 @@ def test_what_the_width_of_a_prior_costs():
     assert entries(found)[SHEAR].ockham_log_factor < -0.5
 
 
-@pytest.mark.parametrize(
-    ("ratio", "clear", "named", "claim"),
-    [
-        (0.499, True, True, True),
-        (0.5, True, True, False),
-        (0.499, False, True, False),
-        (0.499, True, False, False),
-        (None, True, True, False),
-    ],
-)
-def test_an_error_is_claimed_to_be_reduced_only_beyond_chance_with_a_size_clear_of_zero(ratio, clear, named, claim):
-    found = made(NAMED if named else {(): 0.9, (SHEAR,): 0.1}, residual=None if named else np.zeros(6))
-    folded = None if ratio is None else folds_of(found, ratio)
-    case = case_of(found, control_of(found, 0.5), folded, is_clear_of_zero=clear)
-    assert diagnosis_of(case).claim is claim
-
-
-def test_without_a_null_control_of_the_nested_error_nothing_is_claimed():
-    found = made(NAMED)
-    control = replace(control_of(found, 0.5), ratio=None)
-    assert case_of(found, control, folds_of(found, 0.1)).claim is False
-
-
 def test_a_named_effect_that_was_refitted():
     found = made(NAMED)
     ranked = answers(found)
@@ -325,16 +304,43 @@ def test_a_named_effect_that_was_refitted():
     assert told.elastic_shift["E_x"].shift_in_sd == pytest.approx(2.5)
     assert told.p_value.before < 0.05 < told.p_value.after
     assert told.null_control.nested_ratio == pytest.approx(0.25)
-    assert told.gain_null_percentile == 100.0  # ln (0.79 / 0.01) + ln (0.1 / 0.5) is beyond the last of the null sets
+    assert told.gain_null_percentile == 100.0  # ln (0.99 / 0.01) is beyond the last of the null sets
     (finalist,) = told.finalists
     assert (finalist.effects, list(finalist.sizes["board"])) == ((SHEAR,), [SHEAR])
     assert told.after.log_score > told.before.log_score
 
 
+def test_a_claim_is_told_with_its_conditions():
+    found = made(NAMED)
+    met, missed = (Condition("prior predictive", value, 0.05, value >= 0.05) for value in (0.5, 0.01))
+    for conditions, holds in (((met,), True), ((met, missed), False)):
+        case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25), claim=Claim(conditions))
+        told = diagnosis_of(case)
+        assert (told.claim, told.conditions) == (holds, conditions)
+    assert told.null_control.nested_ratio_percentile == 100.0
+
+
+def test_what_was_learnt_of_a_size_is_how_far_it_left_its_prior():
+    """Readings far out move the size; readings of large noise leave it where its prior has it."""
+    learnt = entries(made(NAMED))[SHEAR].learnt_bits
+    assert list(learnt) == ["size"]
+    quiet = entries(made(NAMED, size=1e-5))[SHEAR].learnt_bits["size"]
+    assert quiet == pytest.approx(0.0, abs=1e-3)
+    found = made(NAMED)
+    table = found.ground.candidates[SHEAR].fine
+    log_terms = Terms(table, found.ground.whole, noise_grid(found.ground.baseline.board)).log_densities(
+        found.residual[None, :]
+    )[:, 0]
+    after = np.exp(log_terms).reshape(-1, table.n_cells).sum(axis=0)
+    after /= after.sum()
+    assert learnt["size"] == pytest.approx(np.sum(after * np.log2(after / table.weights)))
+    assert learnt["size"] > 0.5
+
+
 def test_a_refit_that_failed_leaves_the_model_as_it_was():
     found = made(NAMED)
     case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
-    told = diagnosis_of(replace(case, after=case.before, is_clear_of_zero=False, notes=("it failed",)))
+    told = diagnosis_of(replace(case, after=case.before, notes=("it failed",)))
     assert (told.verdict, told.refitted, told.claim) == ("named", (), False)
     assert told.before == told.after
     assert told.notes == ("it failed",)
@@ -356,7 +362,7 @@ def judged(n_modes: int) -> tuple[Found, Diagnosis]:
     rng = np.random.default_rng(4)
     found = search(found.ground, NOISE * rng.standard_normal(n_modes))
     folded = nested(found.ground, found.residual[None, :])
-    return found, diagnosis_of(case_of(found, null_control(found, rng, 40), folded))
+    return found, diagnosis_of(case_of(found, null_control(found.ground, rng, 40), folded))
 
 
 def test_three_modes_leave_nothing_to_judge_by():
@@ -386,7 +392,7 @@ def test_three_modes_leave_nothing_to_judge_by():
 def test_three_modes_leave_nothing_to_judge_by_even_without_candidates():
     base = baseline(np.random.default_rng(1), 3)
     ground = ground_of(base, bare(base, noise_grid(base.board)))
-    assert decide(search(ground, np.zeros(3))).word == "undetectable"
+    assert decided(search(ground, np.zeros(3))).word == "undetectable"
 
 
 @pytest.mark.parametrize("n_modes", [4, 5])

@@ -38,10 +38,10 @@ from bayesplate.diagnosis.wording.words import MERITS, VERDICTS, claim_sentence
 from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
-    "format", "name", "seed", "card_sha256", "verdict", "claim", "effects", "refitted", "reason", "sentences",
-    "declared", "probability_of_none", "probability_of_none_with_doubled_priors", "p_value", "before", "after",
-    "gain_null_percentile", "null_control", "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates",
-    "recommendation", "notes",
+    "format", "name", "seed", "card_sha256", "verdict", "claim", "conditions", "effects", "refitted", "reason",
+    "sentences", "declared", "probability_of_none", "probability_of_none_with_halved_priors",
+    "probability_of_none_with_doubled_priors", "p_value", "before", "after", "gain_null_percentile", "null_control",
+    "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates", "recommendation", "notes",
 ]  # fmt: skip
 ERRORS = [
     "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
@@ -49,7 +49,7 @@ ERRORS = [
 EFFECT = [
     "name", "setup", "raw_rms_cents", "visible_rms_cents", "visible_cents", "below_detection_limit", "bias_percent",
     "inclusion_probability", "inclusion_probability_with_doubled_priors", "log_bayes_factor", "ockham_log_factor",
-    "p_value", "amplitude", "look_alikes", "rejected_because",
+    "p_value", "amplitude", "learnt_bits", "look_alikes", "rejected_because",
 ]  # fmt: skip
 EXCHANGED = [
     "name", "setup", "labels", "raw_rms_cents", "visible_rms_cents", "bias_percent", "inclusion_probability",
@@ -67,7 +67,13 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert [list(one) for one in content["candidates"]] == [EFFECT, EFFECT, EFFECT, EXCHANGED]
     assert list(content["candidates"][0]["amplitude"]) == ["parameter", "form", "q05", "q50", "q95", "unit"]
     assert list(content["p_value"]) == ["before", "after"]
-    assert list(content["null_control"]) == ["n_sets", "flagged_percent", "nested_ratio", "nested_ratio_to_beat"]
+    assert list(content["null_control"]) == [
+        "n_sets",
+        "flagged_percent",
+        "nested_ratio",
+        "nested_ratio_to_beat",
+        "nested_ratio_percentile",
+    ]
     assert list(content["elastic_shift"]["E_x"]) == ["before", "after", "shift_in_sd"]
     spread = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
     assert list(content["elastic_averaged"]["G_xy"]) == spread
@@ -101,7 +107,7 @@ def test_every_word_of_the_verdict_and_every_error_has_its_words():
     [
         ("none needed", "no more than their noise would make them"),
         ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
-         "the left-out error fell from 46 to 12 cents. The evidence gained is larger than on 99 % of simulated boards"),
+         "the left-out error fell from 46 to 12 cents, and every condition of that claim is met."),
         ("indistinguishable group", "cannot tell which: membrane tension or air loading."),
         ("unexplained", "no effect that was tried explains it"),
         ("undetectable", "could not show them even if they were there"),
@@ -138,8 +144,8 @@ def test_the_page_says_what_its_constants_are():
         (53.2, 61.4, "The left-out error rose from 53 to 61 cents. No improvement is claimed."),
         (53.2, 53.4, "The left-out error stayed at 53 cents. No improvement is claimed."),
         (5.2, 5.44, "The left-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
-        (61.4, 53.2, "The left-out error fell from 61 to 53 cents, no more than chance selection may give. The "
-         "evidence gained is larger than on 99 % of simulated boards without any effect. No improvement is claimed."),
+        (61.4, 53.2, "The left-out error fell from 61 to 53 cents. No improvement is claimed: the readings left out "
+         "are not predicted better beyond two standard errors."),
     ],
 )  # fmt: skip
 def test_an_error_that_rises_is_said_to_rise(before, after, words):
@@ -267,7 +273,8 @@ def test_the_terminal_shows_only_tables_that_there_are():
     shown, bare = show_diagnosis(NAMED), show_diagnosis(DIAGNOSES["undetectable"])
     assert [table.title.partition(":")[0] for table in shown.tables] == [
         "The constants, averaged over all explanations by their probability, GPa", "What may be the case",
-        "Error before and after", "Shift of the constants by membrane tension, GPa", "Sizes of what was fitted again",
+        "Error before and after", "May a lower error be claimed? Only if every condition is met",
+        "Shift of the constants by membrane tension, GPa", "Sizes of what was fitted again",
         "Candidates at their usual size",
     ]  # fmt: skip
     assert [table.title for table in bare.tables[1:]] == ["What may be the case", "Error: a-board"]
@@ -329,7 +336,7 @@ def test_it_shows_itself():
     assert repr(NAMED) == "<Diagnosis of a-board, named: membrane_tension, error reduced>"
     assert repr(DIAGNOSES["none needed"]) == "<Diagnosis of a-board, none needed>"
     page = _Tags(NAMED._repr_html_())
-    assert page.tags.count("table") == 6
+    assert page.tags.count("table") == 7
     for words in ("An effect was found", "point to membrane tension", "46.5", f"{AFTER.leave_one_out_rms_cents}", NEXT):
         assert words in page.text
 

@@ -1,0 +1,127 @@
+"""The claim that an error is reduced: four conditions, each of which must be met."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.decision.verdict import Verdict
+from bayesplate.diagnosis.evidence.folds import Nested, log_score_gains, nested
+from bayesplate.diagnosis.evidence.null_control import NullControl
+from bayesplate.diagnosis.evidence.predictive import PASSES
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, varied
+
+Floats = NDArray[np.float64]
+ConditionName = Literal["chance selection", "log score", "probability of none", "prior predictive"]
+
+STANDARD_ERRORS = 2.0
+"""By how many of them the nested log score has to rise."""
+IMPROBABLE = 0.05
+"""What the probability of no effect has to stay below."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One condition of the claim.
+
+    Attributes
+    ----------
+    name : str
+        "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made
+        to choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over the
+        widths of the sizes' priors, to be below 0.05. "prior predictive": p-value with the effect, at least 0.05.
+    value, limit : float or None
+        None where too few readings leave nothing to judge by.
+    is_met : bool
+    """
+
+    name: ConditionName
+    value: float | None
+    limit: float | None
+    is_met: bool
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Whether it may be said that the error is reduced.
+
+    Attributes
+    ----------
+    conditions : tuple of Condition
+        None if nothing was added to the model.
+    """
+
+    conditions: tuple[Condition, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether there is something to claim and every condition is met."""
+        return bool(self.conditions) and all(one.is_met for one in self.conditions)
+
+
+def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Nested | None = None) -> Claim:
+    """Judge the four conditions.
+
+    Parameters
+    ----------
+    found : Found
+    verdict : Verdict
+    control : NullControl
+    folded : Nested, optional
+        Of the board's own readings, where it is known already.
+
+    Returns
+    -------
+    Claim
+    """
+    if not verdict.index:
+        return Claim()
+    folded = nested_of(found, control) if folded is None else folded
+    return Claim(
+        (
+            _beyond_chance(folded, control),
+            _better_score(found, folded),
+            _improbable(found),
+            _passes(found.p_value(verdict.index)),
+        )
+    )
+
+
+def nested_of(found: Found, control: NullControl) -> Nested | None:
+    """The board's own readings left out one by one, an effect added where a fold calls for one."""
+    return nested(found.ground, found.residual[None, :], control.needed_from)
+
+
+def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
+    """Sum of paired differences over readings, and its standard error."""
+    values = np.asarray(gains, dtype=np.float64)
+    return float(values.sum()), float(np.sqrt(values.size) * values.std(ddof=1))
+
+
+def _beyond_chance(folded: Nested | None, control: NullControl) -> Condition:
+    limit = control.ratio_to_beat
+    if folded is None or limit is None:
+        return Condition("chance selection", None, limit, False)
+    ratio = float(folded.ratio[0])
+    return Condition("chance selection", ratio, limit, ratio < limit)
+
+
+def _better_score(found: Found, folded: Nested | None) -> Condition:
+    if folded is None:
+        return Condition("log score", None, None, False)
+    gain, error = score_gain(log_score_gains(found.ground, found.residual, folded.chosen[0]))
+    return Condition("log score", gain, STANDARD_ERRORS * error, gain > STANDARD_ERRORS * error)
+
+
+def _improbable(found: Found) -> Condition:
+    largest = max(found.none, *(varied(found, width=factor).none for factor in WIDTHS.values()))
+    return Condition("probability of none", largest, IMPROBABLE, largest < IMPROBABLE)
+
+
+def _passes(p_value: float) -> Condition:
+    return Condition("prior predictive", p_value, PASSES, p_value >= PASSES)

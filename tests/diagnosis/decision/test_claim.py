@@ -1,0 +1,136 @@
+"""The claim that an error is reduced: each of its four conditions, met and not met."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_searches import bare, baseline, candidate, decided, ground_of
+
+from bayesplate.diagnosis.decision.claim import (
+    Claim,
+    Condition,
+    judge_claim,
+    nested_of,
+    score_gain,
+)
+from bayesplate.diagnosis.evidence.folds import Nested, log_score, log_score_gains
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid
+from bayesplate.diagnosis.evidence.null_control import NullControl
+from bayesplate.diagnosis.evidence.search import search
+
+DIRECTION = 0.05 * np.random.default_rng(2).standard_normal(9)
+CONTROL = NullControl(against=np.linspace(-3.0, 0.0, 101), ratio=np.linspace(0.4, 1.4, 101))
+
+
+def searched(size: float, direction: np.ndarray = DIRECTION, n_modes: int = 9):
+    """A search of one effect on readings that hold it, so many times its nominal size, with a little noise."""
+    base = baseline(np.random.default_rng(1), n_modes)
+    one = candidate(base, "a", direction[:n_modes])
+    levels = noise_grid(base.board)
+    ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.5, one.fine, levels), candidates={"a": one})
+    noise = 0.004 * np.random.default_rng(3).standard_normal(n_modes)
+    return search(ground, size * one.visible + noise)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return searched(1.5)
+
+
+def folds(found, ratio: float = 0.1) -> Nested:
+    """Errors of a given ratio; every fold chose the effect."""
+    told = nested_of(found, CONTROL)
+    return Nested(told.before, ratio * told.before, np.ones_like(told.chosen))
+
+
+def met(claim: Claim) -> dict[str, bool]:
+    return {one.name: one.is_met for one in claim.conditions}
+
+
+def test_an_effect_that_is_there_meets_all_of_them(found):
+    claim = judge_claim(found, decided(found), CONTROL)
+    assert met(claim) == dict.fromkeys(
+        ("chance selection", "log score", "probability of none", "prior predictive"), True
+    )
+    assert claim.holds
+
+
+@pytest.mark.parametrize("missing", range(4))
+def test_one_that_is_not_met_is_enough(missing):
+    conditions = tuple(Condition("log score", 1.0, 0.5, i != missing) for i in range(4))
+    assert not Claim(conditions).holds
+    assert Claim(conditions[:missing] + conditions[missing + 1 :]).holds
+    assert not Claim().holds
+
+
+@pytest.mark.parametrize(("ratio", "is_met"), [(0.449, True), (0.451, False)])
+def test_the_error_falls_further_than_in_95_of_100_null_sets(found, ratio, is_met):
+    told = judge_claim(found, decided(found), CONTROL, folds(found, ratio)).conditions[0]
+    assert (told.name, told.is_met) == ("chance selection", is_met)
+    assert (told.value, told.limit) == pytest.approx((ratio, 0.45))
+
+
+def test_the_log_score_rises_by_two_standard_errors_of_the_paired_differences(found):
+    told = judge_claim(found, decided(found), CONTROL, folds(found)).conditions[1]
+    gains = log_score_gains(found.ground, found.residual, np.ones(9, dtype=int))
+    assert gains.sum() == pytest.approx(
+        log_score(found.ground, 1, found.residual) - log_score(found.ground, 0, found.residual)
+    )
+    assert told.value == pytest.approx(gains.sum())
+    assert told.limit == pytest.approx(2.0 * 3.0 * gains.std(ddof=1))
+    assert told.is_met is (told.value > told.limit)
+    none = replace(folds(found), chosen=np.zeros((1, 9), dtype=int))
+    told = judge_claim(found, decided(found), CONTROL, none).conditions[1]
+    assert (told.value, told.limit, told.is_met) == (0.0, 0.0, False)
+
+
+def test_a_gain_that_rests_on_one_reading_is_within_its_standard_error():
+    gain, error = score_gain([9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert gain == pytest.approx(error)
+
+
+@pytest.mark.parametrize("size", [0.05, 0.1, 0.3])
+def test_no_effect_is_improbable_with_other_priors_too(size):
+    found = searched(size)
+    verdict = replace(decided(found), index=1)
+    told = judge_claim(found, verdict, CONTROL).conditions[2]
+    assert told.value >= found.none
+    assert told.is_met is (told.value < 0.05)
+    assert told.is_met is (size > 0.2)
+
+
+def test_doubled_priors_alone_may_refuse_the_claim():
+    """The probability of none is below one in twenty with the usual priors and above it with others."""
+    one = searched(0.15)
+    told = judge_claim(one, replace(decided(one), index=1), CONTROL).conditions[2]
+    assert one.none < 0.05 < told.value
+    assert not told.is_met
+
+
+def test_the_misfit_that_is_left_passes_its_gate(found):
+    assert judge_claim(found, decided(found), CONTROL).conditions[3].value == pytest.approx(found.p_value(1))
+    off = replace(found, residual=found.residual + 0.05 * np.random.default_rng(8).standard_normal(9))
+    told = judge_claim(off, replace(decided(found), index=1), CONTROL, folds(found)).conditions[3]
+    assert told.value < 0.05
+    assert not told.is_met
+
+
+def test_nothing_is_claimed_where_nothing_was_added_or_nothing_is_left_to_judge_by(found):
+    assert judge_claim(found, replace(decided(found), index=0), CONTROL) == Claim()
+    few = searched(1.5, n_modes=4)
+    told = judge_claim(few, replace(decided(few), index=1), CONTROL)
+    assert [(one.value, one.is_met) for one in told.conditions[:2]] == [(None, False)] * 2
+    silent = judge_claim(found, decided(found), replace(CONTROL, ratio=None))
+    assert silent.conditions[0].value is None
+    assert not silent.holds
+
+
+def test_the_folds_of_the_board_add_an_effect_where_the_null_simulations_call_for_one(found):
+    weak = searched(0.1)
+    calm, loud = (replace(CONTROL, against=np.full(100, level)) for level in (-50.0, 50.0))
+    assert nested_of(weak, calm).chosen.sum() == 9
+    assert nested_of(weak, loud).chosen.sum() == 0
+    assert 0 < nested_of(weak, CONTROL).chosen.sum() < 9

@@ -1,0 +1,157 @@
+"""The search corrected to the exact law: against quadrature over three constants and a size, where the law is bent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from made_searches import bare, baseline, candidate, ground_of, one_level
+
+from bayesplate.diagnosis.decision.constants import draw_constants
+from bayesplate.diagnosis.evidence.draws import draw_terms
+from bayesplate.diagnosis.evidence.exact import draw_exact, exact_log_frequencies, log_weights_of, under_exact_law
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.search import search
+from bayesplate.diagnosis.shifts.tables import together
+from bayesplate.plate.material import RIGIDITIES
+
+NOISE = 0.01
+BEND = 4.0
+N_DRAWS = 20_000
+
+
+class BentLaw:
+    """Frequencies of an effect of one size, bent in the constants: stands for the exact law of a form."""
+
+    models = (None,)
+
+    def __init__(self, form, base, direction):
+        self.form, self.base, self.direction = form, base, direction
+
+    def log_frequencies(self, base, log_rigidities, values):
+        (size,) = values.values()
+        return bent(self.base)(log_rigidities) + np.outer(size, self.direction)
+
+
+def bent(base):
+    """ln f, of second order in ln D."""
+
+    def predict(x):
+        away = x - base.log_rigidities
+        return base.log_frequency + away @ base.slopes.T - BEND * (away**2) @ base.slopes[::-1].T
+
+    return predict
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Two effects that act along directions of their own, and readings of the first."""
+    rng = np.random.default_rng(1)
+    base = baseline(rng, 6)
+    base = replace(base, predict=bent(base))
+    levels = one_level(base, NOISE)
+    candidates = {}
+    for name in ("a", "b"):
+        direction = 0.02 * rng.standard_normal(6)
+        one = candidate(base, name, direction)
+        candidates[name] = replace(one, laws=(BentLaw(one.laws[0].form, base, direction),))
+    every = [bare(base, levels), *(Hypothesis((n,), 0.2, one.fine, levels) for n, one in candidates.items())]
+    return search(ground_of(base, *every, candidates=candidates), 0.015 * rng.standard_normal(6))
+
+
+def quadrature(found, law):
+    """Posterior mean and sd of ln D, and ln of the evidence, on a grid: flat in ln D, half-normal in the size."""
+    base = found.ground.baseline
+    readings = base.log_frequency + found.residual
+    middle, spread = base.log_rigidities, np.linalg.inv(base.slopes.T @ base.slopes / NOISE**2)
+    root = np.linalg.cholesky(spread)
+    steps = np.linspace(-6.0, 6.0, 33)
+    z = np.array(list(product(steps, repeat=3)))
+    shift = base.absorbing @ found.residual
+    x = middle + shift + z @ root.T
+    sizes, weights = [0.0], [1.0]
+    if law is not None:
+        sizes = np.linspace(0.0, 3.0, 41)
+        weights = np.exp(-0.5 * sizes**2)
+        weights = weights / weights.sum()
+    density = np.zeros(len(x))
+    for size, weight in zip(sizes, weights, strict=True):
+        there = base.predict(x) if law is None else law.log_frequencies(base, x, {"size": np.full(len(x), size)})
+        density += weight * np.exp(-0.5 * np.sum((readings - there) ** 2, axis=1) / NOISE**2)
+    mean = density @ x / density.sum()
+    return mean, np.sqrt(density @ (x - mean) ** 2 / density.sum()), np.log(density.sum())
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_draws_and_evidence_are_those_of_the_bent_law(found, index):
+    law = None if index == 0 else found.ground.candidates["a"].laws[0]
+    mean, sd, _ = quadrature(found, law)
+    exact = draw_exact(found, index, np.random.default_rng(2), N_DRAWS)
+    linear = draw_terms(found, index, np.random.default_rng(2), N_DRAWS)
+    error = 4.0 / np.sqrt(N_DRAWS / 2.0)  # weights leave about half the draws their worth
+    assert np.abs((exact.log_rigidities.mean(axis=0) - mean) / sd).max() < error + 0.02  # cells have a width
+    assert np.abs((linear.log_rigidities.mean(axis=0) - mean) / sd).max() > 3.0 * (error + 0.02)  # control
+
+
+def test_odds_are_those_of_the_bent_law(found):
+    """Of the effect against none: the grid's, to the error of 256 draws."""
+    exact = under_exact_law(found)
+    none, effect = (quadrature(found, law)[2] for law in (None, found.ground.candidates["a"].laws[0]))
+    wanted = effect - none
+    told = exact.log_evidence[1] - exact.log_evidence[0]
+    spread = [log_weights_of(found, draw_terms(found, i, np.random.default_rng(3), 4000)).std() for i in (0, 1)]
+    assert abs(told - wanted) < 4.0 * np.hypot(*spread) / np.sqrt(256) + 0.05
+    assert exact.probability.sum() == pytest.approx(1.0)
+    assert np.exp(exact.log_evidence[1] - exact.log_evidence[0]) == pytest.approx(
+        exact.probability[1] / exact.probability[0] * 0.5 / 0.2
+    )
+
+
+def test_where_the_law_is_straight_nothing_changes(found):
+    base = found.ground.baseline
+    base = replace(base, predict=lambda x: base.log_frequency + (x - base.log_rigidities) @ base.slopes.T)
+    ground = replace(found.ground, baseline=base, candidates={}, hypotheses=found.ground.hypotheses[:1])
+    same = replace(found, ground=ground, log_evidence=found.log_evidence[:1], probability=np.ones(1))
+    drawn = draw_terms(same, 0, np.random.default_rng(2), 100)
+    np.testing.assert_allclose(exact_log_frequencies(same, drawn), drawn.predicted, atol=1e-12)
+    np.testing.assert_allclose(log_weights_of(same, drawn), 0.0, atol=1e-8)
+
+
+def test_two_effects_add_at_the_constants_of_a_draw(found):
+    """The shift of one beside the shift of the other, both by their own law."""
+    one, other = (found.ground.candidates[name] for name in ("a", "b"))
+    pair = Hypothesis(("a", "b"), 0.1, together(one.coarse, other.coarse), found.ground.hypotheses[0].noise)
+    ground = replace(found.ground, hypotheses=(*found.ground.hypotheses, pair))
+    both = search(ground, found.residual)
+    drawn = draw_terms(both, 3, np.random.default_rng(4), 200)
+    exact = exact_log_frequencies(both, drawn)
+    sizes = []
+    for member, each in enumerate((one, other)):
+        z = each.coarse.z[drawn.cells[:, member], 0] + each.coarse.z_slopes[0, 0] * drawn.within[:, member]
+        sizes.append(np.maximum(z, 0.0))
+    expected = bent(ground.baseline)(drawn.log_rigidities)
+    expected = expected + sizes[0][:, None] * one.laws[0].direction + sizes[1][:, None] * other.laws[0].direction
+    np.testing.assert_allclose(exact, expected, atol=1e-12)
+
+
+def test_without_an_exact_law_the_search_stays_linear(found):
+    base = replace(found.ground.baseline, predict=None)
+    linear = replace(found, ground=replace(found.ground, baseline=base))
+    assert under_exact_law(linear) is None
+    drawn = draw_exact(linear, 0, np.random.default_rng(2), 500)
+    assert np.array_equal(drawn.predicted, draw_terms(linear, 0, np.random.default_rng(2), 500).predicted)
+
+
+def test_averages_are_by_the_probabilities_of_the_exact_law(found):
+    """The mixture of the draws under each hypothesis."""
+    exact = under_exact_law(found)
+    means = [
+        np.exp(draw_exact(found, i, np.random.default_rng(5), N_DRAWS).log_rigidities).mean(axis=0) for i in range(3)
+    ]
+    wanted = exact.probability @ np.array(means)
+    drawn = draw_constants(found, np.random.default_rng(6), N_DRAWS).values
+    told = np.array([drawn[name].mean() for name in RIGIDITIES])
+    errors = np.array([drawn[name].std() for name in RIGIDITIES]) * np.sqrt(4.0 / N_DRAWS)
+    assert np.abs((told - wanted) / errors).max() < 4.0
