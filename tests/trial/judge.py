@@ -122,6 +122,7 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         "support": _probability(best.support) if best else 0.0,
         "set": [[list(answer.members), _probability(answer.support)] for answer in near],
         "none": _probability(found.none),
+        "needed": bool(found.against_none > control.needed_from),
         "gain_percentile": _rounded(control.percentile_of(found.against_none)),
         "inclusion": {name: _probability(found.inclusion(name)) for name in found.ground.candidates},
         "gate": {
@@ -158,13 +159,13 @@ def _interval(draws: ConstantDraws, name: str, truth: float) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    """Five digits: more would be noise of the draws."""
-    return float(f"{value:.5g}")
+    """Four digits: more would be noise of the draws."""
+    return float(f"{value:.4g}")
 
 
 def _probability(value: float) -> float:
-    """Five decimals: what is less probable is not told apart."""
-    return round(float(value), 5)
+    """Four decimals: what is less probable is not told apart."""
+    return round(float(value), 4)
 
 
 def _short(value: Any) -> Any:

@@ -104,7 +104,7 @@ def test_null_simulations_are_shared_by_boards_of_a_setting():
     others = {Cell("null", "cantilever-6", 1, noise=noise).setting for noise in NOISES}
     assert len(others | {Cell("null", "cantilever-6", 1, 2.0).setting, Cell("null", "free-12", 1).setting}) == 5
     assert control_of(cell.setting) is control_of(Cell("null", "cantilever-6", 9).setting)
-    assert control_of(cell.setting).gain.shape == (2000,)
+    assert control_of(cell.setting).against.shape == (2000,)
     assert cell.setting.rng().random() == cell.setting.rng().random()
     assert len({one.rng().random() for one in others}) == 3
 
@@ -114,9 +114,10 @@ def test_a_record_tells_everything(few):
         assert "error" not in record
         assert 0.0 <= record["none"] <= 1.0
         assert set(record["gate"]) == {"bare", "best"}
-        assert set(record["conditions"]) == set(CONDITIONS)
-        assert record["claim"] <= all(record["conditions"].values())
+        assert set(record["conditions"]) == (set(CONDITIONS) if record["effects"] else set())
+        assert record["claim"] == (bool(record["effects"]) and all(record["conditions"].values()))
         assert 0.0 <= record["gain_percentile"] <= 100.0
+        assert record["needed"] or not record["effects"]
         assert record["support"] == record["set"][0][1]
         assert frozenset(record["best"]) == frozenset(record["set"][0][0])
         for intervals in record["constants"].values():
