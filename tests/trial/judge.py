@@ -122,7 +122,6 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         "support": _probability(best.support) if best else 0.0,
         "set": [[list(answer.members), _probability(answer.support)] for answer in near],
         "none": _probability(found.none),
-        "needed": bool(found.against_none > control.needed_from),
         "gain_percentile": _rounded(control.percentile_of(found.against_none)),
         "inclusion": {name: _probability(found.inclusion(name)) for name in found.ground.candidates},
         "gate": {
