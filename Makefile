@@ -1,4 +1,4 @@
-# From a fresh checkout: `make fit` fits a shipped board, `make test` runs every quick check.
+# From a fresh checkout: `make fit` fits a shipped board, `make test` runs every quick check, `make slow` the tests that it leaves out.
 
 PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
 VENV ?= .venv
@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test docs calibration coverage trial benchmarks
+.PHONY: fit test slow docs calibration coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -18,6 +18,9 @@ test: $(VENV)/tested-with
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+slow: $(VENV)/tested-with
+	$(BIN)/python -m pytest -n 2 -m slow
 
 docs: $(VENV)/tested-with
 	$(BIN)/python -m sphinx -W --keep-going -n -b html docs docs/_build/html

@@ -19,9 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from calibration.records import add_to, publish, read_done
 from calibration.sbc import Design, identity, simulate_one
-from calibration.table import family_p_value, is_calibrated, is_caught, rows, text
-
-FEWEST_FOR_MUTANTS = 40
+from calibration.table import MUTANTS, family_p_value, is_calibrated, is_caught, rows, text
 
 
 def run(
@@ -29,7 +27,7 @@ def run(
 ) -> list[dict[str, Any]]:
     """Do what is not done yet, and return the records of all simulations asked for, in their order."""
     records = read_done(out, identity(design))
-    done = {(r["simulation"], "noise fixed at half" in r.get("ranks", {})) for r in records}
+    done = {(r["simulation"], "noise fixed too low" in r.get("ranks", {})) for r in records}
     open_ones = [
         (i, i < n_mutants)
         for i in range(n_simulations)
@@ -58,10 +56,10 @@ def judge(records: list[dict[str, Any]]) -> tuple[list[str], bool]:
         f"started anew: {sum(r['attempts'] > 1 for r in good)}; linear law: {sum(r['law'] == 'linear' for r in good)}; "
         f"median {sorted(r['seconds'] for r in good)[len(good) // 2]:.1f} s"
     )
-    for mutant in ("likelihood omitted", "noise fixed at half"):
+    for mutant, fewest in MUTANTS.items():
         ranks = [r["ranks"][mutant] for r in good if mutant in r["ranks"]]
-        if len(ranks) < FEWEST_FOR_MUTANTS:
-            paragraphs.append(f"mutant: {mutant}: {len(ranks)} simulations, {FEWEST_FOR_MUTANTS} are needed to judge")
+        if len(ranks) < fewest:
+            paragraphs.append(f"mutant: {mutant}: {len(ranks)} simulations, {fewest} are needed to judge")
             well = False
             continue
         found = rows(ranks)
@@ -76,7 +74,9 @@ def main() -> int:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--simulations", type=int, default=200)
-    parser.add_argument("--mutants", type=int, default=50, help="simulations that are also fitted with half the noise")
+    parser.add_argument(
+        "--mutants", type=int, default=50, help="simulations that are also fitted with too little noise"
+    )
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
     parser.add_argument("--edges", choices=("free", "cantilever"), default="free")

@@ -20,6 +20,8 @@ from typing import Any, Literal
 
 import numpy as np
 import ritz
+from calibration.layouts import EDGES, LABELS, LENGTHS
+from calibration.mutants import LESS_NOISE, NARROWER, narrowed
 from made_boards import models_at, setup_of, with_noise
 from numpy.typing import NDArray
 
@@ -44,14 +46,6 @@ Ranks = dict[str, int]
 Edges = Literal["free", "cantilever"]
 Generator = Literal["package", "ritz"]
 Law = Literal["exact", "auto", "fixed-linear"]
-
-EDGES = {"free": ritz.ALL_FREE, "cantilever": ritz.CANTILEVER}
-LABELS = {
-    "free": ((1, 1), (2, 0), (0, 2), (2, 1), (1, 2), (3, 0), (2, 2), (3, 1)),
-    "cantilever": ((0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2), (2, 0), (2, 1)),
-}
-LENGTHS = {"free": (0.45, 0.20), "cantilever": (0.30, 0.16)}
-"""Sides, m, at which few modes of one class come close to each other over the prior."""
 
 
 @dataclass(frozen=True)
@@ -254,10 +248,7 @@ def prior_draws(problem: PosedProblem, design: Design, rng: np.random.Generator)
     return np.stack(rows)
 
 
-HALF_NOISE = Quantity.from_median(0.5 * DEFAULT_NOISE.median, 1.02)
-
-
-def simulate_one(design: Design, index: int, with_half_noise: bool = False) -> dict[str, Any]:
+def simulate_one(design: Design, index: int, with_less_noise: bool = False) -> dict[str, Any]:
     """One simulation: its ranks, and those of the mutants.
 
     Parameters
@@ -265,8 +256,8 @@ def simulate_one(design: Design, index: int, with_half_noise: bool = False) -> d
     design : Design
     index : int
         Seeds everything random, together with the design's seed.
-    with_half_noise : bool
-        Also fit with the noise fixed at half its median.
+    with_less_noise : bool
+        Also fit with the noise fixed at 0.7 of its median.
 
     Returns
     -------
@@ -285,10 +276,12 @@ def simulate_one(design: Design, index: int, with_half_noise: bool = False) -> d
         draws, attempts = posterior_draws(problem, design, for_draws)
         ranks = {"production": ranks_among(problem, truth, draws)}
         ranks["likelihood omitted"] = ranks_among(problem, truth, prior_draws(problem, design, for_mutants))
-        if with_half_noise:
-            halved = make_problem(design, truth, HALF_NOISE)
-            draws, _ = posterior_draws(halved, design, for_mutants)
-            ranks["noise fixed at half"] = ranks_among(halved, truth, draws)
+        for name, factor in NARROWER.items():
+            ranks[name] = ranks_among(problem, truth, narrowed(draws, factor))
+        if with_less_noise:
+            quieter = make_problem(design, truth, LESS_NOISE)
+            draws, _ = posterior_draws(quieter, design, for_mutants)
+            ranks["noise fixed too low"] = ranks_among(quieter, truth, draws)
     except BayesplateError as error:
         return record | {"error": f"{type(error).__name__}: {error}"}
     return record | {
@@ -302,4 +295,4 @@ def simulate_one(design: Design, index: int, with_half_noise: bool = False) -> d
 
 def identity(design: Design) -> dict[str, Any]:
     """What a file of ranks must agree in before more are added to it."""
-    return {"format": 1, "n_draws": N_DRAWS, "design": asdict(design)}
+    return {"format": 2, "n_draws": N_DRAWS, "design": asdict(design)}

@@ -17,7 +17,14 @@ Ten bands of 95 % would reject a correct code four times in ten.
 
 MUTANT_LEVEL = 1e-3
 
-NOT_COUNTED = {"noise fixed at half": ("noise",)}
+MUTANTS = {
+    "likelihood omitted": 40,
+    "noise fixed too low": 40,
+    "spread 0.7 of itself": 64,
+    "spread 0.8 of itself": 200,
+}
+"""Wrong posteriors that must be found out, and how many simulations that takes: see `test_bands` for the spreads."""
+NOT_COUNTED = {"noise fixed too low": ("noise",)}
 """The noise of that mutant is wrong by construction; it has to be found by what follows from it."""
 
 

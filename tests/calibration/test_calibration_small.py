@@ -6,19 +6,20 @@ import json
 
 import numpy as np
 import pytest
+from calibration.mutants import narrowed
 from calibration.records import read_done
 from calibration.run import judge, run
 from calibration.sbc import N_DRAWS, Design, identity, simulate_one
-from calibration.table import family_p_value, is_calibrated, is_caught, rows
+from calibration.table import MUTANTS, family_p_value, is_calibrated, is_caught, rows
 
 SMALL = Design(law="fixed-linear", resolution=0.0, thickness_sd=0.0, n_walkers=12)
-N_SMALL, N_HALVED = 32, 16
+N_SMALL = 32
 
 
 @pytest.fixture(scope="module")
 def small():
     """The same simulations whenever they are made."""
-    records = [simulate_one(SMALL, i, with_half_noise=i < N_HALVED) for i in range(N_SMALL)]
+    records = [simulate_one(SMALL, i, with_less_noise=True) for i in range(N_SMALL)]
     assert [record for record in records if "error" in record] == []
     return records
 
@@ -33,7 +34,7 @@ def test_ranks_of_the_truth_are_uniform(small):
     assert is_calibrated(table), table
 
 
-@pytest.mark.parametrize("mutant", ["likelihood omitted", "noise fixed at half"])
+@pytest.mark.parametrize("mutant", ["likelihood omitted", "noise fixed too low", "spread 0.7 of itself"])
 def test_a_wrong_posterior_is_caught(small, mutant):
     table = rows(ranks_of(small, mutant))
     assert is_caught(mutant, table), table
@@ -47,8 +48,15 @@ def test_without_the_likelihood_only_the_likelihood_tells(small):
     assert family_p_value(list(table.values())) > 0.01
 
 
+def test_narrowed_draws_keep_their_mean():
+    draws = np.random.default_rng(0).normal(3.0, 2.0, (99, 2))
+    narrow = narrowed(draws, 0.8)
+    assert narrow.mean(axis=0) == pytest.approx(draws.mean(axis=0))
+    assert narrow.std(axis=0) == pytest.approx(0.8 * draws.std(axis=0))
+
+
 def test_a_simulation_is_the_same_whenever_it_is_made(small):
-    again = simulate_one(SMALL, 20)
+    again = simulate_one(SMALL, 20, with_less_noise=True)
     assert again["ranks"] == small[20]["ranks"]
     assert again["ranks"] != small[21]["ranks"]
 
@@ -57,7 +65,7 @@ def test_an_interrupted_run_goes_on(small, tmp_path):
     out = tmp_path / "ranks.jsonl"
     lines = [json.dumps(identity(SMALL)), *(json.dumps(record) for record in small)]
     out.write_text("\n".join(lines[:-1]) + "\n" + lines[-1][:40])  # killed while it wrote the last one
-    records = run(SMALL, N_SMALL - 1, N_HALVED, 1, out, quiet=True)
+    records = run(SMALL, N_SMALL - 1, N_SMALL - 1, 1, out, quiet=True)
     assert records == small[:-1]  # nothing was left to do
     assert len(out.read_text().splitlines()) == N_SMALL
     _, well = judge(records)
@@ -79,18 +87,18 @@ def test_simulations_without_draws_are_not_passed_over():
             "simulation": i,
             "ranks": {
                 "production": {name: int(rng.integers(N_DRAWS + 1)) for name in ranks},
-                "likelihood omitted": ranks,
-                "noise fixed at half": ranks,
+                **dict.fromkeys(MUTANTS, ranks),
             },
             "seconds": 1.0,
             "law": "exact",
             "attempts": 1,
             "relabelled": False,
         }
-        for i in range(60)
+        for i in range(200)
     ]
     assert judge(good)[1]
-    paragraphs, well = judge([*good, {"simulation": 60, "error": "NotConvergedError: too short"}])
+    assert not judge(good[:199])[1]  # one too few to say that the subtlest mutant would be caught
+    paragraphs, well = judge([*good, {"simulation": 200, "error": "NotConvergedError: too short"}])
     assert not well
     assert "1 simulations gave no draws" in paragraphs[0]
 
@@ -98,6 +106,6 @@ def test_simulations_without_draws_are_not_passed_over():
 @pytest.mark.slow
 @pytest.mark.parametrize("design", [Design(), Design(generator="ritz", law="auto")], ids=["exact", "another solver"])
 def test_the_full_calibration(design, tmp_path):
-    """As `python tests/calibration/run.py`: 200 simulations; 95 % family-wise, both mutants caught."""
+    """As `python tests/calibration/run.py`: 200 simulations; 95 % family-wise, every mutant caught."""
     paragraphs, well = judge(run(design, 200, 50, 2, tmp_path / "ranks.jsonl", quiet=True))
     assert well, "\n".join(paragraphs)

@@ -71,7 +71,7 @@ def test_noise_is_what_the_truth_says(rng: np.random.Generator) -> None:
 
 
 def test_a_drawn_noise_is_log_normal_about_the_one_stated(rng: np.random.Generator) -> None:
-    """Mean and variance of ln noise over 60 boards of two setups, to four standard errors; the card states neither."""
+    """Mean and variance of ln noise over 60 boards of two setups within four standard errors; no card tells it."""
     boards = [
         plant(rng, "cantilever-6-free-6", [], noise_cents=5.0, noise_factor=1.65, noise_is_drawn=True)
         for _ in range(60)

@@ -109,10 +109,10 @@ def truth(record: Record) -> frozenset[str]:
 
 
 def listed(record: Record) -> frozenset[str]:
-    """Effects of the credible set that the verdict gives: of a name or a group; empty otherwise."""
+    """Effects that the verdict gives, of a name or a group, and those within a factor ten of it; empty otherwise."""
     if record["word"] not in ANSWERED:
         return frozenset()
-    return frozenset(name for members, _ in record["set"] for name in members)
+    return frozenset(record["effects"]).union(*(members for members, _ in record["set"]))
 
 
 def is_named(record: Record) -> bool:

@@ -158,13 +158,13 @@ def _interval(draws: ConstantDraws, name: str, truth: float) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    """Five digits: more would be noise of the draws."""
-    return float(f"{value:.5g}")
+    """Four digits: more would be noise of the draws."""
+    return float(f"{value:.4g}")
 
 
 def _probability(value: float) -> float:
-    """Five decimals: what is less probable is not told apart."""
-    return round(float(value), 5)
+    """Four decimals: what is less probable is not told apart."""
+    return round(float(value), 4)
 
 
 def _short(value: Any) -> Any:

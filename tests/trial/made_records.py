@@ -64,7 +64,7 @@ def made(
         "word": word,
         "effects": list(effects),
         "claim": claim,
-        "conditions": dict.fromkeys(CONDITIONS, claim),
+        "conditions": dict.fromkeys(CONDITIONS, claim) if effects else {},
         "best": list(best if best is not None else effects[:1]),
         "support": 0.5,
         "set": [[[name], 0.5] for name in near],

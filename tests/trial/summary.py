@@ -126,7 +126,10 @@ def _cell(cell: Cell, records: Sequence[Record]) -> dict[str, Any]:
 
 
 def claims(cells: Sequence[Cell], by_cell: Mapping[str, Sequence[Record]]) -> dict[str, Any]:
-    """How often an effect is claimed and each condition of a claim met, by what is planted and what is said of it."""
+    """How often an effect is claimed and each condition of a claim met, by what is planted and what is said of it.
+
+    Conditions are judged where the verdict has an effect to add; of all others there is no share.
+    """
     nothing = [record for cell in cells if cell.kind == "null" for record in by_cell[cell.name]]
     something = [record for cell in cells if cell.kind != "null" for record in by_cell[cell.name]]
     outside = [record for cell in cells if cell.kind == "outside" for record in by_cell[cell.name]]
@@ -143,7 +146,8 @@ def claims(cells: Sequence[Cell], by_cell: Mapping[str, Sequence[Record]]) -> di
         name: {
             "claimed": share(records, is_claimed).as_json(),
             "conditions": {
-                one: share(records, lambda r, one=one: r["conditions"][one]).as_json() for one in CONDITIONS
+                one: share([r for r in records if r["conditions"]], lambda r, one=one: r["conditions"][one]).as_json()
+                for one in CONDITIONS
             },
         }
         for name, records in groups.items()

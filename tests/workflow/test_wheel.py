@@ -18,10 +18,9 @@ from bayesplate.results.contract import as_json
 ROOT = Path(bayesplate.__file__).resolve().parents[1]
 EXECUTES_DATA = (".pkl", ".pickle", ".joblib", ".dill", ".npy", ".npz", ".pyc", ".so", ".pyd")
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (ROOT / "pyproject.toml").exists(), reason="needs the checkout that a wheel is built from"),
-]
+pytestmark = pytest.mark.skipif(
+    not (ROOT / "pyproject.toml").exists(), reason="needs the checkout that a wheel is built from"
+)
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,15 +108,23 @@ class Terms:
         return np.einsum("di,li,ei->lde", blind, variances, blind) + inputs @ inputs.T
 
     @cached_property
-    def _whitening(self) -> tuple[Floats, Floats]:
-        """Inverse Cholesky factors and half log determinants of all terms: (n_terms, d, d) and (n_terms,) arrays."""
-        spread = np.einsum("di,kip->kdp", self.fold.blind, self.table.slopes)
-        own = spread @ np.swapaxes(spread, 1, 2)
-        covariance = self.noise_covariance[:, None] + own[None]
-        n_levels, n_cells, d, _ = covariance.shape
-        factors = np.linalg.cholesky(covariance.reshape(n_levels * n_cells, d, d))
+    def _parts(self) -> _Parts:
+        """What the densities of all terms are made of."""
+        factors = np.linalg.cholesky(self.noise_covariance)
+        whitening = np.linalg.inv(factors)
         half = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-        return np.linalg.inv(factors), half
+        n_levels, d, _ = whitening.shape
+        n_cells, n_modes, p = self.table.slopes.shape
+        spread = np.moveaxis(self.table.slopes, 1, 0).reshape(n_modes, n_cells * p)
+        along = ((whitening @ self.fold.blind).reshape(n_levels * d, n_modes) @ spread).reshape(n_levels, d, n_cells, p)
+        along = np.ascontiguousarray(along.transpose(0, 2, 3, 1))
+        inner = _cholesky_of_one_plus(along)
+        for j in range(p):
+            for k in range(j):
+                along[:, :, j] -= inner[j][k][:, :, None] * along[:, :, k]
+            along[:, :, j] /= inner[j][j][:, :, None]
+        half = half[:, None] + np.sum([np.log(inner[j][j]) for j in range(p)], axis=0)
+        return _Parts(whitening, np.broadcast_to(half, (n_levels, n_cells)), along, inner)
 
     @cached_property
     def middles(self) -> Floats:
@@ -130,16 +139,17 @@ class Terms:
         residuals : (n_sets, n_modes) array
             ln measured less ln f of the baseline.
         """
-        whitening, half = self._whitening
-        n_terms, d, _ = whitening.shape
-        seen = residuals @ self.fold.blind.T
-        n_levels = self.noise.weights.size
-        middles = np.tile(self.middles, (n_levels, 1))
-        whitened = (whitening.reshape(n_terms * d, d) @ seen.T).reshape(n_terms, d, len(seen))
-        whitened -= np.einsum("kde,ke->kd", whitening, middles)[:, :, None]
-        squares = np.einsum("kdn,kdn->kn", whitened, whitened)
-        result: Floats = (self.log_weights - half - 0.5 * d * _LOG_TWO_PI)[:, None] - 0.5 * squares
-        return result
+        parts = self._parts
+        n_levels, n_cells, p, d = parts.along.shape
+        seen = (residuals @ self.fold.blind.T) @ np.swapaxes(parts.whitening, 1, 2)
+        middles = self.middles @ np.swapaxes(parts.whitening, 1, 2)
+        across = np.swapaxes(seen, 1, 2)
+        squares = (seen**2).sum(axis=2)[:, None] + (middles**2).sum(axis=2)[:, :, None] - 2.0 * (middles @ across)
+        inside = (parts.along.reshape(n_levels, n_cells * p, d) @ across).reshape(n_levels, n_cells, p, len(residuals))
+        inside -= np.einsum("lkpd,lkd->lkp", parts.along, middles)[:, :, :, None]
+        squares -= (inside**2).sum(axis=2)
+        offsets = self.log_weights - parts.half.ravel() - 0.5 * d * _LOG_TWO_PI
+        return np.asarray(offsets[:, None] - 0.5 * squares.reshape(n_levels * n_cells, len(residuals)))
 
     def log_evidence(self, residuals: Floats) -> Floats:
         """Logarithm of the restricted marginal density of data sets: (n_sets,) array."""
@@ -165,12 +175,51 @@ class Terms:
     @cached_property
     def _gains(self) -> Floats:
         """Takes what is seen, less a cell's middle, to the place within the cell: (n_levels, n_cells, p, d) array."""
-        whitening, _ = self._whitening
-        n_levels = self.noise.weights.size
-        spread = np.einsum("di,kip->kdp", self.fold.blind, self.table.slopes)
-        d, p = spread.shape[1:]
-        precision = (np.swapaxes(whitening, 1, 2) @ whitening).reshape(n_levels, -1, d, d)
-        return np.einsum("kdp,lkde->lkpe", spread, precision).reshape(n_levels, -1, p, d)
+        parts = self._parts
+        result = parts.along.copy()
+        for j in reversed(range(result.shape[2])):
+            for k in range(j + 1, result.shape[2]):
+                result[:, :, j] -= parts.inner[k][j][:, :, None] * result[:, :, k]
+            result[:, :, j] /= parts.inner[j][j][:, :, None]
+        return np.asarray(result @ parts.whitening[:, None])
+
+
+class _Parts(NamedTuple):
+    """Terms of covariance N + S S' with the few tangents S of a cell: only I + T T' with T = (L^-1 S)' is factorised.
+
+    Attributes
+    ----------
+    whitening : (n_levels, d, d) array
+        L^-1 with N = L L'.
+    half : (n_levels, n_cells) array
+        Half the log determinant of the whole covariance.
+    along : (n_levels, n_cells, p, d) array
+        C^-1 T with I + T T' = C C': what takes off the squares of whitened readings.
+    inner : list of list of (n_levels, n_cells) array
+        Lower triangle of C.
+    """
+
+    whitening: Floats
+    half: Floats
+    along: Floats
+    inner: list[list[Floats]]
+
+
+def _cholesky_of_one_plus(along: Floats) -> list[list[Floats]]:
+    """Lower triangle of the Cholesky factor of I + T T', element by element over all terms, T of few rows.
+
+    Thousands of matrices of one to four rows: a call of a library for each would take ten times as long.
+    """
+    inner: list[list[Floats]] = []
+    for i in range(along.shape[2]):
+        row: list[Floats] = []
+        for j in range(i + 1):
+            value = np.einsum("lkd,lkd->lk", along[:, :, i], along[:, :, j]) + (1.0 if i == j else 0.0)
+            for k in range(j):
+                value = value - row[k] * (row[k] if i == j else inner[j][k])
+            row.append(np.sqrt(value) if i == j else value / inner[j][j])
+        inner.append(row)
+    return inner
 
 
 def log_sum(values: Floats) -> Floats:

@@ -1,0 +1,13 @@
+"""How the boards of the calibration are held, which modes are read and how large they are, by the name of a layout."""
+
+from __future__ import annotations
+
+import ritz
+
+EDGES = {"free": ritz.ALL_FREE, "cantilever": ritz.CANTILEVER}
+LABELS = {
+    "free": ((1, 1), (2, 0), (0, 2), (2, 1), (1, 2), (3, 0), (2, 2), (3, 1)),
+    "cantilever": ((0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (1, 2), (2, 0), (2, 1)),
+}
+LENGTHS = {"free": (0.45, 0.20), "cantilever": (0.30, 0.16)}
+"""Sides, m, at which few modes of one class come close to each other over the prior."""
