@@ -190,7 +190,7 @@ def test_each_verdict_is_told_in_plain_words(clamped, verdict):
     told = {
         "none needed": ("need no further effect", "no more than their noise"),
         "named": ("An effect was found", "point to membrane tension.", "its low modes ring higher", "is reduced",
-                  "larger than on 99 % of simulated boards"),
+                  "every condition of that claim is met"),
         "indistinguishable group": ("cannot tell which: membrane tension or air loading.", "No improvement is claimed"),
         "unexplained": ("Something is missing that was not found", "Check the labels"),
         "undetectable": ("These readings could not show it",),

@@ -59,7 +59,10 @@ def claim_table(diagnosis: Diagnosis) -> Table | None:
     for one in diagnosis.conditions:
         words = CONDITIONS[one.name]
         wanted = words.wanted.format(limit=words.shown(one.limit))
-        rows.append((words.title, words.shown(one.value), wanted, "yes" if one.is_met else "no"))
+        found = words.shown(one.value)
+        if one.name == "chance selection" and diagnosis.null_control.nested_ratio_percentile is not None:
+            found += f", smaller than on {diagnosis.null_control.nested_ratio_percentile:.0f} % of them"
+        rows.append((words.title, found, wanted, "yes" if one.is_met else "no"))
     return Table(
         "May a lower error be claimed? Only if every condition is met", ("", "found", "wanted", "met"), tuple(rows)
     )

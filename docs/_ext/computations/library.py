@@ -12,13 +12,16 @@ import numpy as np
 import bayesplate
 from bayesplate import errors
 from bayesplate.cards.shelf import card_names
+from bayesplate.diagnosis.decision.claim import IMPROBABLE, STANDARD_ERRORS
 from bayesplate.diagnosis.decision.verdict import AT_LIMIT, CLEARLY, WITHIN
 from bayesplate.diagnosis.evidence.folds import NEEDED
 from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, TWO
-from bayesplate.diagnosis.evidence.null_control import CLAIM_QUANTILE, N_SETS
+from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS
 from bayesplate.diagnosis.evidence.predictive import PASSES
+from bayesplate.diagnosis.evidence.sensitivity import NOISES, WIDTHS
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects import EFFECTS
+from bayesplate.effects.words import joined
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
@@ -153,7 +156,8 @@ def gate(folder: Path) -> str:
 def verdict_limits(folder: Path) -> str:
     """The numbers in the rules of the verdict."""
     rows = [
-        ("probability of no effect from which on none is added", f"{NEEDED:g}"),
+        ("an effect is needed: probability of no effect below", f"{NEEDED:g}"),
+        ("or larger odds against no effect than all but so many boards without any", f"{100 * FALSE_ALARMS:g} of 100"),
         ("named: more probable than the next by a factor of", f"{CLEARLY:g}"),
         ("group: within a factor of the best", f"{WITHIN:g}"),
         ("a pair counts if it beats its better member by a factor of", f"{CLEARLY:g}"),
@@ -162,7 +166,14 @@ def verdict_limits(folder: Path) -> str:
         ("look-alikes: cosine of the visible parts above", f"{LOOK_ALIKE:g}"),
         ("prior probability of no effect, one, two", f"{NONE:g}, {ONE:g}, {TWO:g}"),
         ("simulated boards of the null control", f"{N_SETS}"),
-        ("a claim: chance alone would do as well in fewer than", f"{100 * CLAIM_QUANTILE:g} of 100"),
+        ("a name survives widths of the sizes' priors times", joined([f"{one:g}" for one in WIDTHS.values()])),
+        ("and noises times", joined([f"{one:.2g}" for one in NOISES.values()])),
+        (
+            "a claim: an effect chosen by chance lowers the left-out error as far in fewer than",
+            f"{100 * BY_CHANCE:g} of 100",
+        ),
+        ("a claim: standard errors by which the nested log score rises, more than", f"{STANDARD_ERRORS:g}"),
+        ("a claim: probability of no effect, at its largest, below", f"{IMPROBABLE:g}"),
     ]
     return words_table(("rule", "number"), rows)
 
