@@ -77,7 +77,8 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     values = problem.parameters.values(flat)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     noise = np.exp(problem.parameters.log_noise(flat))
-    by_setup = posterior.log_frequencies(flat)
+    distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
+    by_setup = [part[which.ravel()] for part in posterior.log_frequencies(distinct)]
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
     predictive, log_likelihood = [], []
     for i, (readings, predicted) in enumerate(zip(posterior.readings, by_setup, strict=True)):

@@ -38,8 +38,6 @@ Floats = NDArray[np.float64]
 
 HALF_WIDTH = 0.6
 """Of the shared laws in ln D_x / D_s and ln D_y / D_s: boards of a design spread by 0.17 and 0.18."""
-N_NULL_SETS = 2000
-"""Null simulations of a setting: a false-alarm rate of 2 % is known to 0.3 points."""
 
 
 def baseline_of_card(planted: PlantedBoard) -> Baseline:
@@ -90,7 +88,7 @@ def law_without_effect(design: str, estimate: Estimate) -> Predict:
 def control_of(setting: Setting) -> NullControl:
     """Null simulations of a setting: the same for every board of it, whichever process makes them."""
     planted = _median_board(setting)
-    return null_control(ground_of(planted, shared_law), setting.rng(), n_sets=N_NULL_SETS)
+    return null_control(ground_of(planted, shared_law), setting.rng())
 
 
 @cache

@@ -87,6 +87,13 @@ def test_the_log_score_rises_by_two_standard_errors_of_the_paired_differences(fo
     assert (told.value, told.limit, told.is_met) == (0.0, 0.0, False)
 
 
+def test_a_gain_within_two_standard_errors_is_not_enough():
+    weak = searched(0.12)
+    told = judge_claim(weak, replace(decided(weak), index=1), CONTROL, folds(weak)).conditions[1]
+    assert 0.0 < told.value < told.limit
+    assert not told.is_met
+
+
 def test_a_gain_that_rests_on_one_reading_is_within_its_standard_error():
     gain, error = score_gain([9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert gain == pytest.approx(error)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level
 
+from bayesplate.diagnosis.decision import constants
 from bayesplate.diagnosis.decision.constants import draw_constants
 from bayesplate.diagnosis.evidence.draws import draw_terms
 from bayesplate.diagnosis.evidence.exact import draw_exact, exact_log_frequencies, log_weights_of, under_exact_law
@@ -144,14 +145,26 @@ def test_without_an_exact_law_the_search_stays_linear(found):
     assert np.array_equal(drawn.predicted, draw_terms(linear, 0, np.random.default_rng(2), 500).predicted)
 
 
-def test_averages_are_by_the_probabilities_of_the_exact_law(found):
-    """The mixture of the draws under each hypothesis."""
-    exact = under_exact_law(found)
-    means = [
-        np.exp(draw_exact(found, i, np.random.default_rng(5), N_DRAWS).log_rigidities).mean(axis=0) for i in range(3)
-    ]
-    wanted = exact.probability @ np.array(means)
+def test_averages_are_by_the_probabilities_of_the_exact_law(found, monkeypatch):
+    """Whatever these are: here all of it with the explanation that the search finds least probable."""
+    shares = np.array([0.0, 0.0, 1.0])
+    monkeypatch.setattr(constants, "under_exact_law", lambda found: replace(found, probability=shares))
+    means = np.array(
+        [np.exp(draw_exact(found, i, np.random.default_rng(5), N_DRAWS).log_rigidities).mean(axis=0) for i in range(3)]
+    )
     drawn = draw_constants(found, np.random.default_rng(6), N_DRAWS).values
     told = np.array([drawn[name].mean() for name in RIGIDITIES])
     errors = np.array([drawn[name].std() for name in RIGIDITIES]) * np.sqrt(4.0 / N_DRAWS)
-    assert np.abs((told - wanted) / errors).max() < 4.0
+    assert np.abs((told - shares @ means) / errors).max() < 4.0
+    assert np.abs((told - found.probability @ means) / errors).max() > 6.0  # control: those of the search
+
+
+def test_what_is_improbable_is_corrected_as_no_effect_is(found):
+    """Its own weights are not worth their cost, but an uncorrected one would gain on all others."""
+    shares = np.array([0.6, 0.399, 0.001])
+    evidence = np.log(shares / np.array([one.prior for one in found.ground.hypotheses]))
+    exact = under_exact_law(replace(found, log_evidence=evidence, probability=shares))
+    corrections = exact.log_evidence - evidence
+    assert corrections[2] == pytest.approx(corrections[0], abs=1e-12)
+    assert abs(corrections[0]) > 1e-3
+    assert abs(corrections[1] - corrections[0]) > 1e-6

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_searches import bare, baseline, ground_of, one_level, table, with_readings
@@ -68,6 +70,14 @@ def test_only_close_neighbours_of_different_symmetry_may_be_exchanged(base):
     assert {(one.first, one.second) for one in confusable(base)} == {(0, 1), (1, 2), (3, 4), (4, 5)}
     apart = baseline(np.random.default_rng(1), parities=CLOSE_PAIR, spacing=0.13)
     assert confusable(apart) == ()
+
+
+def test_neighbours_of_one_class_that_stand_in_the_other_order_may_be_confused(base):
+    """The third and fourth readings are of one class: only where they have crossed is there something to exchange."""
+    crossed = base.log_frequency[[0, 1, 3, 2, 4, 5]] - base.log_frequency
+    assert (2, 3) not in {(one.first, one.second) for one in confusable(base)}
+    found = {(one.first, one.second) for one in confusable(replace(base, residual=crossed))}
+    assert (3, 2) in found
 
 
 def test_exchanging_twice_changes_nothing_and_once_moves_the_readings(base):

@@ -169,4 +169,8 @@ def test_a_name_has_to_survive_widths_and_noises(small):
         "with the priors of the sizes halved", "with the priors of the sizes doubled",
         "if the noise is 1.5 times smaller", "if the noise is 1.5 times larger",
     ]  # fmt: skip
+    usual = [
+        varied(found, **change).none for change in ({"width": 0.5}, {"width": 2.0}, {"noise": 2 / 3}, {"noise": 1.5})
+    ]
+    assert [one.found.none for one in told] == pytest.approx(usual)
     assert len({round(one.found.none, 6) for one in told} | {round(found.none, 6)}) == 5
