@@ -21,6 +21,8 @@ from trial.run import BASE_SEED, run
 from trial.shared import baseline_of_card, control_of
 from trial.summary import CONDITIONS
 
+from bayesplate.diagnosis.evidence.null_control import N_SETS
+
 FEW = (Cell("one", "cantilever-6", 2, size=2.0), Cell("null", "cantilever-6", 2))
 
 
@@ -104,7 +106,7 @@ def test_null_simulations_are_shared_by_boards_of_a_setting():
     others = {Cell("null", "cantilever-6", 1, noise=noise).setting for noise in NOISES}
     assert len(others | {Cell("null", "cantilever-6", 1, 2.0).setting, Cell("null", "free-12", 1).setting}) == 5
     assert control_of(cell.setting) is control_of(Cell("null", "cantilever-6", 9).setting)
-    assert control_of(cell.setting).against.shape == (2000,)
+    assert control_of(cell.setting).against.shape == (N_SETS,)
     assert cell.setting.rng().random() == cell.setting.rng().random()
     assert len({one.rng().random() for one in others}) == 3
 
