@@ -15,7 +15,7 @@ from bayesplate.diagnosis.decision.advice import recommendation
 from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
-from bayesplate.diagnosis.decision.verdict import Verdict, answer_words, answers, decide
+from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answer_words, answers, decide
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
@@ -219,7 +219,7 @@ def advice(found: Found, verdict: Verdict) -> str:
 def asked_about(found: Found, verdict: Verdict) -> tuple[str, ...]:
     """Effects that the next measurement should tell apart: the alternatives, or what is most probable so far."""
     ranked = answers(found)
-    near = verdict.stands_for if verdict.index else ranked[:3]
+    near = dict.fromkeys((*verdict.stands_for, *alternatives(found, ranked))) if verdict.index else ranked[:3]
     if verdict.index and len(near) == 1:
         return ()
     names = dict.fromkeys(name for one in near for name in one.members if name in found.ground.candidates)

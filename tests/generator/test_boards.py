@@ -90,7 +90,7 @@ def test_a_drawn_noise_is_log_normal_about_the_one_stated(rng: np.random.Generat
     ]
     assert np.mean(np.square(scatter)) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(scatter)))
     cards = [tomllib.loads(board.card_text()) for board in boards]
-    assert {setup["noise_percent"]["median"] for card in cards for setup in card["setup"]} == {0.289228}
+    assert {setup["noise_percent"]["median"] for card in cards for setup in card["setup"]} == {0.289229}
     assert plant(rng, "cantilever-6", []).truth.drawn_noise == {}
 
 

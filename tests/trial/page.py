@@ -166,6 +166,8 @@ def _constants(summary: Mapping[str, Any]) -> Iterable[str]:
     yield from ("", "## Intervals of 90 % for the constants: how many hold the truth, percent", "")
     body = []
     for name, cell in summary["cells"].items():
+        if "constants" not in cell:
+            continue
         shares = [[cell["constants"][way][c]["share"] for c in CONSTANTS] for way in WAYS]
         body.append((name, *(" / ".join(f"{100 * one:.0f}" for one in each) for each in shares)))
     yield from _table(("cell", *(f"{shown}: {' / '.join(CONSTANTS)}" for shown in WAYS.values())), body)

@@ -103,8 +103,9 @@ def _cell(cell: Cell, records: Sequence[Record]) -> dict[str, Any]:
         "flagged": share(records, is_flagged).as_json(),
         "claimed": share(records, is_claimed).as_json(),
         "gate_of_the_ideal_board": share(records, lambda r: r["gate"]["bare"] >= 0.05).as_json(),
-        "constants": _coverage(records),
     }
+    if cell.kind != "null":  # their constants were not drawn
+        result["constants"] = _coverage(records)
     if cell.kind == "outside":
         return result
     result["top_1"] = share(records, is_best).as_json()

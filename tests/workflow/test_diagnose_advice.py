@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -36,6 +37,10 @@ def test_alternatives_are_told_apart_and_a_winner_without_rival_from_nobody(rank
     assert asked_about(FOUND, verdict("named", 1)) == ()
     ranked(0.8, 0.1)
     assert asked_about(FOUND, verdict("named", 1)) == ("shear", "air")
+    ranked(0.9, 0.01)
+    turned = tuple(Answer((name,), i, 0.0) for i, name in ((1, "shear"), (3, "mass")))
+    group = replace(verdict("indistinguishable group", 1), stands_for=turned)
+    assert asked_about(FOUND, group) == ("shear", "mass")
 
 
 def test_where_nothing_explains_the_readings_only_a_wrong_one_is_told(ranked, monkeypatch):
