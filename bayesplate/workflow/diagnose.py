@@ -119,7 +119,7 @@ def diagnose(
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
     n_null : int
-        Data sets of the null control.
+        Data sets of the null control at most.
     progress : callable, optional
         Told when a part begins and after every chunk of sampling, with the share of the whole that is done.
 
@@ -156,7 +156,7 @@ def diagnose(
     stages.begin("search for effects", _SEARCH)
     found = search(prepare_search(baseline_of(before.inference.problem), tell=stages.reached))
     stages.begin("the same search on simulated boards", _CONTROL)
-    control = null_control(found.ground, np.random.default_rng([seed, _NULL_LINE]), n_null)
+    control = null_control(found.ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
     finals = verdict.stands_for[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals)

@@ -14,6 +14,8 @@ from bayesplate.diagnosis.evidence.search import Ground
 Floats = NDArray[np.float64]
 
 N_SETS = 500
+_BATCH = 100
+_CONFIDENCE = 0.99
 FALSE_ALARMS = 0.02
 """Share of boards without any effect on which one is called needed."""
 BY_CHANCE = 0.05
@@ -60,8 +62,12 @@ class NullControl:
         return None if self.ratio is None else 100.0 * float(np.mean(self.ratio > ratio))
 
 
-def null_control(ground: Ground, rng: np.random.Generator, n_sets: int = N_SETS) -> NullControl:
+def null_control(
+    ground: Ground, rng: np.random.Generator, n_sets: int = N_SETS, against: float = np.inf
+) -> NullControl:
     """Simulate readings of a board without any effect and search each of them.
+
+    Where the odds of the board at hand are clearly within chance, fewer sets say so as well as many.
 
     Parameters
     ----------
@@ -69,17 +75,36 @@ def null_control(ground: Ground, rng: np.random.Generator, n_sets: int = N_SETS)
         What the board at hand says does not matter, only its sizes, its modes and its priors do.
     rng : numpy.random.Generator
     n_sets : int
+        At most; fewer as soon as more than the false alarms certainly have larger odds than the board.
+    against : float
+        ln odds against no effect of the board at hand; by default none that fewer sets could judge.
 
     Returns
     -------
     NullControl
     """
-    residuals = simulate_null(ground, rng, n_sets)
-    folded = nested(ground, residuals, ALWAYS)
-    return NullControl(
-        against=odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, residuals)),
-        ratio=None if folded is None else folded.ratio,
-    )
+    odds: list[Floats] = []
+    ratios: list[Floats] = []
+    for n_done in range(0, n_sets, _BATCH):
+        residuals = simulate_null(ground, rng, min(_BATCH, n_sets - n_done))
+        odds.append(odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, residuals)))
+        folded = nested(ground, residuals, ALWAYS)
+        if folded is not None:
+            ratios.append(folded.ratio)
+        if _is_within_chance(np.concatenate(odds), against):
+            break
+    return NullControl(np.concatenate(odds), np.concatenate(ratios) if ratios else None)
+
+
+def _is_within_chance(odds: Floats, against: float) -> bool:
+    """Whether larger odds than those of the board are certainly more frequent than the false alarms.
+
+    By the lower bound of Clopper and Pearson on the share of the sets.
+    """
+    from scipy.special import betaincinv
+
+    larger = int(np.sum(odds > against))
+    return larger > 0 and bool(betaincinv(larger, odds.size - larger + 1, 1.0 - _CONFIDENCE) > FALSE_ALARMS)
 
 
 def simulate_null(ground: Ground, rng: np.random.Generator, n_sets: int) -> Floats:
