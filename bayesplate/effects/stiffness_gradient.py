@@ -3,58 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, Scope, Variation
-from bayesplate.effects.part import WHOLE, Part, growing_along_x, vibrating_part
+from bayesplate.effects.base import Variation
+from bayesplate.effects.gradients import GradientAlongX
+from bayesplate.effects.part import growing_along_x
 from bayesplate.modes.fields import Group
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
-
-DEFAULT_GRADIENT = Quantity.from_mean(0.0, 0.08, "normal")
-_SOURCE = "normal: E_x varies by some per cent along one plank; a board is not stiffer at a known end"
 
 
 @dataclass(frozen=True)
-class StiffnessGradient(Effect):
+class StiffnessGradient(GradientAlongX):
     """E_x 1 + g (s - 1/2) times its mean, s from 0 to 1 along the whole board; the density stays.
 
     Where the plate has the curvatures a along and b across the grain, twice its bending energy per area is
     E_x h^3 / 12 a^2 + D_y (b + nu_xy a)^2. The first part alone grows, so D_x grows by g times D_x - nu_xy^2 D_y. E_y,
     G_xy and nu_xy stay, and with them D_s. D_y and nu_xy D_y stay as well: strictly they hold E_x in
     1 - nu_xy^2 E_y / E_x and fall by a hundredth of g where it grows by g, which is 0.2 cents at g = 0.1.
-
-    Attributes
-    ----------
-    part : Part
-        What vibrates of the board along x.
     """
 
-    part: Part = WHOLE
-
     name: ClassVar[str] = "stiffness_gradient"
-    scope: ClassVar[Scope] = "board"
     sentence: ClassVar[str] = "The wood is stiffer towards one end, so modes that bend it there ring higher."
-
-    @classmethod
-    def of(cls, board: Board, setup: Setup) -> StiffnessGradient:
-        """The effect on the part of the board that vibrates."""
-        return cls(part=vibrating_part(board, setup, "x"))
-
-    def in_setup(self, board: Board, setup: Setup) -> StiffnessGradient:
-        """The same gradient on the part of the board that vibrates in another setup."""
-        return replace(self, part=vibrating_part(board, setup, "x"))
-
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Relative growth of E_x from x = 0 to the other end."""
-        return (self.parameter("gradient", DEFAULT_GRADIENT, "1", 0.0, _SOURCE),)
-
-    def keeps_symmetry(self) -> tuple[bool, bool]:
-        """The two ends along x differ."""
-        return False, True
+    default: ClassVar[Quantity] = Quantity.from_mean(0.0, 0.08, "normal")
+    source: ClassVar[str] = "normal: E_x varies by some per cent along one plank; a board is not stiffer at a known end"
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
         """E_x that grows along x."""

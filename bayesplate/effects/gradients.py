@@ -1,0 +1,47 @@
+"""What two effects share: a property of the wood that grows along the board, so that its two ends differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+from bayesplate.effects.base import Effect, Scope
+from bayesplate.effects.part import WHOLE, Part, vibrating_part
+from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import Parameter
+from bayesplate.plate.setup import Setup
+from bayesplate.quantities import Quantity
+
+
+@dataclass(frozen=True)
+class GradientAlongX(Effect):
+    """A property 1 + g (s - 1/2) times its mean, s from 0 to 1 along the whole board.
+
+    Attributes
+    ----------
+    part : Part
+        What vibrates of the board along x.
+    """
+
+    part: Part = WHOLE
+
+    scope: ClassVar[Scope] = "board"
+    default: ClassVar[Quantity]
+    source: ClassVar[str]
+
+    @classmethod
+    def of(cls, board: Board, setup: Setup) -> Self:
+        """The effect on the part of the board that vibrates."""
+        return cls(part=vibrating_part(board, setup, "x"))
+
+    def in_setup(self, board: Board, setup: Setup) -> Self:
+        """The same gradient on the part of the board that vibrates in another setup."""
+        return replace(self, part=vibrating_part(board, setup, "x"))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Relative growth from x = 0 to the other end."""
+        return (self.parameter("gradient", self.default, "1", 0.0, self.source),)
+
+    def keeps_symmetry(self) -> tuple[bool, bool]:
+        """The two ends along x differ."""
+        return False, True
