@@ -53,7 +53,7 @@ class Claim:
     Attributes
     ----------
     conditions : tuple of Condition
-        None if nothing was added to the model.
+        Empty if nothing was added to the model.
     """
 
     conditions: tuple[Condition, ...] = ()

@@ -13,14 +13,18 @@ from bayesplate.plate.board import Board
 def likely_forms(found: Found, index: int) -> tuple[Form, ...]:
     """For each effect of a hypothesis the form that is most probable."""
     hypothesis = found.ground.hypotheses[index]
-    chosen = []
-    for member, name in enumerate(hypothesis.members):
-        if name not in found.ground.candidates:
-            continue
-        laws = found.ground.candidates[name].laws
-        shares = [_form_share(found, index, member, form) for form in range(len(laws))]
-        chosen.append(laws[int(np.argmax(shares))].form)
-    return tuple(chosen)
+    candidates = found.ground.candidates
+    return tuple(
+        candidates[name].laws[likely_form(found, index, member)].form
+        for member, name in enumerate(hypothesis.members)
+        if name in candidates
+    )
+
+
+def likely_form(found: Found, index: int, member: int) -> int:
+    """Which form of one effect of a hypothesis is most probable."""
+    laws = found.ground.candidates[found.ground.hypotheses[index].members[member]].laws
+    return int(np.argmax([_form_share(found, index, member, form) for form in range(len(laws))]))
 
 
 def refit_board(found: Found, index: int) -> Board:

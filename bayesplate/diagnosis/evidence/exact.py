@@ -30,7 +30,7 @@ _OVERSAMPLED = 2
 """Draws for each that is kept by its weight."""
 
 
-@lru_cache(maxsize=2)  # the verdict, the claim and the averages ask for the same
+@lru_cache(maxsize=2)  # the verdict and the averages ask for the same
 def under_exact_law(found: Found) -> Found | None:
     """The same search with every evidence corrected to the exact law.
 
@@ -48,7 +48,7 @@ def under_exact_law(found: Found) -> Found | None:
     rng = np.random.default_rng(0)
     corrections = np.full(found.probability.size, _correction(found, 0, rng))
     worth = found.probability > _WORTH * found.probability.max()
-    for index in np.flatnonzero(worth)[1:] if worth[0] else np.flatnonzero(worth):
+    for index in 1 + np.flatnonzero(worth[1:]):
         if _has_law(found, int(index)):
             corrections[index] = _correction(found, int(index), rng)
     evidence = found.log_evidence + corrections

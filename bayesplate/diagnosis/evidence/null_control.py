@@ -14,8 +14,8 @@ from bayesplate.diagnosis.evidence.search import Ground
 Floats = NDArray[np.float64]
 
 N_SETS = 500
-_BATCH = 100
-_CONFIDENCE = 0.99
+"""Simulated boards at most, a batch at a time until the answer is certain."""
+_BATCH, _CERTAIN = 100, 0.99
 FALSE_ALARMS = 0.02
 """Share of boards without any effect on which one is called needed."""
 BY_CHANCE = 0.05
@@ -104,7 +104,7 @@ def _is_within_chance(odds: Floats, against: float) -> bool:
     from scipy.special import betaincinv
 
     larger = int(np.sum(odds > against))
-    return larger > 0 and bool(betaincinv(larger, odds.size - larger + 1, 1.0 - _CONFIDENCE) > FALSE_ALARMS)
+    return larger > 0 and bool(betaincinv(larger, odds.size - larger + 1, 1.0 - _CERTAIN) > FALSE_ALARMS)
 
 
 def simulate_null(ground: Ground, rng: np.random.Generator, n_sets: int) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,7 @@ def variants(found: Found) -> Iterator[Variant]:
         yield Variant("under the exact law", exact)
 
 
+@lru_cache(maxsize=8)  # the verdict, the claim and the result ask for the same
 def varied(found: Found, *, width: float = 1.0, noise: float = 1.0) -> Found:
     """The same search with other priors.
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.diagnosis.decision.refits import likely_form
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
 from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
@@ -135,7 +136,7 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
     """
     if not one.laws[0].form.free:
         return _fixed(one)
-    best = _likely_form(found, index, one)
+    best = likely_form(found, index, 0)
     free = one.laws[best].form.free[0]
     share, z = size_posterior(found, index, 0, best, 0)
     order = np.argsort(z)
@@ -145,21 +146,13 @@ def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
     return Amplitude(parameter=free.key, form=one.laws[best].form.detail, q05=low, q50=middle, q95=high, unit=free.unit)
 
 
-def _likely_form(found: Found, index: int, one: Candidate) -> int:
-    """Which form of an effect is most probable."""
-    if not all(law.form.free for law in one.laws):
-        return 0
-    shares = [size_posterior(found, index, 0, form, 0)[0].sum() for form in range(len(one.laws))]
-    return int(np.argmax(shares))
-
-
 def _learnt(found: Found, index: int, one: Candidate) -> dict[str, float]:
     """How far the posterior of each size left its prior, given that the effect is there: bits, by parameter.
 
     Of the most probable form. A size of which nothing is learnt says nothing against its null value either.
     """
     table = found.ground.hypotheses[index].table
-    form = _likely_form(found, index, one)
+    form = likely_form(found, index, 0)
     prior = table.weights[table.form == form]
     result = {}
     for i, free in enumerate(one.laws[form].form.free):
