@@ -48,7 +48,7 @@ PRIORS = {
 """Unit, kind, median, standard deviation (of the logarithm if log-normal) and bounds."""
 
 MASSES = {
-    "accelerometer": (1.2e-3, 2.5),
+    "accelerometer": (1.4e-3, 2.7),
     "exciter": (50e-3, 1.6),
     "shaker": (10e-3, 2.0),
     "weight": (5e-3, 3.0),
