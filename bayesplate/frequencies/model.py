@@ -1,4 +1,4 @@
-"""Frequencies of one setup: its plate, the places of its labelled modes, and the two laws around an estimate."""
+"""Frequencies of one setup: its plate, the places of its modes, and the two laws around an estimate."""
 
 from __future__ import annotations
 
@@ -9,12 +9,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency
+from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
-from bayesplate.modes.naming import Place, find
-from bayesplate.modes.plate import PlateMatrices
+from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
+from bayesplate.modes.plate import Beams, PlateMatrices
 from bayesplate.modes.reduced import reduced_order_model
+from bayesplate.modes.solve import solve_up_to
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
+
+_ABOVE = 1.15
+"""Frequency up to which modes are looked for, over the highest peak: what lies higher will not come down to it."""
+
+
+@dataclass(frozen=True)
+class OtherMode:
+    """A mode that no reading is labelled with.
+
+    Attributes
+    ----------
+    place : Place
+    beams : (int, int) or None
+        Orders of the beam functions that its shape resembles; None where it clearly resembles none.
+    """
+
+    place: Place
+    beams: Beams | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +51,11 @@ class SetupModel:
     linear : LinearLaw
     exact : ExactLaw or None
         None until `with_exact` has built it.
+    others : tuple of OtherMode
+        Modes without a label, up to above the highest peak; none until `with_others` has found them.
+    residues : (n_modes + n_others,) array or None
+        Residue of each mode between hammer and sensor over the largest that its shape could give; None where the places
+        are not known.
     """
 
     system: System
@@ -38,6 +63,8 @@ class SetupModel:
     places: tuple[Place, ...]
     linear: LinearLaw
     exact: ExactLaw | None = None
+    others: tuple[OtherMode, ...] = ()
+    residues: NDArray[np.float64] | None = None
 
     @property
     def setup(self) -> Setup:
@@ -52,8 +79,17 @@ class SetupModel:
             raise ValueError("the exact law of this setup has not been built yet")
         return self.exact
 
+    @property
+    def every_place(self) -> tuple[Place, ...]:
+        """Places of the labelled modes, then of the others."""
+        return (*self.places, *(other.place for other in self.others))
+
     def log_frequencies(self, values: Values, law: LawName) -> NDArray[np.float64]:
         """ln f of each labelled mode: (n_draws, n_modes) array; not a number where the law gives no frequency."""
+        return self.every_log_frequency(values, law)[:, : len(self.places)]
+
+    def every_log_frequency(self, values: Values, law: LawName) -> NDArray[np.float64]:
+        """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         return log_frequency(self.law(law).squared(self.system.weights(values)))
 
     def sensitivities(self, values: Values) -> NDArray[np.float64]:
@@ -61,11 +97,12 @@ class SetupModel:
 
         Half the share of each constant in the mode's energy: for the bare thin plate rows sum to one half.
         """
-        total = self.linear.stiffness @ self.system.weights(values).stiffness[0]
+        stiffness = self.linear.stiffness[: len(self.places)]
+        total = stiffness @ self.system.weights(values).stiffness[0]
         columns = []
         for name in ("D_x", "D_y", "D_s"):
             without = self.system.weights({**values, name: 0.0 * values[name]}).stiffness[0]
-            columns.append(0.5 * (1.0 - self.linear.stiffness @ without / total))
+            columns.append(0.5 * (1.0 - stiffness @ without / total))
         return np.column_stack(columns)
 
 
@@ -101,11 +138,52 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
     )
 
 
+def with_others(model: SetupModel, values: Values) -> SetupModel:
+    """Add the modes that peaks may be: all without a label up to above the highest peak or reading.
+
+    Parameters
+    ----------
+    model : SetupModel
+    values : dict of float
+        Where it was made.
+
+    Returns
+    -------
+    SetupModel
+        With their linear law, without an exact one.
+    """
+    setup = model.setup
+    highest = 2.0 * np.pi * _ABOVE * max([*setup.measured, *setup.unlabelled])
+    modes = solve_up_to(model.plate, model.system.weights(values).at(0), highest**2)
+    at = {(parity, int(rank)): i for i, (parity, rank) in enumerate(zip(modes.parities, modes.ranks, strict=True))}
+    labelled = [at.get((place.parity, place.rank)) for place in model.places]
+    rest = [i for i in range(len(modes.eigenvalues)) if i not in labelled]
+    named = name_modes(modes)
+    taken = {reading.beams for reading in setup.readings}
+    others = tuple(
+        OtherMode(
+            Place(modes.parities[i], int(modes.ranks[i]), named[i][1]),
+            named[i][0] if named[i][1] >= CERTAIN and named[i][0] not in taken else None,
+        )
+        for i in rest
+    )
+    n = len(model.places)
+    linear = LinearLaw(
+        np.concatenate([model.linear.stiffness[:n], modes.coefficients[rest]]),
+        np.concatenate([model.linear.mass[:n], modes.mass_coefficients[rest]]),
+    )
+    by_mode = residues_of(setup, modes, values)
+    residues = None
+    if by_mode is not None:
+        residues = np.array([np.nan if i is None else by_mode[i] for i in [*labelled, *rest]])
+    return replace(model, linear=linear, exact=None, others=others, residues=residues)
+
+
 def with_exact(model: SetupModel, centre: Values, around: Sequence[Values], held_out: Sequence[Values]) -> SetupModel:
     """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`."""
     reduced = reduced_order_model(
         model.plate,
-        model.places,
+        model.every_place,
         model.system.weights(centre).at(0),
         [model.system.weights(values).at(0) for values in around],
         [model.system.weights(values).at(0) for values in held_out],

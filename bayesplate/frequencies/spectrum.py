@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.residues import NODAL_LINE, residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, name_modes
 from bayesplate.modes.plate import PlateMatrices
 from bayesplate.modes.solve import Modes, solve
-from bayesplate.plate.board import Values, vibrating_lengths
+from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
 
-_NODAL_LINE = 0.05
 _FURTHER = 1.1
 """Than where the modes of a plate would reach if they were evenly spaced, which they nearly are."""
 _FEWEST_MODES, _MOST_MODES = 12, 96
@@ -117,39 +117,26 @@ def doubtful_labels(models: Sequence[SetupModel]) -> tuple[str, ...]:
 
 
 def sign_conflicts(setup: Setup, modes: Modes, named: tuple[NamedMode, ...], values: Values) -> tuple[str, ...]:
-    """Labels whose measured sign of the residue differs from the product of the shape at hammer and sensor.
+    """Labels whose measured sign of the residue differs from that of the shape.
 
-    Only where the setup states signs, the hammer's place and one sensor's place, and where neither stands near a nodal
-    line: there the sign tells nothing.
+    Only where the setup states signs and the places are known, and where neither stands near a nodal line: there the
+    sign tells nothing.
 
     Returns
     -------
     tuple of str
         One sentence a conflict.
     """
-    sensors = [item for item in setup.attached if item.kind == "accelerometer" and len(item.places) == 1]
     stated = {reading.label: reading.sign for reading in setup.readings if reading.sign}
-    if setup.hammer is None or len(sensors) != 1 or not stated:
+    residues = residues_of(setup, modes, values) if stated else None
+    if residues is None:
         return ()
-    places = [_fraction(setup, place, values) for place in (setup.hammer, sensors[0].places[0])]
-    at = [modes.displacement(np.array([x]), np.array([y]))[:, 0, 0] for x, y in places]
-    product = at[0] * at[1]
-    largest = np.max(np.abs(modes.displacement(np.linspace(0, 1, 21), np.linspace(0, 1, 21))), axis=(1, 2)) ** 2
     sentences = []
-    for mode, value, scale in zip(named, product, largest, strict=True):
-        expected = "+" if value > 0 else "-"
-        if mode.label in stated and stated[mode.label] != expected and abs(value) > _NODAL_LINE * scale:
+    for mode, residue in zip(named, residues, strict=True):
+        expected = "+" if residue > 0 else "-"
+        if mode.label in stated and stated[mode.label] != expected and abs(residue) > NODAL_LINE:
             sentences.append(
                 f"setup {setup.name}: mode {mode.name} should have sign {expected} between hammer and sensor, the card "
                 f"says {stated[mode.label]}: check its label"
             )
     return tuple(sentences)
-
-
-def _fraction(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:
-    """A place on the board (m from its corner) as fractions of the vibrating sides."""
-    fractions = []
-    for axis, position, side in zip("xy", place, vibrating_lengths(values, setup), strict=True):
-        covered = values[setup.input_name(f"{axis}0")] if f"{axis}0" in setup.clamped else 0.0
-        fractions.append(float(np.clip((position - covered) / side, 0.0, 1.0)))
-    return fractions[0], fractions[1]

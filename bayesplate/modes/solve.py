@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 
 _SPARE_FOR_PROJECTED = 8
+_FIRST_OF_CLASS = 8
 _TOLERANCE = 1e-8
 """Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
 
@@ -173,6 +174,15 @@ def solve(plate: PlateMatrices, weights: Weights, n_modes: int) -> Modes:
         if not short and values.size >= n_modes:
             return collect(plate, solved, n_modes)
         solved |= solve_classes(plate, weights, short or {p: 2 * c.eigenvalues.size for p, c in solved.items()})
+
+
+def solve_up_to(plate: PlateMatrices, weights: Weights, highest: float) -> Modes:
+    """All elastic modes of a plate up to an eigenvalue (s^-2), at least one; see `solve`."""
+    solved = {block.parity: solve_class(block, weights, _FIRST_OF_CLASS) for block in plate.blocks}
+    while short := {p: 2 * c.eigenvalues.size for p, c in solved.items() if c.eigenvalues[-1] < highest}:
+        solved |= solve_classes(plate, weights, short)
+    n_modes = sum(int(np.sum(c.eigenvalues <= highest)) for c in solved.values())
+    return collect(plate, solved, max(n_modes, 1))
 
 
 def collect(plate: PlateMatrices, solved: Mapping[Parity, ClassModes], n_modes: int | None = None) -> Modes:

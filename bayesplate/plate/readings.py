@@ -9,8 +9,9 @@ adds resolution^2 / 12 to the variance.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,6 +53,17 @@ class ReadingErrors:
         """Errors of a setup's readings; plain numbers are rounded to its resolution, others state their own sd."""
         own = setup.relative_sd
         return cls(setup.measured, own, np.where(own == 0, setup.resolution, 0.0), robust)
+
+    @classmethod
+    def of_peaks(cls, setup: Setup, readings: Iterable[int], robust: bool = False) -> ReadingErrors:
+        """Errors of a setup's peaks without a label, then of some of its labelled readings, by their indices."""
+        every = [peak.frequency for peak in setup.peaks] + [setup.readings[i].frequency for i in readings]
+        own = np.array([one.sd / one.mean for one in every])
+        return cls(np.array([one.mean for one in every]), own, np.where(own == 0, setup.resolution, 0.0), robust)
+
+    def at(self, kept: NDArray[Any]) -> ReadingErrors:
+        """Some of the readings, or all in another order."""
+        return replace(self, frequency=self.frequency[kept], own_sd=self.own_sd[kept], resolution=self.resolution[kept])
 
     @cached_property
     def log_frequency(self) -> Floats:
@@ -113,6 +125,24 @@ class ReadingErrors:
         result[..., ~rounded] = self._density.log(z[..., ~rounded]) - np.log(scale[..., ~rounded])
         result[..., rounded] = self._density.log_between(low[..., rounded], high[..., rounded])
         return np.where(np.isnan(predicted), -np.inf, result)
+
+    def log_likelihood_of_each(self, predicted: Floats, noise: Floats) -> Floats:
+        """Logarithm of the probability of each reading if it were of each mode.
+
+        Parameters
+        ----------
+        predicted : (n_draws, n_modes) array
+            ln f (Hz).
+        noise : (n_draws,) array
+
+        Returns
+        -------
+        (n_draws, n_readings, n_modes) array
+        """
+        n_draws, n_modes = predicted.shape
+        each = np.repeat(predicted.reshape(-1, 1), self.frequency.size, axis=1)
+        found = self.log_likelihood(each, np.repeat(noise, n_modes))
+        return np.swapaxes(found.reshape(n_draws, n_modes, -1), 1, 2)
 
     def deviance_residuals(self, predicted: Floats, noise: ArrayLike) -> tuple[Floats, Floats]:
         """Signed roots of the deviances, and how they change with the prediction.
