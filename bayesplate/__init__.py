@@ -47,7 +47,8 @@ if TYPE_CHECKING:
     )
     from bayesplate.labels import Label
     from bayesplate.plate.board import Board
-    from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup
+    from bayesplate.plate.measured import Peak, Reading
+    from bayesplate.plate.setup import AttachedItem, DeclaredAir, Setup
     from bayesplate.quantities import Quantity
     from bayesplate.results.checking import CheckReport
     from bayesplate.results.comparison import Comparison
@@ -83,6 +84,7 @@ __all__ = [
     "ModesResult",
     "NotConvergedError",
     "NotIdentifiableError",
+    "Peak",
     "PriorCard",
     "Problem",
     "Quantity",
@@ -119,10 +121,11 @@ _HOMES = {
     "ModesResult": "bayesplate.workflow.modes",
     "NotConvergedError": "bayesplate.errors",
     "NotIdentifiableError": "bayesplate.errors",
+    "Peak": "bayesplate.plate.measured",
     "PriorCard": "bayesplate.cards.prior",
     "Problem": "bayesplate.workflow.problem",
     "Quantity": "bayesplate.quantities",
-    "Reading": "bayesplate.plate.setup",
+    "Reading": "bayesplate.plate.measured",
     "Setup": "bayesplate.plate.setup",
     "Summary": "bayesplate.results.summary",
     "check": "bayesplate.workflow.check",

@@ -15,7 +15,7 @@ from bayesplate.labels import Label
 from bayesplate.plate.board import INPUTS, Board, made_board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.setup import Reading, Setup
+from bayesplate.plate.setup import Peak, Reading, Setup
 from bayesplate.quantities import Quantity
 
 NARROW = 1.0001
@@ -49,6 +49,11 @@ def setup_of(
         clamped=dict(clamped or {}),
         resolution=resolution,
     )
+
+
+def peaks_of(*hertz: float) -> tuple[Peak, ...]:
+    """Peaks without a label, of which nothing but the frequency is known."""
+    return tuple(Peak(Quantity.exact(one)) for one in hertz)
 
 
 def board_of(plate: ritz.Plate, setups: Sequence[Setup], **inputs: Quantity) -> Board:

@@ -13,7 +13,16 @@ from bayesplate.cards.named import NamedCards, load_named
 from bayesplate.cards.physical import physical_faults, plate_mass_g
 from bayesplate.cards.prior import PriorCard, StatedPrior, load_prior
 from bayesplate.cards.remarks import remarks
-from bayesplate.cards.setup import AirSection, AttachedItem, Edges, HammerSection, SetupSection
+from bayesplate.cards.setup import (
+    MISSED,
+    SPURIOUS,
+    AirSection,
+    AttachedItem,
+    Edges,
+    HammerSection,
+    PeakSection,
+    SetupSection,
+)
 from bayesplate.cards.shelf import card_names
 from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
 
@@ -22,6 +31,8 @@ __all__ = [
     "EDGE_NAMES",
     "EDGE_WORDS",
     "EFFECT_NAMES",
+    "MISSED",
+    "SPURIOUS",
     "AirSection",
     "AttachedItem",
     "BoardCard",
@@ -30,6 +41,7 @@ __all__ = [
     "HammerSection",
     "MaterialSection",
     "NamedCards",
+    "PeakSection",
     "PlateSection",
     "PriorCard",
     "SetupSection",

@@ -39,12 +39,19 @@ from bayesplate.quantities import Quantity
 
 MOST_ATTACHED = 50
 DEFAULT_SETUP_NAME = "setup"
+MISSED, SPURIOUS = 0.2, 0.02
+"""Probabilities where a card states none: that a mode below the highest peak left no peak, that a peak is no mode."""
+
 _KILOHERTZ = "in Hz: 1 kHz is 1000 Hz"
 _HERTZ = Number(0.1, 1e6, "Hz", "in Hz; the zero-frequency modes of a free board are not listed", _KILOHERTZ)
 _FREQUENCY = QuantityReader(_HERTZ, furthest=FURTHEST_FREQUENCIES)
+_OPEN, _PROBABILITY = 1e-9, "a probability: 98 % is 0.98"
+_CONFIDENCE = Number(_OPEN, 1, hint=_PROBABILITY)
+_CHANCE = Number(_OPEN, 1 - _OPEN, hint=_PROBABILITY)
 _CLAMPED = Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing")
 _CLAMPED_LENGTH = QuantityReader(_CLAMPED, furthest=FURTHEST_SIZES, resolution=RULE)
 _ATTACHED_MASS = QuantityReader(Number(1e-4, 1e6, "g"), furthest=FURTHEST_SIZES, resolution=FINE_SCALES)
+_SIGN = Choice(("+", "-"))
 _EDGE_WANTED = 'a word for each of the four edges x0, x1, y0, y1: "clamped", "supported" or "free"'
 
 EdgeWord = Literal["clamped", "supported", "free"]
@@ -103,6 +110,17 @@ class AttachedItem(Section):
     )
 
 
+class PeakSection(Section):
+    """A peak without a label: its frequency, and what else was read there."""
+
+    hz: Annotated[Quantity, PlainValidator(_FREQUENCY)] = Field(description="its frequency in Hz")
+    sign: Annotated[str, PlainValidator(_SIGN)] = ""
+    amplitude: Annotated[float | None, PlainValidator(Number(1e-12, 1e12))] = None
+    damping_percent: Annotated[
+        float | None, PlainValidator(Number(1e-6, 100, "%", "the damping ratio in percent: half the loss factor"))
+    ] = None
+
+
 class HammerSection(Section):
     """Where the hammer hit."""
 
@@ -138,7 +156,11 @@ def _read_frequencies(value: object) -> dict[Label, Quantity]:
 
 
 def _read_signs(value: object) -> dict[Label, str]:
-    return read_by_label(value, Choice(("+", "-")))
+    return read_by_label(value, _SIGN)
+
+
+def _read_confidence(value: object) -> float | Mapping[Label, float]:
+    return read_by_label(value, _CONFIDENCE) if isinstance(value, dict) else _CONFIDENCE(value)
 
 
 def _read_clamped(value: object) -> dict[str, Quantity]:
@@ -159,13 +181,22 @@ class SetupSection(Section):
     published_coefficients: Annotated[str | None, PlainValidator(read_reference)] = None
     noise_percent: Annotated[Quantity | None, PlainValidator(read_noise)] = None
     unlabelled_hz: Annotated[tuple[Quantity, ...], PlainValidator(_read_unlabelled)] = ()
+    peaks: tuple[PeakSection, ...] = Field(default=(), max_length=MOST_MODES)
+    missed_probability: Annotated[float, PlainValidator(_CHANCE)] = MISSED
+    spurious_probability: Annotated[float, PlainValidator(_CHANCE)] = SPURIOUS
     frequencies_hz: Annotated[Mapping[Label, Quantity], PlainValidator(_read_frequencies)] = Field(
         default_factory=dict, validate_default=True
     )
     signs: Annotated[Mapping[Label, str], PlainValidator(_read_signs)] = Field(default_factory=dict)
+    label_confidence: Annotated[float | Mapping[Label, float], PlainValidator(_read_confidence)] = 1.0
     attached: tuple[AttachedItem, ...] = Field(default=(), max_length=MOST_ATTACHED)
     hammer: HammerSection | None = None
     air: AirSection | None = None
+
+    def confidence_in(self, label: Label) -> float:
+        """Probability that a label is right."""
+        stated = self.label_confidence
+        return stated.get(label, 1.0) if isinstance(stated, Mapping) else stated
 
     # These compare two keys. They read info.data, which holds the earlier keys that were themselves in order, so that
     # they complain beside the faults of other keys and never because of one.
@@ -180,19 +211,30 @@ class SetupSection(Section):
                 raise Refusal(*(Complaint("a clamped edge", f"a {edges.words[e]} one", inside=(e,)) for e in loose))
         return value
 
+    @field_validator("peaks")
+    @classmethod
+    def _stands_once(cls, value: tuple[PeakSection, ...]) -> tuple[PeakSection, ...]:
+        firsts = [(i, value.index(peak)) for i, peak in enumerate(value)]
+        wanted, remedy = "a peak of its own", "repeated readings of one peak are a list: hz = [.., ..]"
+        again = [Complaint(wanted, f"peak {first + 1} again", remedy, (i,)) for i, first in firsts if first < i]
+        if again:
+            raise Refusal(*again)
+        return value
+
     @field_validator("frequencies_hz")
     @classmethod
     def _holds_a_frequency(cls, value: Mapping[Label, Quantity], info: ValidationInfo) -> Mapping[Label, Quantity]:
         may_lack = (info.context or {}).get("may_lack_frequencies", False)
-        if not value and info.data.get("unlabelled_hz") == () and not may_lack:
+        peaks = [info.data.get(key) for key in ("unlabelled_hz", "peaks")]
+        if not value and peaks == [(), ()] and not may_lack:
             raise Refusal(Complaint('measured frequencies, "(1,0)" = 52', "no modes"))
         return value
 
-    @field_validator("signs")
+    @field_validator("signs", "label_confidence")
     @classmethod
-    def _have_a_frequency(cls, value: Mapping[Label, str], info: ValidationInfo) -> Mapping[Label, str]:
+    def _have_a_frequency(cls, value: Any, info: ValidationInfo) -> Any:
         frequencies: Mapping[Label, Any] | None = info.data.get("frequencies_hz")
-        if frequencies is not None:
+        if frequencies is not None and isinstance(value, Mapping):
             stray = [str(label) for label in value if label not in frequencies]
             if stray:
                 wanted = "a label among the frequencies_hz"

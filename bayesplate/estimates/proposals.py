@@ -27,7 +27,6 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
 from bayesplate.plate.readings import reading_sd
 from bayesplate.plate.setup import Reading, Setup
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Assignment = tuple[Label | None, ...]
@@ -122,14 +121,14 @@ def probabilities(found: Sequence[Proposal], peak: int) -> dict[Label | None, fl
 
 def _labelled(board: Board, setup: Setup, labels: Assignment) -> Board:
     first = setup.first_label
-    peaks = np.sort(setup.unlabelled)
+    peaks = sorted(setup.peaks, key=lambda peak: peak.frequency.mean)
     readings = tuple(
-        Reading.of((label.m, label.n), Quantity.exact(hertz), first_label=(first.m, first.n))
-        for label, hertz in zip(labels, peaks, strict=True)
+        Reading.of((label.m, label.n), peak.frequency, peak.sign, (first.m, first.n))
+        for label, peak in zip(labels, peaks, strict=True)
         if label is not None
     )
-    rest = tuple(float(hertz) for label, hertz in zip(labels, peaks, strict=True) if label is None)
-    return replace(board, setups=(replace(setup, readings=readings, unlabelled=rest),))
+    rest = tuple(peak for label, peak in zip(labels, peaks, strict=True) if label is None)
+    return replace(board, setups=(replace(setup, readings=readings, peaks=rest),))
 
 
 def _rough_assignments(board: Board, setup: Setup, prior: PriorCard, rng: np.random.Generator) -> list[Assignment]:

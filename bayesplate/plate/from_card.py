@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 from bayesplate.cards import BoardCard, CoefficientCard, PriorCard, SetupSection
 from bayesplate.plate.board import Board, made_board
-from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup, assumed_noise
+from bayesplate.plate.setup import AttachedItem, DeclaredAir, Peak, Reading, Setup, assumed_noise
 from bayesplate.quantities import Quantity
 
 NO_TABLES: Mapping[str, CoefficientCard] = MappingProxyType({})
@@ -94,11 +94,14 @@ def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCar
                 (label.m - first.m, label.n - first.n),
                 _joined_with_rounding(frequency, section.resolution_hz),
                 section.signs.get(label, ""),
+                section.confidence_in(label),
             )
             for label, frequency in section.frequencies_hz.items()
         ),
         resolution=section.resolution_hz or 0.0,
-        unlabelled=tuple(peak.mean for peak in section.unlabelled_hz),
+        peaks=tuple(_peaks(section)),
+        missed=section.missed_probability,
+        spurious=section.spurious_probability,
         noise=_noise(section, prior),
         first_label=first,
         published_coefficients=table,
@@ -113,6 +116,15 @@ def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCar
         hammer=None if section.hammer is None else (section.hammer.at_mm[0] * _MILLI, section.hammer.at_mm[1] * _MILLI),
         air=None if section.air is None else DeclaredAir(section.air.density_kg_m3, section.air.baffle),
     )
+
+
+def _peaks(section: SetupSection) -> Iterator[Peak]:
+    """The peaks without a label: those that are listed, then those with tables of their own."""
+    for frequency in section.unlabelled_hz:
+        yield Peak(_joined_with_rounding(frequency, section.resolution_hz))
+    for peak in section.peaks:
+        damping = None if peak.damping_percent is None else peak.damping_percent * _PERCENT
+        yield Peak(_joined_with_rounding(peak.hz, section.resolution_hz), peak.sign, peak.amplitude, damping)
 
 
 def _notes(card: BoardCard, poisson: Quantity) -> tuple[str, ...]:

@@ -9,16 +9,21 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.cards import CoefficientCard, PriorCard
+from bayesplate.cards import MISSED, SPURIOUS, CoefficientCard, PriorCard
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
+from bayesplate.plate.measured import NO_OFFSET, Peak, Reading, label_text, peaks_of
 from bayesplate.plate.parameter import Owner, Parameter, shown_name
 from bayesplate.quantities import Quantity
+
+__all__ = [
+    "CLAMPED_NOISE", "DEFAULT_NOISE", "EDGES", "NOISE_WANTED", "NO_OFFSET",
+    "AttachedItem", "DeclaredAir", "End", "Ends", "Peak", "Reading", "Setup", "assumed_noise",
+]  # fmt: skip
 
 End = Literal["clamped", "supported", "free"]
 Ends = tuple[End, End]
 EDGES = ("x0", "x1", "y0", "y1")
-NO_OFFSET = Label(0, 0)
 DEFAULT_NOISE = Quantity.from_median(0.003, np.exp(0.5))
 CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 """Relative noise of a frequency: free boards settle at 0.24-0.30 %; re-clamping one board spreads it by 1-2.4 %."""
@@ -30,64 +35,6 @@ def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quant
     if prior is not None and prior.noise_percent is not None:
         return prior.noise_percent.scaled(1e-2)
     return CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A measured frequency of a named mode.
-
-    Attributes
-    ----------
-    label : Label
-        This laboratory's label.
-    beams : tuple of int
-        Orders of the beam functions along x and y, from 0: the label less `Setup.first_label`.
-    frequency : Quantity, Hz
-    sign : str
-        Sign of the residue between hammer and sensor, "+" or "-"; empty if not known.
-    """
-
-    label: Label
-    beams: tuple[int, int]
-    frequency: Quantity
-    sign: str = ""
-
-    @classmethod
-    def of(
-        cls,
-        label: str | tuple[int, int],
-        frequency: Quantity | ArrayLike,
-        sign: str = "",
-        first_label: tuple[int, int] = NO_OFFSET,
-    ) -> Reading:
-        """A reading from numbers.
-
-        Parameters
-        ----------
-        label : str or tuple of int
-            "(1,0)" or (1, 0).
-        frequency : Quantity, number or array of readings, Hz
-            A number is rounded to the resolution of its setup, an array holds repeated readings of one mode.
-        sign : str
-        first_label : tuple of int
-            The laboratory's label of the lowest beam functions.
-
-        Returns
-        -------
-        Reading
-
-        Raises
-        ------
-        InputError
-            If the label cannot be read, or the frequency is no number.
-        """
-        read = Label.parse(_label_text(label))
-        try:
-            quantity = Quantity.of(frequency)
-        except ValueError as error:
-            wanted = "a number, an array of readings or a Quantity, in Hz"
-            raise InputError(Fault(f"frequency of {read}", wanted, repr(frequency), str(error))) from None
-        return cls(read, (read.m - first_label[0], read.n - first_label[1]), quantity, sign)
 
 
 @dataclass(frozen=True)
@@ -121,7 +68,12 @@ class Setup:
     readings : tuple of Reading
     resolution : float, Hz
         Readings that are plain numbers are rounded to this; 0 if not rounded.
-    unlabelled : tuple of float, Hz
+    peaks : tuple of Peak
+        Those without a label.
+    missed : float
+        Probability that a mode below the highest peak left no peak.
+    spurious : float
+        Probability that a peak is no mode.
     noise : Quantity
         Relative noise of a frequency (log-normal).
     first_label : Label
@@ -140,7 +92,9 @@ class Setup:
     noise: Quantity
     clamped: Mapping[str, Quantity] = field(default_factory=dict)
     resolution: float = 0.0
-    unlabelled: tuple[float, ...] = ()
+    peaks: tuple[Peak, ...] = ()
+    missed: float = MISSED
+    spurious: float = SPURIOUS
     first_label: Label = NO_OFFSET
     published_coefficients: CoefficientCard | None = None
     attached: tuple[AttachedItem, ...] = ()
@@ -159,7 +113,7 @@ class Setup:
         first_label: tuple[int, int] = NO_OFFSET,
         clamped: Mapping[str, Quantity | ArrayLike] | None = None,
         signs: Mapping[str | tuple[int, int], str] | None = None,
-        unlabelled: Sequence[float] = (),
+        unlabelled: Sequence[Peak | Quantity | ArrayLike] = (),
         attached: Sequence[AttachedItem] = (),
         hammer: tuple[float, float] | None = None,
         air: DeclaredAir | None = None,
@@ -186,7 +140,8 @@ class Setup:
             What a clamp covers, by edge.
         signs : dict of str, optional
             "+" or "-", by label.
-        unlabelled : sequence of float, Hz
+        unlabelled : sequence of Peak, Quantity, number or array of readings, Hz
+            Peaks without a label.
         attached : sequence of AttachedItem
         hammer : tuple of float, optional, m
         air : DeclaredAir, optional
@@ -199,13 +154,13 @@ class Setup:
         Raises
         ------
         InputError
-            With every label, frequency and name of an edge that cannot be read.
+            With every label, frequency, peak and name of an edge that cannot be read.
         """
         faults: list[Fault] = []
         if not isinstance(edges, str) and set(edges) != set(EDGES):
             faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
         words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
-        told = {Label.parse(_label_text(label)): sign for label, sign in (signs or {}).items()}
+        told = {Label.parse(label_text(label)): sign for label, sign in (signs or {}).items()}
         readings = []
         for label, frequency in frequencies.items():
             try:
@@ -224,10 +179,10 @@ class Setup:
                 faults.append(Fault(f"{name} clamped {edge}", "a length in m", repr(length), str(error)))
         if not (noise is None or (isinstance(noise, Quantity) and not noise.is_exact)):
             faults.append(Fault(f"{name} noise", NOISE_WANTED, repr(noise)))
-        numbers = np.asarray([resolution, *unlabelled])
-        if numbers.dtype.kind not in "iuf":
-            got = repr([resolution, *unlabelled])
-            faults.append(Fault(f"{name} resolution and unlabelled", "numbers, in Hz", got))
+        if np.asarray(resolution).dtype.kind not in "iuf":
+            faults.append(Fault(f"{name} resolution", "a number, in Hz", repr(resolution)))
+        peaks, no_peaks = peaks_of(unlabelled, name)
+        faults += no_peaks
         if faults:
             raise InputError(faults)
         return cls(
@@ -238,7 +193,7 @@ class Setup:
             noise=assumed_noise(tuple(words.values())) if noise is None else noise,
             clamped=covered,
             resolution=float(resolution),
-            unlabelled=tuple(float(peak) for peak in unlabelled),
+            peaks=peaks,
             first_label=Label(*first_label),
             published_coefficients=published_coefficients,
             attached=tuple(attached),
@@ -260,6 +215,11 @@ class Setup:
     def labels(self) -> tuple[Label, ...]:
         """Labels of the readings, in their order."""
         return tuple(reading.label for reading in self.readings)
+
+    @property
+    def unlabelled(self) -> tuple[float, ...]:
+        """Mean frequencies of the peaks without a label, Hz, in their order."""
+        return tuple(peak.frequency.mean for peak in self.peaks)
 
     @property
     def measured(self) -> NDArray[np.float64]:
@@ -297,7 +257,3 @@ class Setup:
     def input_name(self, edge: str) -> str:
         """Name of the clamped length of an edge among the board's inputs."""
         return shown_name(f"clamped_{edge}", self.owner)
-
-
-def _label_text(label: str | tuple[int, int]) -> str:
-    return label if isinstance(label, str) else f"({','.join(map(str, label))})"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import takewhile
 
+from bayesplate.cards import MISSED, SPURIOUS
 from bayesplate.cards.writing import array, density_numbers, number, quantity, table, text, unstatable
 from bayesplate.errors import Fault, InputError
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.setup import NOISE_WANTED, AttachedItem, Setup
+from bayesplate.plate.setup import NOISE_WANTED, AttachedItem, Peak, Setup
 from bayesplate.quantities import Kind, Quantity
 
 _MILLI = 1e-3
@@ -73,6 +75,8 @@ def _uncertain(board: Board) -> Iterator[tuple[str, Quantity, Kind]]:
         yield f"{setup.name} noise", setup.noise, "log-normal"
         for reading in setup.readings:
             yield f"{setup.name} {reading.label}", reading.frequency, "log-normal"
+        for i, peak in enumerate(setup.peaks, start=1):
+            yield f"{setup.name} peak {i}", peak.frequency, "log-normal"
         for i, item in enumerate(setup.attached, start=1):
             if item.mass is not None:
                 yield f"{setup.name} attached {i}", item.mass, "log-normal"
@@ -91,8 +95,8 @@ def _setup(setup: Setup) -> Iterator[str]:
         yield f"resolution_hz = {number(setup.resolution)}"
     if setup.published_coefficients is not None:
         yield f"published_coefficients = {text(setup.published_coefficients.name)}"
-    if setup.unlabelled:
-        yield f"unlabelled_hz = {array(number(peak) for peak in setup.unlabelled)}"
+    yield from _peaks(setup.peaks)
+    yield from _probabilities(setup)
     median, factor = density_numbers(setup.noise, _PERCENT, lambda m, f: Quantity.from_median(m, f).scaled(_PERCENT))
     yield f"noise_percent = {table({'median': median, 'factor': factor})}"
     if setup.hammer is not None:
@@ -107,6 +111,33 @@ def _setup(setup: Setup) -> Iterator[str]:
     signs = {f'"{reading.label}"': text(reading.sign) for reading in setup.readings if reading.sign}
     if signs:
         yield f"signs = {table(signs)}"
+
+
+def _peaks(peaks: Sequence[Peak]) -> Iterator[str]:
+    """Peaks without a label, in their order: a list as far as nothing but their frequencies is known, then tables."""
+    listed = tuple(takewhile(lambda peak: peak.is_bare, peaks))
+    if listed:
+        yield f"unlabelled_hz = {array(quantity(peak.frequency, 1.0) for peak in listed)}"
+    if len(listed) < len(peaks):
+        yield f"peaks = {array(_peak(peak) for peak in peaks[len(listed) :])}"
+
+
+def _peak(peak: Peak) -> str:
+    entries = {"hz": quantity(peak.frequency, 1.0)} | ({"sign": text(peak.sign)} if peak.sign else {})
+    entries |= {} if peak.amplitude is None else {"amplitude": number(peak.amplitude)}
+    return table(entries | ({} if peak.damping is None else {"damping_percent": number(peak.damping, _PERCENT)}))
+
+
+def _probabilities(setup: Setup) -> Iterator[str]:
+    """What is believed of labels and peaks, where it is not what a card without these keys says."""
+    doubted = {f'"{one.label}"': number(one.confidence) for one in setup.readings if one.confidence != 1}
+    if doubted:
+        alike = len(doubted) == len(setup.readings) and len({*doubted.values()}) == 1
+        yield f"label_confidence = {next(iter(doubted.values())) if alike else table(doubted)}"
+    if setup.missed != MISSED:
+        yield f"missed_probability = {number(setup.missed)}"
+    if setup.spurious != SPURIOUS:
+        yield f"spurious_probability = {number(setup.spurious)}"
 
 
 def _by_label(setup: Setup) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import ritz
-from made_boards import CANTILEVER_LABELS, board_of, setup_of
+from made_boards import CANTILEVER_LABELS, board_of, peaks_of, setup_of
 
 from bayesplate.cards import load_prior
 from bayesplate.errors import NotIdentifiableError
@@ -42,7 +42,7 @@ def test_fewer_modes_than_constants_are_refused(hertz, n_modes):
 
 def test_a_setup_without_labels_is_refused(hertz):
     board = cantilever(hertz, *CANTILEVER_LABELS)
-    bare = replace(board.setups[0], name="bare", readings=(), unlabelled=(50.0, 100.0))
+    bare = replace(board.setups[0], name="bare", readings=(), peaks=peaks_of(50.0, 100.0))
     with pytest.raises(NotIdentifiableError, match="'bare' has no labelled mode, its 2 peaks have none"):
         require_labels(replace(board, setups=(*board.setups, bare)))
 

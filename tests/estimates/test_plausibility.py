@@ -96,7 +96,7 @@ def test_a_prior_that_knows_the_wood_also_asks_about_a_factor_of_ten(name):
 
 def test_a_setup_without_labels_is_asked_nothing():
     board = board_of("spruce-free-2R", "spruce")
-    peaks = replace(board.setups[0], name="other", readings=(), unlabelled=(50.0, 70.0))
+    peaks = replace(board.setups[0], name="other", readings=(), peaks=made_boards.peaks_of(50.0, 70.0))
 
     assert asked(replace(board, setups=(board.setups[0], peaks)), "spruce") == ""
 

@@ -24,7 +24,7 @@ MISSING = (0, 2)
 
 
 def board_of(peaks: list[float]) -> Board:
-    setup = replace(made_boards.setup_of(ritz.ALL_FREE, {}), unlabelled=tuple(peaks))
+    setup = replace(made_boards.setup_of(ritz.ALL_FREE, {}), peaks=made_boards.peaks_of(*peaks))
     return made_boards.board_of(PLATE, [setup])
 
 
@@ -51,7 +51,7 @@ def test_the_most_probable_board_holds_its_peaks_as_readings(found):
     (setup,) = ways[0].board.setups
 
     assert tuple(reading.label for reading in setup.readings) == truth
-    assert setup.unlabelled == ()
+    assert setup.peaks == ()
 
 
 def test_probabilities_of_a_peak_are_those_of_the_ways_that_give_it_a_label(found):
@@ -91,7 +91,7 @@ def test_the_weight_of_a_way_holds_the_prior_at_its_estimate_and_what_is_unusual
 def test_three_peaks_and_boards_with_a_label_are_left_alone():
     prior, rng = load_prior("spruce"), np.random.default_rng(1)
     labelled = made_boards.setup_of(ritz.ALL_FREE, {(1, 1): 35.0, (2, 0): 50.0})
-    with_label = made_boards.board_of(PLATE, [replace(labelled, unlabelled=(86.0, 111.0, 129.0, 139.0))])
+    with_label = made_boards.board_of(PLATE, [replace(labelled, peaks=made_boards.peaks_of(86.0, 111.0, 129.0, 139.0))])
 
     assert proposals(board_of([35.0, 50.0, 86.0]), prior, rng) == []
     assert proposals(with_label, prior, rng) == []

@@ -12,7 +12,7 @@ from bayesplate.errors import InputError
 from bayesplate.labels import Label
 from bayesplate.plate.board import made_board
 from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.setup import AttachedItem, DeclaredAir, Reading, Setup
+from bayesplate.plate.setup import AttachedItem, DeclaredAir, Peak, Reading, Setup
 from bayesplate.plate.writing import card_text
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -62,14 +62,21 @@ def everything():
         ends_x=("clamped", "free"),
         ends_y=("free", "free"),
         readings=(
-            Reading(Label(1, 0), (0, 0), Quantity.from_readings([52.0, 53.0], 1.0), "+"),
+            Reading(Label(1, 0), (0, 0), Quantity.from_readings([52.0, 53.0], 1.0), "+", 0.9),
             Reading(Label(1, 1), (0, 1), Quantity.exact(98.0)),
-            Reading(Label(2, 0), (1, 0), Quantity.from_mean(310.0, 2.0), "-"),
+            Reading(Label(2, 0), (1, 0), Quantity.from_mean(310.0, 2.0), "-", 0.75),
         ),
         noise=Quantity.from_median(0.004, 1.7),
         clamped={"x0": Quantity.from_mean(0.03, 0.0005)},
         resolution=0.5,
-        unlabelled=(448.8, 594.1),
+        peaks=(
+            Peak(Quantity.exact(448.8)),
+            Peak(Quantity.from_readings([594.1, 594.4], 0.5)),
+            Peak(Quantity.from_mean(671.2, 0.3), "-", 0.25, 0.0123),
+            Peak(Quantity.exact(707.0), amplitude=3.0),
+        ),
+        missed=0.1,
+        spurious=0.05,
         first_label=Label(1, 0),
         attached=(
             AttachedItem("accelerometer", ((0.2, 0.02),), Quantity.from_mean(0.6e-3, 0.1e-3)),

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ritz
-from made_boards import setup_of
+from made_boards import peaks_of, setup_of
 
 from bayesplate.frequencies.spectrum import NamedMode
 from bayesplate.labels import Label
@@ -68,7 +68,7 @@ def test_the_rest_of_a_row(rows):
 
 def test_a_peak_stands_beside_the_mode_nearest_to_it():
     """Nearest as a ratio: 71 Hz is nearer to 100 than to 50, though less far from 50 in hertz."""
-    board = SimpleNamespace(setups=(replace(SETUP, unlabelled=(71.0, 49.0)),))
+    board = SimpleNamespace(setups=(replace(SETUP, peaks=peaks_of(71.0, 49.0)),))
     named = (NamedMode(Label(0, 0), 50.0, 0.99), NamedMode(None, 100.0, 0.5))
     high, low = unlabelled_peaks(board, {"bench": named})
 
