@@ -134,7 +134,10 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
         system=system,
         plate=plate,
         places=tuple(found[b].place for b in beams),
-        linear=LinearLaw(np.stack([found[b].stiffness for b in beams]), np.stack([found[b].mass for b in beams])),
+        linear=LinearLaw(
+            np.reshape([found[b].stiffness for b in beams], (len(beams), -1 if beams else 0)),
+            np.reshape([found[b].mass for b in beams], (len(beams), -1 if beams else 0)),
+        ),
     )
 
 

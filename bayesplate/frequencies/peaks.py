@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,11 @@ from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
+Group = tuple[Rows, Rows]
+"""Peaks and modes."""
 
+_MOST_UNSIGNED = 6
+"""Peaks of unknown sign up to which each is tried with both."""
 _SIGNS = {"+": 1, "-": -1, "": 0}
 
 
@@ -36,8 +41,8 @@ class PeakLikelihood:
     ----------
     errors : ReadingErrors
         Of the peaks, in the order of frequency.
-    readings : (n_peaks,) array of int
-        Which labelled reading each peak is; -1 for a peak without a label.
+    readings, bare : (n_peaks,) array of int
+        Which of the setup's readings, and which of its peaks without a label, each one is; -1 for none.
     columns : (n_modes,) array of int
         The modes that peaks may be, among all of the setup's model: the labelled ones first.
     labels : tuple of Label or None
@@ -48,20 +53,22 @@ class PeakLikelihood:
         ln of the probability of each peak if it is no mode.
     missed : (n_modes,) array
         Probability that a mode below the highest peak left none.
-    groups : tuple of (array of int, array of int)
-        Peaks and modes that keep their order: all, or those of one sign.
+    orders : tuple of tuple of (array of int, array of int)
+        Peaks and modes that keep their order: all, or those of one sign and those of the other; in the latter case once
+        for every sign that the peaks of unknown sign may have.
     log_highest : float
         ln of the highest frequency that was read, Hz.
     """
 
     errors: ReadingErrors
     readings: Rows
+    bare: Rows
     columns: Rows
     labels: tuple[Label | None, ...]
     log_prior: Floats
     log_alone: Floats
     missed: Floats
-    groups: tuple[tuple[Rows, Rows], ...]
+    orders: tuple[tuple[Group, ...], ...]
     log_highest: float
 
     @classmethod
@@ -77,11 +84,13 @@ class PeakLikelihood:
         setup = model.setup
         if not takes_part(setup):
             return None
-        doubtful = np.flatnonzero([reading.confidence < 1.0 for reading in setup.readings])
-        readings = np.concatenate([np.full(len(setup.peaks), -1), doubtful]).astype(np.intp)
+        doubtful = np.flatnonzero([not reading.is_sure for reading in setup.readings])
+        n_bare = len(setup.peaks)
+        readings = np.concatenate([np.full(n_bare, -1), doubtful]).astype(np.intp)
+        bare = np.concatenate([np.arange(n_bare), np.full(doubtful.size, -1)]).astype(np.intp)
         errors = ReadingErrors.of_peaks(setup, doubtful, robust)
         order = np.argsort(errors.frequency, kind="stable")
-        errors, readings = errors.at(order), readings[order]
+        errors, readings, bare = errors.at(order), readings[order], bare[order]
         signs = np.array([_SIGNS[sign] for sign in _signs(setup, doubtful)])[order]
         others = np.arange(len(setup.readings), len(model.every_place))
         columns = np.concatenate([doubtful, others]).astype(np.intp)
@@ -94,21 +103,23 @@ class PeakLikelihood:
             known = np.nan_to_num(np.sign(residues))
         opposed = signs[:, None] * known < 0
         log_pair = np.where(opposed, -np.inf, np.log(seen) + np.log1p(-setup.spurious))
-        log_label = _log_labels(setup, readings, columns)
+        labels = tuple(_labels(model)[column] for column in columns)
+        log_label = _log_labels(setup, readings, labels)
         highest = max([*setup.measured, *setup.unlabelled])
         wide = np.where(errors.rounded, errors.resolution, errors.frequency) / highest
-        log_alone = (
-            np.log(setup.spurious * wide) + log_label[:, -1] + np.where((signs != 0) & known.any(), -np.log(2), 0)
-        )
+        orders = tuple(_orders(signs, known))
+        log_sign = np.where(((signs != 0) & known.any()) | (len(orders[0]) > 1), -np.log(2.0), 0.0)
+        log_alone = np.log(setup.spurious * wide) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
             readings=readings,
+            bare=bare,
             columns=columns,
-            labels=tuple(_labels(model)[column] for column in columns),
+            labels=labels,
             log_prior=log_pair + log_label[:, :-1],
             log_alone=log_alone,
             missed=1.0 - seen,
-            groups=tuple(_groups(signs, known)),
+            orders=orders,
             log_highest=float(np.log(highest)),
         )
 
@@ -127,12 +138,14 @@ class PeakLikelihood:
         (n_draws,) array
             -inf where a mode has no frequency.
         """
+        from scipy.special import logsumexp
+
         there = every_log_frequency[:, self.columns]
         has_all = np.isfinite(there).all(axis=1)
         result = np.full(len(there), -np.inf)
         if has_all.any():
-            by_group = (one.log_sum() for _, _, one in self._assignments(there[has_all], noise[has_all]))
-            result[has_all] = sum(by_group)
+            by_order = self._assignments(there[has_all], noise[has_all])
+            result[has_all] = logsumexp([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
         return result
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
@@ -144,75 +157,76 @@ class PeakLikelihood:
             ln f (Hz), all of them finite.
         noise : (n_draws,) array
         """
+        from scipy.special import softmax
+
+        by_order = self._assignments(every_log_frequency[:, self.columns], noise)
+        weights = softmax([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
         result = np.zeros(self.log_prior.shape)
-        for peaks, modes, one in self._assignments(every_log_frequency[:, self.columns], noise):
-            by_mode = np.zeros((len(noise), peaks.size, self.columns.size))
-            np.put_along_axis(by_mode, modes[:, None, :], one.pairs(), axis=2)
-            result[peaks] += by_mode.mean(axis=0)
+        for groups, weight in zip(by_order, weights, strict=True):
+            for peaks, modes, one in groups:
+                by_mode = np.zeros((len(noise), peaks.size, self.columns.size))
+                np.put_along_axis(by_mode, modes[:, None, :], one.pairs(), axis=2)
+                result[peaks] += np.tensordot(weight, by_mode, axes=1) / len(noise)
         return result
 
-    def _assignments(self, there: Floats, noise: Floats) -> Iterator[tuple[Rows, Rows, Assignments]]:
-        """Peaks of each group, its modes in the order of each draw, (n_draws, n) array, and what the ones say of the others."""
+    def _assignments(self, there: Floats, noise: Floats) -> list[list[tuple[Rows, Rows, Assignments]]]:
+        """Of each group of each of `orders`: its peaks, its modes in the order of each draw, what they say together.
+
+        The modes are (n_draws, n) arrays.
+        """
+        from scipy.special import ndtr
+
         sd = self.errors.sd(noise).mean(axis=1, keepdims=True)
-        above = _upper((there - self.log_highest) / sd)
-        missed = self.missed + (1.0 - self.missed) * above
+        missed = self.missed + (1.0 - self.missed) * ndtr((there - self.log_highest) / sd)
         log_errors = self.errors.log_likelihood_of_each(there, noise)
-        for peaks, modes in self.groups:
+        log_pair = log_errors + self.log_prior
+
+        def assigned(peaks: Rows, modes: Rows) -> tuple[Rows, Rows, Assignments]:
             order = modes[np.argsort(there[:, modes], axis=1)]
-            pair = (log_errors + self.log_prior)[:, peaks]
-            one = Assignments(
-                np.take_along_axis(pair, order[:, None, :], axis=2),
-                self.log_alone[peaks],
-                np.take_along_axis(missed, order, axis=1),
-            )
-            yield peaks, order, one
+            ordered = np.take_along_axis(log_pair[:, peaks], order[:, None, :], axis=2)
+            return peaks, order, Assignments(ordered, self.log_alone[peaks], np.take_along_axis(missed, order, axis=1))
+
+        return [[assigned(*group) for group in groups] for groups in self.orders]
 
 
 def takes_part(setup: Setup) -> bool:
     """Whether a setup has peaks without a label, or with a doubtful one."""
-    return bool(setup.peaks) or any(reading.confidence < 1.0 for reading in setup.readings)
+    return bool(setup.peaks) or not all(reading.is_sure for reading in setup.readings)
 
 
 def _signs(setup: Setup, doubtful: Rows) -> list[str]:
     return [*(peak.sign for peak in setup.peaks), *(setup.readings[i].sign for i in doubtful)]
 
 
-def _groups(signs: Rows, known: Floats) -> Iterator[tuple[Rows, Rows]]:
-    """Those of one sign where all signs are known, otherwise all together."""
-    if not (signs.all() and known.all()):
-        yield np.arange(signs.size), np.arange(known.size)
+def _orders(signs: Rows, known: Floats) -> Iterator[tuple[Group, ...]]:
+    """Those of one sign apart, for every sign of the peaks of which it is not known; or all together."""
+    unsigned = np.flatnonzero(signs == 0)
+    if unsigned.size > _MOST_UNSIGNED or unsigned.size == signs.size or not known.all():
+        yield ((np.arange(signs.size), np.arange(known.size)),)
         return
-    for sign in (1, -1):
-        peaks, modes = np.flatnonzero(signs == sign), np.flatnonzero(known == sign)
-        if peaks.size or modes.size:
-            yield peaks, modes
+    for tried in product((1, -1), repeat=unsigned.size):
+        every = signs.copy()
+        every[unsigned] = tried
+        yield tuple((np.flatnonzero(every == sign), np.flatnonzero(known == sign)) for sign in (1, -1))
 
 
 def _labels(model: SetupModel) -> list[Label | None]:
     """Of all modes of a model."""
     first = model.setup.first_label
-    others = (
-        None if one.beams is None else Label(one.beams[0] + first.m, one.beams[1] + first.n) for one in model.others
-    )
-    return [*model.setup.labels, *others]
+    beams = (other.beams for other in model.others)
+    return [*model.setup.labels, *(None if b is None else Label(b[0] + first.m, b[1] + first.n) for b in beams)]
 
 
-def _log_labels(setup: Setup, readings: Rows, columns: Rows) -> Floats:
+def _log_labels(setup: Setup, readings: Rows, labels: Sequence[Label | None]) -> Floats:
     """ln of the probability of what each peak was labelled, for each mode and, last, if it is no mode.
 
-    A label that is right with probability c is each other mode's with an equal share of 1 - c.
+    A label that is right with probability c is each other mode's with an equal share of 1 - c. One that the program
+    proposed says nothing.
     """
-    result = np.zeros((readings.size, columns.size + 1))
-    for i, reading in enumerate(readings):
-        if reading >= 0:
-            confidence = setup.readings[reading].confidence
-            result[i] = np.log((1.0 - confidence) / columns.size)
-            result[i, :-1][columns == reading] = np.log(confidence)
+    result = np.zeros((readings.size, len(labels) + 1))
+    for i, at in enumerate(readings):
+        if at >= 0 and (reading := setup.readings[at]).confidence > 0:
+            stated = reading.label if reading.stated is None else reading.stated
+            result[i] = np.log((1.0 - reading.confidence) / len(labels))
+            result[i, [j for j, label in enumerate(labels) if label == stated]] = np.log(reading.confidence)
     return result
-
-
-def _upper(z: Floats) -> Floats:
-    """Probability that a standard normal number is above -z."""
-    from scipy.special import ndtr
-
-    return np.asarray(ndtr(z))

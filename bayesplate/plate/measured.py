@@ -28,7 +28,9 @@ class Reading:
     sign : str
         Sign of the residue between hammer and sensor, "+" or "-"; empty if not known.
     confidence : float
-        Probability, before the fit, that the label is right.
+        Probability, before the fit, that the label is right; 0 for a label that the program proposes for a bare peak.
+    stated : Label or None
+        The label on the card, where another is proposed.
     """
 
     label: Label
@@ -36,6 +38,12 @@ class Reading:
     frequency: Quantity
     sign: str = ""
     confidence: float = 1.0
+    stated: Label | None = None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the label cannot be wrong."""
+        return self.confidence >= 1.0
 
     @classmethod
     def of(

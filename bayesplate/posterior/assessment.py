@@ -33,13 +33,13 @@ class Assessment:
         too few modes are left.
     leverages : (n_modes,) array
         Share of each reading in its own prediction, at the posterior's median noise.
-    linear_errors : (n_some, n_modes) array, cents
-        Linear less exact law over the posterior.
+    linear_errors : (n_some, n_every) array, cents
+        Linear less exact law over the posterior, of every mode that the likelihood looks at.
     linear_is_enough : bool
         Whether these stay below their share of the posterior's own noise.
     exact_worst : float, cents
         Largest error of the exact law against full solves.
-    surrogate_errors : (n_draws, n_modes) array, cents
+    surrogate_errors : (n_draws, n_every) array, cents
         Surrogate of the exact law less that law over the posterior; without draws where the walkers walked on none.
     means : dict of (dict of float, float)
         By law: posterior means of E_x ... D_s, and how many draws of equal weight they rest on.
@@ -67,7 +67,7 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     ----------
     inference : Inference
     draws : Draws
-    linear_errors : (n_some, n_modes) array, cents, optional
+    linear_errors : (n_some, n_every) array, cents, optional
         Those of `bayesplate.posterior.reweighting.linearisation`, where they are known already.
 
     Returns
@@ -96,8 +96,7 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
 
 
 def _surrogate_errors(inference: Inference, draws: Draws) -> Floats:
-    n_modes = draws.log_frequency.shape[-1]
+    exact = np.concatenate([each.reshape(-1, each.shape[-1]) for each in draws.every_log_frequency], axis=1)
     if inference.surrogate is None:
-        return np.empty((0, n_modes))
-    exact = draws.log_frequency.reshape(-1, n_modes)
+        return exact[:0]
     return np.asarray(cents(inference.surrogate.log_frequencies(draws.flat) - exact))

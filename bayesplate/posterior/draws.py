@@ -32,7 +32,10 @@ class Draws:
     derived : dict of Derived
     log_frequency : (n_chains, n_draws, n_modes) array
         ln f (Hz) under the law of the fit.
-    log_likelihood : (n_chains, n_draws, n_modes) array
+    every_log_frequency : tuple of (n_chains, n_draws, n_every) array
+        Of each setup: the labelled modes, then those that peaks may be.
+    log_likelihood : (n_chains, n_draws, n_factors) array
+        In the order of `bayesplate.posterior.target.Posterior.factors`.
     predictive : (n_chains, n_draws, n_modes) array, Hz
         Frequencies that the next measurement would read, noise included, rounded where the readings are.
     """
@@ -45,6 +48,7 @@ class Draws:
     noise: Floats
     derived: Mapping[str, Derived]
     log_frequency: Floats
+    every_log_frequency: tuple[Floats, ...]
     log_likelihood: Floats
     predictive: Floats
 
@@ -78,12 +82,13 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     noise = np.exp(problem.parameters.log_noise(flat))
     distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
-    by_setup = [part[which.ravel()] for part in posterior.log_frequencies(distinct)]
+    by_setup = [part[which.ravel()] for part in posterior.every_log_frequency(distinct)]
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
-    predictive, log_likelihood = [], []
-    for i, (readings, predicted) in enumerate(zip(posterior.readings, by_setup, strict=True)):
-        predictive.append(readings.simulate(predicted, noise[:, i], rng))
-        log_likelihood.append(readings.log_likelihood(predicted, noise[:, i]))
+    labelled = posterior.labelled(by_setup)
+    predictive = [
+        readings.simulate(predicted, noise[:, i], rng)
+        for i, (readings, predicted) in enumerate(zip(posterior.readings, labelled, strict=True))
+    ]
 
     def shaped(array: Floats) -> Floats:
         return np.broadcast_to(array, flat.shape[:1] + array.shape[1:]).reshape(*shape, *array.shape[1:])
@@ -97,8 +102,9 @@ def named_draws(inference: Inference, seed: int) -> Draws:
         inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
         noise=shaped(noise),
         derived={name: Derived(shaped(item.values), item.unit) for name, item in derived.items()},
-        log_frequency=shaped(np.concatenate(by_setup, axis=1)),
-        log_likelihood=shaped(np.concatenate(log_likelihood, axis=1)),
+        log_frequency=shaped(np.concatenate(labelled, axis=1)),
+        every_log_frequency=tuple(shaped(each) for each in by_setup),
+        log_likelihood=shaped(posterior.log_likelihood_of(by_setup, flat)),
         predictive=shaped(np.concatenate(predictive, axis=1)),
     )
 

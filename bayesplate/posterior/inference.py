@@ -18,6 +18,7 @@ from bayesplate.estimates.identifiability import (
     require_identifiable,
     require_labels,
 )
+from bayesplate.estimates.labelling import with_proposed_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
@@ -130,6 +131,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     faults = coefficient_faults(board)
     if faults:
         raise InputError(faults)
+    board = with_proposed_labels(board, prior)
     require_labels(board)
     estimate = weighted_least_squares(board)
     found = identifiability(estimate.sensitivities, estimate.scales)
@@ -144,7 +146,9 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
         limits = parameters.fitted_bounds
         draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
         errors = linearisation_errors(board, approximation.models, draws)
-        law = "linear" if linear_suffices(board, errors, [s.noise.median for s in board.setups]) else "exact"
+        medians = [setup.noise.median for setup in board.setups]
+        n_every = [len(model.every_place) for model in approximation.models]
+        law = "linear" if linear_suffices(n_every, errors, medians) else "exact"
     posterior = Posterior(board, prior, approximation.models, law, robust)
     require_reachable(posterior, approximation.centre, approximation.covariance)
     require_possible_noise(posterior, approximation.centre)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.model import SetupModel, setup_model, with_exact
+from bayesplate.frequencies.model import SetupModel, setup_model, with_exact, with_others
+from bayesplate.frequencies.peaks import takes_part
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
@@ -68,13 +70,13 @@ def laplace_approximation(board: Board, estimate: Estimate, robust: bool = False
     widenings = noise_widenings(board, estimate)
     noise = np.array([setup.noise.median for setup in board.setups]) * widenings
     centre = parameters.theta(estimate.values, noise)
-    models = estimate.models
+    models = _with_peaks(estimate.models, estimate.values)
     scales = reading_sd(board.setups, noise)
     if robust:
         rigidities, noise = highest_student(board, estimate)
         values = dict(estimate.values) | dict(zip(RIGIDITIES, rigidities, strict=True))
         centre = parameters.theta(values, noise)
-        models = tuple(setup_model(model.system, values, model.plate) for model in models)
+        models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
         scales = reading_sd(board.setups, noise)
         residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         scales = scales / np.sqrt(student_weights(residuals / scales))
@@ -88,10 +90,15 @@ def laplace_approximation(board: Board, estimate: Estimate, robust: bool = False
         start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
         centre[columns] = refit(predict, log_measured(board), scales, start, bounds)
         values = {name: np.ravel(value)[0] for name, value in parameters.values(centre[None, :]).items()}
-        models = tuple(setup_model(model.system, values, model.plate) for model in models)
+        models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
         covariance = _covariance(board, models, "linear", scales, centre)
         models = exact_models(board, models, centre, covariance)
     return LaplaceApproximation(centre, covariance, models)
+
+
+def _with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
+    """The models, with all modes that peaks may be where a setup has such peaks."""
+    return tuple(with_others(model, values) if takes_part(model.setup) else model for model in models)
 
 
 def noise_widenings(board: Board, estimate: Estimate) -> Floats:
@@ -212,7 +219,8 @@ def worst_cents(models: Sequence[SetupModel]) -> float:
 
 
 def linearisation_errors(board: Board, models: Sequence[SetupModel], theta: Floats) -> Floats:
-    """Linear less exact law at each draw: (n_draws, n_modes) array, cents."""
+    """Linear less exact law at each draw, of all modes of the likelihood: (n_draws, n_every) array, cents."""
     values = Parameters(board).values(theta)
-    parts = [model.log_frequencies(values, "linear") - model.log_frequencies(values, "exact") for model in models]
+    laws = [[model.every_log_frequency(values, law) for model in models] for law in get_args(LawName)]
+    parts = [linear - exact for linear, exact in zip(*laws, strict=True)]
     return cents(np.concatenate(parts, axis=1))

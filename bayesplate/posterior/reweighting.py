@@ -32,7 +32,7 @@ def means_under(
     inference : Inference
     draws : Draws
     law : "linear" or "exact"
-    errors : (n_some, n_modes) array, cents, optional
+    errors : (n_some, n_every) array, cents, optional
         Those of `linearisation`, where they are known already.
 
     Returns
@@ -46,7 +46,8 @@ def means_under(
     if law == "exact" != inference.problem.posterior.law:
         every = _every(draws)
         errors = linearisation(inference, draws) if errors is None else errors
-        exact = draws.log_frequency.reshape(-1, draws.log_frequency.shape[-1])[::every] - errors / cents(np.ones(1))
+        linear = [each.reshape(-1, each.shape[-1])[::every] for each in draws.every_log_frequency]
+        exact = np.concatenate(linear, axis=1) - errors / cents(np.ones(1))
         weights = _weights(_log_likelihood(inference, draws.flat[::every], exact), draws, every)
         if effective_draws(weights) >= FEWEST_WEIGHTED_DRAWS:
             means = {
@@ -73,19 +74,11 @@ def _weights(log_likelihood: Floats, draws: Draws, every: int = 1) -> Floats:
     return np.asarray(weights / weights.sum())
 
 
-def _log_likelihood(inference: Inference, theta: Floats, log_frequency: Floats) -> Floats:
-    """Log probability of every reading where the frequencies are known: (n_some, n_modes) arrays."""
+def _log_likelihood(inference: Inference, theta: Floats, every_log_frequency: Floats) -> Floats:
+    """Log probability of every factor of the likelihood where the frequencies are known: (n_some, n) arrays."""
     posterior = inference.problem.posterior
-    noise = np.exp(inference.problem.parameters.log_noise(theta))
-    ends = np.cumsum([len(setup.readings) for setup in inference.problem.board.setups])
-    parts = np.split(log_frequency, ends[:-1], axis=1)
-    return np.concatenate(
-        [
-            readings.log_likelihood(part, noise[:, i])
-            for i, (readings, part) in enumerate(zip(posterior.readings, parts, strict=True))
-        ],
-        axis=1,
-    )
+    ends = np.cumsum(posterior.n_every)[:-1]
+    return posterior.log_likelihood_of(np.split(every_log_frequency, ends, axis=1), theta)
 
 
 def weighted_mean(values: Floats, weights: Floats) -> float:
@@ -99,7 +92,7 @@ def effective_draws(weights: Floats) -> float:
 
 
 def linearisation(inference: Inference, draws: Draws) -> Floats:
-    """Linear less exact law over the posterior: (n_some, n_modes) array, cents."""
+    """Linear less exact law over the posterior, of every mode: (n_some, n_every) array, cents."""
     return linearisation_errors(
         inference.problem.board, inference.problem.posterior.models, draws.flat[:: _every(draws)]
     )
@@ -116,6 +109,5 @@ def linear_is_enough(inference: Inference, draws: Draws, errors: Floats | None =
     `errors` are those of `linearisation`, where they are known already.
     """
     noise = np.median(draws.noise.reshape(-1, draws.noise.shape[-1]), axis=0)
-    return linear_suffices(
-        inference.problem.board, linearisation(inference, draws) if errors is None else errors, list(noise)
-    )
+    n_every = inference.problem.posterior.n_every
+    return linear_suffices(n_every, linearisation(inference, draws) if errors is None else errors, list(noise))

@@ -61,7 +61,7 @@ class Solved(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """Polynomials for the frequencies of all labelled modes.
+    """Polynomials for the frequencies of all modes that the likelihood looks at.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Surrogate:
         return replace(bare, coefficients=np.asarray(found, dtype=np.float64))
 
     def log_frequencies(self, theta: Floats) -> Floats:
-        """ln f (Hz) of all labelled modes, setup after setup: (n_draws, n_modes) array from (n_draws, n_dim)."""
+        """ln f (Hz) of these modes, setup after setup: (n_draws, n_modes) array from (n_draws, n_dim)."""
         parts = [self._terms(theta[i : i + _BATCH]) @ self.coefficients for i in range(0, len(theta), _BATCH)]
         return np.concatenate(parts) if parts else np.empty((0, self.coefficients.shape[1]))
 
@@ -123,8 +123,8 @@ class SurrogatePosterior(Posterior):
 
     surrogate: Surrogate
 
-    def log_frequencies(self, theta: Floats) -> list[Floats]:
-        """ln f of the labelled modes: one (n_draws, n_modes) array per setup."""
+    def every_log_frequency(self, theta: Floats) -> list[Floats]:
+        """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
         return _by_setup(self, self.surrogate.log_frequencies(theta))
 
 
@@ -140,7 +140,7 @@ def serves(posterior: Posterior, errors: Floats) -> bool:
 
     The rule is the linear law's. A surrogate that is off by one noise level in a single mode does not serve.
     """
-    return linear_suffices(posterior.board, errors, [setup.noise.median for setup in posterior.board.setups])
+    return linear_suffices(posterior.n_every, errors, [setup.noise.median for setup in posterior.board.setups])
 
 
 def find_surrogate(
@@ -191,7 +191,7 @@ def find_surrogate(
 
 def _solved(posterior: Posterior, coordinates: TailCoordinates, theta: Floats) -> Solved:
     """Frequencies and log density in the coordinates of the walk, by the law itself."""
-    by_setup = posterior.log_frequencies(theta)
+    by_setup = posterior.every_log_frequency(theta)
     likelihood = posterior.log_likelihood_of(by_setup, theta).sum(axis=1)
     log_density = posterior.log_prior(theta) + likelihood + coordinates.log_jacobian(coordinates.y(theta))
     return Solved(theta, np.concatenate(by_setup, axis=1), log_density)
@@ -213,5 +213,5 @@ def _walked(
 
 
 def _by_setup(posterior: Posterior, log_frequency: Floats) -> list[Floats]:
-    ends = np.cumsum([len(setup.readings) for setup in posterior.board.setups])[:-1]
+    ends = np.cumsum(posterior.n_every)[:-1]
     return np.split(log_frequency, ends, axis=1)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bayesplate.cards import PriorCard
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.plate.readings import ReadingErrors
@@ -43,12 +44,14 @@ class Posterior:
     robust: bool = False
     parameters: Parameters = field(init=False)
     readings: tuple[ReadingErrors, ...] = field(init=False)
+    peaks: tuple[PeakLikelihood | None, ...] = field(init=False)
     priors: Mapping[str, Quantity] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", Parameters(self.board))
         object.__setattr__(self, "priors", self.prior.constants)
         object.__setattr__(self, "readings", tuple(ReadingErrors.of(s, self.robust) for s in self.board.setups))
+        object.__setattr__(self, "peaks", tuple(PeakLikelihood.of(model, self.robust) for model in self.models))
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log density: (n_draws,) array from (n_draws, n_dim); -inf outside the support."""
@@ -120,40 +123,66 @@ class Posterior:
         theta[:, :N_RIGIDITIES] = np.log(np.stack(constants, axis=1))
         return theta
 
+    @property
+    def n_every(self) -> tuple[int, ...]:
+        """How many modes of each setup the likelihood looks at: the labelled ones, and those that peaks may be."""
+        return tuple(len(model.every_place) for model in self.models)
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """What the likelihood is a product of: readings whose label is sure, and all the other peaks of a setup."""
+        names = []
+        for setup, peaks in zip(self.board.setups, self.peaks, strict=True):
+            names += [f"{setup.name} {reading.label}" for reading in setup.readings if reading.is_sure]
+            names += [] if peaks is None else [f"{setup.name} peaks"]
+        return tuple(names)
+
+    def every_log_frequency(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
+        values = self.parameters.values(theta)
+        return [model.every_log_frequency(values, self.law) for model in self.models]
+
     def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """ln f of the labelled modes: one (n_draws, n_modes) array per setup."""
-        values = self.parameters.values(theta)
-        return [model.log_frequencies(values, self.law) for model in self.models]
+        return self.labelled(self.every_log_frequency(theta))
+
+    def labelled(self, every_log_frequency: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+        """Columns of the labelled modes among those of `every_log_frequency`."""
+        pairs = zip(every_log_frequency, self.board.setups, strict=True)
+        return [every[:, : len(setup.readings)] for every, setup in pairs]
 
     def log_likelihood(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Log probability of every reading, setup after setup: (n_draws, n_modes) array."""
-        return self.log_likelihood_of(self.log_frequencies(theta), theta)
+        """Log probability of every one of `factors`: (n_draws, n_factors) array."""
+        return self.log_likelihood_of(self.every_log_frequency(theta), theta)
 
     def log_likelihood_of(
-        self, log_frequencies: Sequence[NDArray[np.float64]], theta: NDArray[np.float64]
+        self, every_log_frequency: Sequence[NDArray[np.float64]], theta: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """The same from frequencies that are known already, as `log_frequencies` gives them."""
+        """The same from frequencies that are known already, as `every_log_frequency` gives them."""
         noise = np.exp(self.parameters.log_noise(theta))
-        parts = [
-            readings.log_likelihood(predicted, noise[:, i])
-            for i, (readings, predicted) in enumerate(zip(self.readings, log_frequencies, strict=True))
-        ]
+        parts = []
+        labelled = self.labelled(every_log_frequency)
+        for i, (errors, setup, peaks) in enumerate(zip(self.readings, self.board.setups, self.peaks, strict=True)):
+            sure = np.array([reading.is_sure for reading in setup.readings], dtype=bool)
+            parts.append(errors.at(sure).log_likelihood(labelled[i][:, sure], noise[:, i]))
+            if peaks is not None:
+                parts.append(peaks.log_likelihood(every_log_frequency[i], noise[:, i])[:, None])
         return np.concatenate(parts, axis=1)
 
 
-def linear_suffices(board: Board, errors: NDArray[np.float64], noise: Sequence[float]) -> bool:
+def linear_suffices(n_every: Sequence[int], errors: NDArray[np.float64], noise: Sequence[float]) -> bool:
     """Whether linearisation errors stay below a quarter of the noise for every mode, rms over draws.
 
     Parameters
     ----------
-    board : Board
+    n_every : sequence of int
+        Modes of each setup.
     errors : (n_draws, n_modes) array, cents
+        Of all of them.
     noise : sequence of float
         Relative, one per setup.
     """
-    limit = LINEAR_SHARE * cents(
-        np.concatenate([np.full(len(s.readings), n) for s, n in zip(board.setups, noise, strict=True)])
-    )
+    limit = LINEAR_SHARE * cents(np.repeat(noise, n_every))
     finite = np.isfinite(errors).all(axis=1)
     if finite.mean() < 0.5:
         return False

@@ -1,0 +1,146 @@
+"""Labels proposed for peaks that have none: where the posterior is looked for, and what its tables call the peaks.
+
+The likelihood sums over all assignments of peaks to modes (`bayesplate.frequencies.peaks`), so that a label which is
+proposed here says nothing there. But a search for the posterior has to begin somewhere, and a residual needs a mode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import PriorCard
+from bayesplate.estimates.identifiability import identifiability
+from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
+from bayesplate.estimates.proposals import proposals
+from bayesplate.frequencies.model import setup_model, with_others
+from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
+from bayesplate.frequencies.system import system_of
+from bayesplate.labels import Label
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.measured import Peak, Reading
+from bayesplate.plate.setup import Setup
+
+_LIKELY = 0.5
+"""Probability from which on a label is proposed: no two peaks can have the same one."""
+_N_DRAWS = 64
+_MOST_ROUNDS = 8
+
+
+def with_proposed_labels(board: Board, prior: PriorCard) -> Board:
+    """The board with a reading for each peak that is likely one certain mode.
+
+    From the constants that the labelled modes give, with their uncertainty, each peak is assigned where it likely
+    belongs; the constants are fitted anew to all of them; and again, until no label changes.
+
+    Parameters
+    ----------
+    board : Board
+    prior : PriorCard
+        For the first labels of a board that has too few.
+
+    Returns
+    -------
+    Board
+        The same where every label is sure and no peak lacks one. Otherwise readings with a proposed label follow the
+        labelled ones of their setup, with the confidence 0; peaks without a likely label stay peaks.
+    """
+    if not any(takes_part(setup) for setup in board.setups):
+        return board
+    first = _first(board, prior)
+    if first is None:
+        return board
+    before: list[tuple[Setup, ...]] = []
+    for _ in range(_MOST_ROUNDS):
+        estimate = weighted_least_squares(first)
+        labelled = replace(board, setups=tuple(_labelled(board, setup, estimate) for setup in board.setups))
+        if labelled.setups in before or sum(len(setup.readings) for setup in labelled.setups) < len(RIGIDITIES):
+            break
+        before.append(labelled.setups)
+        first = _of_labelled(labelled)
+    return labelled
+
+
+def _first(board: Board, prior: PriorCard) -> Board | None:
+    """Setups whose labels determine the constants, or the most probable labels of the setup with most peaks."""
+    if sum(len(setup.readings) for setup in board.setups) >= len(RIGIDITIES):
+        labelled = _of_labelled(board)
+        estimate = weighted_least_squares(labelled)
+        if not identifiability(estimate.sensitivities, estimate.scales).blind():
+            return labelled
+    fullest = max(board.setups, key=lambda setup: len(setup.peaks) + len(setup.readings))
+    bare = tuple(Peak(reading.frequency, reading.sign) for reading in fullest.readings)
+    given = {reading.frequency.mean: reading.label for reading in fullest.readings if reading.is_sure}
+    alone = replace(fullest, readings=(), peaks=(*bare, *fullest.peaks))
+    found = proposals(replace(board, setups=(alone,)), prior, np.random.default_rng(0), given)
+    return found[0].board if found else None
+
+
+def _of_labelled(board: Board) -> Board:
+    """The board with those setups only that have a reading."""
+    return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
+
+
+def _labelled(board: Board, setup: Setup, estimate: Estimate) -> Setup:
+    """A setup with the labels that its peaks likely have at an estimate, which may be that of other setups."""
+    if not takes_part(setup):
+        return setup
+    model = with_others(setup_model(system_of(board, setup), estimate.values), estimate.values)
+    peaks = PeakLikelihood.of(model)
+    assert peaks is not None
+    widening = _widening(estimate)
+    covariance = widening**2 * identifiability(estimate.sensitivities, estimate.scales).covariance
+    logs = np.random.default_rng(0).multivariate_normal(np.log(estimate.rigidities), covariance, _N_DRAWS)
+    values = {**estimate.values, **dict(zip(RIGIDITIES, np.exp(logs).T, strict=True))}
+    every = model.every_log_frequency(values, "linear")
+    usable = np.isfinite(every).all(axis=1)
+    noise = np.full(int(usable.sum()), widening * setup.noise.median)
+    return with_labels(setup, peaks, peaks.probabilities(every[usable], noise), _LIKELY)
+
+
+def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.float64], least: float) -> Setup:
+    """A setup with labels for the peaks that are one mode with a probability above the least one.
+
+    Parameters
+    ----------
+    setup : Setup
+    peaks : PeakLikelihood
+    probabilities : (n_peaks, n_modes) array
+        Of each peak to be each mode.
+    least : float
+        At least one half, so that no two peaks have the same label.
+
+    Returns
+    -------
+    Setup
+    """
+    likely = [_likely(peaks.labels, row, least) for row in probabilities]
+    readings, rest = list(setup.readings), dict(enumerate(setup.peaks))
+    doubtful = {int(at): label for at, label in zip(peaks.readings, likely, strict=True) if at >= 0}
+    taken = {reading.label for at, reading in enumerate(readings) if doubtful.get(at) is None}
+    for label, at, bare in zip(likely, peaks.readings, peaks.bare, strict=True):
+        if label is None or label in taken:
+            continue
+        beams = (label.m - setup.first_label.m, label.n - setup.first_label.n)
+        if at >= 0:
+            stated = readings[at].stated or readings[at].label
+            readings[at] = replace(readings[at], label=label, beams=beams, stated=None if label == stated else stated)
+        else:
+            peak = rest.pop(int(bare))
+            readings.append(Reading(label, beams, peak.frequency, peak.sign, confidence=0.0))
+    return replace(setup, readings=tuple(readings), peaks=tuple(rest.values()))
+
+
+def _likely(labels: Sequence[Label | None], probabilities: NDArray[np.float64], least: float) -> Label | None:
+    best = int(np.argmax(probabilities))
+    return labels[best] if probabilities[best] > least else None
+
+
+def _widening(estimate: Estimate) -> float:
+    """How far the residuals exceed what the readings' uncertainties let expect, at least 1."""
+    spare = max(estimate.residuals.size - len(RIGIDITIES), 1)
+    return float(max(np.sqrt(np.sum((estimate.residuals / estimate.scales) ** 2) / spare), 1.0))
