@@ -79,6 +79,7 @@ def starter_text(starter: Starter, examples: Sequence[Label]) -> str:
     ]
     if "clamped" in starter.edges.values():
         lines.append("# clamped_mm = { x0 = 30 }  # what the clamp covers, where the plate's length includes it")
+    lines.append("# unlabelled_hz = [404, 448.8]  # peaks of which you cannot tell the mode")
     lines += ["", '[setup.frequencies_hz]  # "(m,n)": m nodal lines crossed along x, n along y']
     lines += [f"{_quoted(label)} = {hz:g}" for label, hz in starter.frequencies.items()]
     lines += [f'# "{label}" = ' for label in examples if str(label) not in starter.frequencies]

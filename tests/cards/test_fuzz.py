@@ -31,6 +31,7 @@ LEAVES = st.one_of(
 CARD_KEYS = [
     *("mean", "sd", "readings", "resolution", "at_x_mm", "at_y_mm", "median", "factor", "x0", "y1", "name"),
     *("(1,0)", "( 1,0)", "(0,0)", "edges", "kind", "at_mm", "mass_g"),
+    *("peaks", "hz", "sign", "label_confidence", "missed_probability"),
 ]
 KEYS = st.one_of(st.text(max_size=8), st.sampled_from(CARD_KEYS))
 TREES = st.recursive(LEAVES, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=4))
@@ -105,6 +106,7 @@ def test_mutated_tables(table: dict[str, Any]) -> None:
 def check_means_something(card: BoardCard) -> None:
     assert all(isinstance(fault, Fault) for fault in physical_faults(card))
     for setup in card.setups:
-        for quantity in (*setup.frequencies_hz.values(), *setup.unlabelled_hz):
+        peaks = (peak.hz for peak in setup.peaks)
+        for quantity in (*setup.frequencies_hz.values(), *setup.unlabelled_hz, *peaks):
             assert math.isfinite(float(quantity.value(1.0)))
             assert 0.1 <= quantity.mean <= 1e6

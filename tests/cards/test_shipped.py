@@ -21,7 +21,7 @@ from bayesplate.cards import (
 from bayesplate.cards.shelf import shelf_folder
 from bayesplate.labels import Label
 
-FREE = ("spruce-free-1R", "spruce-free-2L", "spruce-free-2R", "spruce-free-3L")
+FREE = tuple(f"spruce-free-{number}{side}" for number in (1, 2, 3) for side in "LR")
 CANTILEVER = [(1, 0), (1, 1), (2, 0), (1, 2), (2, 1), (2, 2)]
 CLAMPED = [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2)]
 PAPER = {
@@ -33,7 +33,7 @@ PAPER = {
 
 
 def test_the_shelf() -> None:
-    assert card_names("boards") == tuple(sorted((*PAPER, *FREE)))
+    assert card_names("boards") == tuple(sorted((*PAPER, *FREE, "nemus-D")))
     assert card_names("priors") == ("spruce", "weakly-informative")
     assert card_names("coefficients") == ("paper-cantilever", "paper-clamped")
 
@@ -75,22 +75,25 @@ def test_the_boards_of_the_paper(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "mass", "labelled", "unlabelled", "some"),
+    ("name", "mass", "labelled", "unlabelled", "some", "confidence"),
     [
-        ("spruce-free-1R", 248.0, 6, 10, {(1, 1): 55.08, (2, 2): 290.29}),
-        ("spruce-free-2L", 256.0, 9, 7, {(0, 2): 163.29, (4, 1): 455.26}),
-        ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}),
-        ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}),
+        ("spruce-free-1L", 236.0, 8, 11, {(0, 2): 133.28, (2, 2): 263.02}, 0.7),
+        ("spruce-free-1R", 248.0, 6, 10, {(1, 1): 55.08, (2, 2): 290.29}, 0.9),
+        ("spruce-free-2L", 256.0, 9, 7, {(0, 2): 163.29, (4, 1): 455.26}, 0.98),
+        ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}, 0.98),
+        ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}, 0.7),
+        ("spruce-free-3R", 253.2, 6, 11, {(1, 1): 60.35, (2, 2): 292.24}, 0.9),
     ],
 )
 def test_the_free_boards(
-    name: str, mass: float, labelled: int, unlabelled: int, some: dict[tuple[int, int], float]
+    name: str, mass: float, labelled: int, unlabelled: int, some: dict[tuple[int, int], float], confidence: float
 ) -> None:
     card = load_board(name)
     (setup,) = card.setups
 
     assert plate_mass_g(card) == pytest.approx(mass)
-    assert (len(setup.frequencies_hz), len(setup.unlabelled_hz)) == (labelled, unlabelled)
+    assert (len(setup.frequencies_hz), len(setup.peaks), setup.unlabelled_hz) == (labelled, unlabelled, ())
+    assert {setup.confidence_in(label) for label in setup.frequencies_hz} == {confidence}
     assert {label: setup.frequencies_hz[Label(*label)].mean for label in some} == some
     assert setup.resolution_hz is None
     assert setup.edges.letters == "FFFF"
@@ -98,6 +101,41 @@ def test_the_free_boards(
     assert len(card.plate.thickness_mm.at_x) == len(card.plate.thickness_mm.at_y) == 10
     # opposite corners: the residue is positive where m + n is even, whatever the board
     assert setup.signs == {label: "+" if sum(label) % 2 == 0 else "-" for label in setup.frequencies_hz}
+
+
+PEAKS = {
+    "spruce-free-1L": {384.06: (0.145, "+", 0.435), 634.11: (0.1, "-", 0.38), 970.01: (0.195, "-", 0.075)},
+    "spruce-free-1R": {369.63: (0.105, "", 0.25), 566.04: (1.085, "-", 0.275), 876.94: (0.295, "", 0.095)},
+    "spruce-free-2L": {404.69: (0.155, "", 0.45), 553.65: (1.06, "-", 0.485), 995.35: (0.635, "+", 0.045)},
+    "spruce-free-2R": {404.01: (0.175, "+", 0.5), 707.01: (0.1, "+", 0.44), 995.25: (0.53, "+", 0.32)},
+    "spruce-free-3L": {361.36: (0.11, "+", 0.835), 397.11: (0.1, "-", 0.895), 936.0: (0.545, "-", 0.32)},
+    "spruce-free-3R": {158.94: (1.18, "+", 0.115), 683.31: (0.275, "+", 0.43), 993.05: (0.33, "-", 0.335)},
+}
+"""Some peaks of each board, Hz: sd (Hz), sign and damping (%)."""
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_peaks_of_the_free_boards(name: str) -> None:
+    """The sd is half the spread of the fit, and at least 0.1 Hz; the peaks ascend, and none is a labelled mode."""
+    (setup,) = load_board(name).setups
+    read = {peak.hz.mean: (peak.hz.sd, peak.sign, peak.damping_percent) for peak in setup.peaks}
+
+    assert {hertz: read[hertz] for hertz in PEAKS[name]} == PEAKS[name]
+    assert list(read) == sorted(read)
+    assert min(sd for sd, _, _ in read.values()) >= 0.1
+    assert not {quantity.mean for quantity in setup.frequencies_hz.values()} & set(read)
+
+
+def test_the_board_of_three_sessions() -> None:
+    """Peaks alone; each of the six spreads by the per cent of the source, largest less smallest over the mean."""
+    card = load_board("nemus-D")
+    sessions = [[peak.mean for peak in setup.unlabelled_hz] for setup in card.setups]
+    spread = [100 * (max(hertz) - min(hertz)) / (sum(hertz) / 3) for hertz in zip(*sessions, strict=True)]
+
+    assert [setup.name for setup in card.setups] == ["session-1", "session-2", "session-3"]
+    assert {setup.edges.letters for setup in card.setups} == {"CFFF"}
+    assert [round(percent, 1) for percent in spread] == [2.4, 2.4, 2.0, 0.9, 2.0, 1.0]
+    assert all(not setup.frequencies_hz for setup in card.setups)
 
 
 @pytest.mark.parametrize("name", card_names("priors"))

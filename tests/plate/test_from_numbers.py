@@ -105,6 +105,17 @@ def test_what_is_not_said_is_what_a_card_assumes():
     assert board(prior=noisy, setups=setup(noise=own)).setups[0].noise == own
 
 
+def test_peaks_are_numbers_readings_quantities_or_peaks():
+    vague = bayesplate.Peak(Q.from_mean(671.2, 0.3), "-", amplitude=0.4, damping=0.005)
+    one = setup(unlabelled=[448.8, [594.0, 595.0], Q.from_mean(640.0, 1.0), vague, bayesplate.Peak(707)])
+    numbers = (Q.exact(448.8), Q.from_readings([594, 595]), Q.from_mean(640.0, 1.0), vague.frequency, Q.exact(707))
+
+    assert tuple(peak.frequency for peak in one.peaks) == numbers
+    assert one.peaks[3] == vague
+    assert one.unlabelled == (448.8, 594.5, 640.0, 671.2, 707.0)
+    assert [peak.is_bare for peak in one.peaks] == [True, True, True, False, True]
+
+
 def test_labels_count_from_the_first_one():
     one = bayesplate.Reading.of("(1,0)", 52, "+", first_label=(1, 0))
 
@@ -159,6 +170,11 @@ BAD = {
     "noise and resolution": (lambda: setup(noise=0.005, resolution="1 Hz"),
                              ["free noise: wanted a relative noise and how far it may be off: Quantity.from_median(",
                               "free resolution: wanted a number, in Hz, got '1 Hz'"]),
+    "peaks": (lambda: setup(unlabelled=[448.8, "594 Hz", bayesplate.Peak(np.nan)]),
+              ["free unlabelled 2: wanted a number, an array of readings, a Quantity or a Peak, in Hz, got '594 Hz'",
+               "free unlabelled 3: wanted a number, an array of readings, a Quantity or a Peak, in Hz, got Peak("]),
+    "a bounded peak": (lambda: board(setups=setup(unlabelled=[Q.from_range(440.0, 450.0)])).to_card(),
+                       ["free peak 1: wanted a log-normal quantity without bounds, as cards state it, got"]),
     "exact noise": (lambda: board(setups=replace(setup(), noise=Q.exact(0.005))).to_card(),
                     ["free noise: wanted a relative noise", "got an exact number"]),
     "physics": (lambda: bayesplate.check(board(mass=41.0)),

@@ -119,3 +119,21 @@ def test_what_no_card_can_state_is_refused(name):
     known = {"thickness": Quantity.from_range(2e-3, 4e-3), "poisson_xy": Quantity.from_mean(0.4, 0.1, "normal", 0.0)}
     with pytest.raises(InputError, match=f"{name}: wanted a .*normal quantity without bounds, as cards state it, got"):
         card_text(everything().with_priors({name: known[name]}))
+
+
+def test_peaks_and_what_is_believed_of_them_are_written_where_they_say_something():
+    """The bare ones first as a list, then tables, in their order; one confidence as a number, several by label."""
+    text, bare = card_text(everything()), card_text(replace(everything(), setups=everything().setups[:1]))
+
+    assert "unlabelled_hz = [448.8, { readings = [594.1, 594.4], resolution = 0.5 }]" in text
+    first = '{ hz = { mean = 671.2, sd = 0.3 }, sign = "-", amplitude = 0.25, damping_percent = 1.23 }'
+    assert f"peaks = [{first}, {{ hz = 707.0, amplitude = 3.0 }}]" in text
+    assert 'label_confidence = { "(1,0)" = 0.9, "(2,0)" = 0.75 }' in text
+    assert "missed_probability = 0.1\nspurious_probability = 0.05\n" in text
+    assert not any(key in bare for key in ("unlabelled", "peaks", "confidence", "missed", "spurious"))
+    assert "label_confidence = 0.98\n" in card_text(prepare("spruce-free-2R").board)
+    alike = replace(everything().setups[1], readings=tuple(replace(r, confidence=0.5) for r in READINGS))
+    assert "label_confidence = 0.5\n" in card_text(replace(everything(), setups=(alike,)))
+
+
+READINGS = everything().setups[1].readings

@@ -64,10 +64,13 @@ def test_the_report_printed_is_the_one_returned(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+DEAR = ("spruce-free-1L", "spruce-free-1R", "spruce-free-3L", "spruce-free-3R")
+"""Profiles of the outline make their plates dear."""
+
 BOARDS = [
-    # profiles of the outline make their plates dear
-    pytest.param(name, marks=pytest.mark.slow) if name in ("spruce-free-1R", "spruce-free-3L") else name
+    pytest.param(name, marks=pytest.mark.slow) if name in DEAR else name
     for name in card_names("boards")
+    if name != "nemus-D"
 ]
 
 
@@ -81,6 +84,13 @@ def test_every_shipped_board_can_be_checked(name):
         assert sum(mode["share_percent"]) == pytest.approx(100.0, abs=0.2)  # each is rounded to 0.1
     squares = [mode["residual_cents"] ** 2 for mode in report["modes"]]
     assert report["in_sample_rms_cents"] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-12)
+
+
+def test_a_board_of_peaks_alone_is_told_what_it_lacks():
+    result = invoke("check", "nemus-D")
+
+    assert result.exit_code == 4
+    assert "nemus-D: setup 'session-1' has no labelled mode, its 6 peaks have none" in result.stderr
 
 
 def test_the_expected_precision_is_that_of_the_noise(with_labels):

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import bayesplate
-from bayesplate.cards import load_board
+from bayesplate.cards import load_board, read_board_text
 from bayesplate.cli import main
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.labels import Label
@@ -41,6 +41,15 @@ def test_answers_become_a_card_that_check_takes():
     readings = {str(label): hz.mean for label, hz in card.setups[0].frequencies_hz.items()}
     assert readings == {"(1,1)": 35, "(2,0)": 50, "(0,2)": 111, "(2,1)": 86}
     assert bayesplate.check("my-board.toml").name == "my-board"
+
+
+def test_the_line_for_peaks_without_a_label_can_be_used():
+    path = new("a", frequencies={"(1,1)": 35})
+    line, *_ = (line for line in path.read_text(encoding="utf-8").splitlines() if "unlabelled_hz" in line)
+    text = path.read_text(encoding="utf-8").replace(line, line.removeprefix("# "))
+
+    assert read_board_text(path.read_text(encoding="utf-8"), "a").setups[0].unlabelled_hz == ()
+    assert [peak.mean for peak in read_board_text(text, "a").setups[0].unlabelled_hz] == [404, 448.8]
 
 
 def test_every_question_can_be_skipped_and_modes_works_on_the_card():
