@@ -129,14 +129,15 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
     """
     plate = system.plate(values) if plate is None else plate
     beams = [reading.beams for reading in system.setup.readings]
-    found = find(plate, system.weights(values).at(0), beams)
+    weights = system.weights(values).at(0)
+    found = find(plate, weights, beams)
     return SetupModel(
         system=system,
         plate=plate,
         places=tuple(found[b].place for b in beams),
         linear=LinearLaw(
-            np.reshape([found[b].stiffness for b in beams], (len(beams), -1 if beams else 0)),
-            np.reshape([found[b].mass for b in beams], (len(beams), -1 if beams else 0)),
+            np.reshape([found[b].stiffness for b in beams], (len(beams), weights.stiffness.size)),
+            np.reshape([found[b].mass for b in beams], (len(beams), weights.mass.size)),
         ),
     )
 

@@ -1,4 +1,4 @@
-"""Every mode of a setup up to a frequency, with its label; what labels, peaks and signs say against it."""
+"""Every mode of a setup up to a frequency, with its label; what labels and signs say against it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,7 @@ from bayesplate.modes.solve import Modes, solve
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
 
-_FURTHER = 1.1
-"""Than where the modes of a plate would reach if they were evenly spaced, which they nearly are."""
-_FEWEST_MODES, _MOST_MODES = 12, 96
-_SPARE = 1.5
-"""Modes solved for each measured peak: some peaks are missed on the bench."""
+_FEWEST_MODES = 12
 
 
 @dataclass(frozen=True)
@@ -78,7 +74,7 @@ def spectrum(
 
 
 def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Modes, tuple[NamedMode, ...]]]:
-    """Spectrum of every setup with a peak or a sign to compare it with.
+    """Spectrum of every setup with a hammer, whose signs can be compared with it.
 
     Parameters
     ----------
@@ -89,18 +85,13 @@ def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Mod
     Returns
     -------
     dict of (Modes, tuple of NamedMode)
-        By setup; up to above its highest peak, and at least two modes per reading.
+        By setup; at least two modes per reading.
     """
     found = {}
     for model in models:
         setup = model.setup
-        if not setup.unlabelled and setup.hammer is None:
-            continue
-        n_modes = max(_FEWEST_MODES, 2 * len(setup.readings), round(_SPARE * len(setup.readings + setup.unlabelled)))
-        found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
-        highest = max(setup.unlabelled, default=0.0)
-        while (reached := found[setup.name][1][-1].frequency) < highest and n_modes < _MOST_MODES:
-            n_modes = min(int(n_modes * _FURTHER * highest / reached) + 1, _MOST_MODES)
+        if setup.hammer is not None:
+            n_modes = max(_FEWEST_MODES, 2 * len(setup.readings))
             found[setup.name] = spectrum(model.system, values, n_modes, model.plate)
     return found
 

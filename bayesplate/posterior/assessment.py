@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.spectrum import NamedMode, doubtful_labels, sign_conflicts, spectra
+from bayesplate.frequencies.spectrum import doubtful_labels, sign_conflicts, spectra
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
@@ -43,8 +43,6 @@ class Assessment:
         Surrogate of the exact law less that law over the posterior; without draws where the walkers walked on none.
     means : dict of (dict of float, float)
         By law: posterior means of E_x ... D_s, and how many draws of equal weight they rest on.
-    named : dict of tuple of NamedMode
-        Modes at the posterior mean of every setup with a peak or a sign to compare them with.
     doubts : tuple of str
         Labels that hardly fit, and signs that contradict them.
     """
@@ -56,7 +54,6 @@ class Assessment:
     exact_worst: float
     surrogate_errors: Floats
     means: Mapping[LawName, tuple[Mapping[str, float], float]]
-    named: Mapping[str, tuple[NamedMode, ...]]
     doubts: tuple[str, ...]
 
 
@@ -90,7 +87,6 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
         exact_worst=worst_cents(models),
         surrogate_errors=_surrogate_errors(inference, draws),
         means={law: means_under(inference, draws, law, errors) for law in get_args(LawName)},
-        named={setup: named for setup, (_, named) in found.items()},
         doubts=(*doubtful_labels(models), *conflicts),
     )
 

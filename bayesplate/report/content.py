@@ -15,7 +15,7 @@ from bayesplate.report.words import effect_sentence
 from bayesplate.results.budget import input_shares
 from bayesplate.results.contract import Spread
 from bayesplate.results.summary import Percentile, Summary
-from bayesplate.results.tables import Table, modes_table, unlabelled_table
+from bayesplate.results.tables import Table, modes_table, peaks_table
 from bayesplate.results.words import (
     CONSTANTS,
     GPA,
@@ -188,9 +188,9 @@ def _prior(quantity: Quantity) -> str:
 
 
 def modes_tables(summary: Summary) -> list[Table]:
-    """The labelled modes, and the peaks without a label."""
-    unlabelled = unlabelled_table(summary)
-    return [modes_table(summary), *([unlabelled] if unlabelled else [])]
+    """The labelled modes, and the peaks whose label is not sure."""
+    peaks = peaks_table(summary)
+    return [modes_table(summary), *([peaks] if peaks else [])]
 
 
 def laws_table(summary: Summary) -> Table:

@@ -1,19 +1,19 @@
-"""The modes of a summary: each reading beside what the fitted model predicts, and the peaks without a label."""
+"""The modes of a summary: each reading beside what the fitted model predicts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from bayesplate.frequencies.laws import cents
-from bayesplate.frequencies.spectrum import NamedMode
-from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.results.contract import finite
+
+LabelOrigin = Literal["card", "doubtful", "proposed"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,9 @@ class ModeRow:
         Share of the reading in its own prediction.
     label_correlation : float
         Of the mode's shape with what its label names.
+    label_origin : "card", "doubtful" or "proposed"
+        Whether the card states the label as sure or with a doubt, or the peak has none and this one is its likeliest;
+        the probabilities of the latter two stand in `Summary.peaks`.
     """
 
     setup: str
@@ -58,17 +61,7 @@ class ModeRow:
     left_out_cents: float | None
     leverage: float
     label_correlation: float
-
-
-@dataclass(frozen=True)
-class UnlabelledPeak:
-    """A peak without a label beside the predicted mode nearest to it; it is shown, not fitted."""
-
-    setup: str
-    measured_hz: float
-    nearest: str
-    predicted_hz: float
-    cents: float
+    label_origin: LabelOrigin = "card"
 
 
 def over(measured: float, predicted: float) -> float:
@@ -112,6 +105,7 @@ def mode_rows(problem: PosedProblem, draws: Draws, assessment: Assessment) -> tu
             left_out_cents=finite(float(cents(assessment.left_out[i]))),
             leverage=float(assessment.leverages[i]),
             label_correlation=place.correlation,
+            label_origin="card" if reading.is_sure else "doubtful" if reading.confidence else "proposed",
         )
         made.append(row)
     return tuple(made)
@@ -124,21 +118,3 @@ def rounding_intervals(problem: PosedProblem) -> list[tuple[float, float] | None
         ends = zip(cents(one.log_low - one.log_frequency), cents(one.log_high - one.log_frequency), strict=True)
         found += [(float(low), float(high)) if high > low else None for low, high in ends]
     return found
-
-
-def unlabelled_peaks(board: Board, named: Mapping[str, Sequence[NamedMode]]) -> tuple[UnlabelledPeak, ...]:
-    """Every peak without a label beside its nearest mode.
-
-    Parameters
-    ----------
-    board : Board
-    named : dict of sequence of NamedMode
-        By setup.
-    """
-    peaks = []
-    for setup in board.setups:
-        for hertz in setup.unlabelled:
-            nearest = min(named[setup.name], key=lambda mode: abs(np.log(mode.frequency / hertz)))
-            miss = over(hertz, nearest.frequency)
-            peaks.append(UnlabelledPeak(setup.name, hertz, nearest.name, nearest.frequency, miss))
-    return tuple(peaks)

@@ -55,11 +55,12 @@ def posterior_archive(inference: Inference, draws: Draws, attributes: Mapping[st
     problem, convergence = inference.problem, inference.convergence
     board = problem.board
     factors = problem.posterior.log_prior_factors(draws.flat)
+    all_sure = not any(problem.posterior.peaks)
     return Archive(
         groups={
             "posterior": {**draws.rigidities, **draws.moduli, "noise": draws.noise, **draws.inputs},
             "log_prior": {name: values.reshape(draws.log_posterior.shape) for name, values in factors.items()},
-            "log_likelihood": {"frequency": draws.log_likelihood},
+            "log_likelihood": {"frequency" if all_sure else "factor": draws.log_likelihood},
             "posterior_predictive": {"frequency": draws.predictive},
             "sample_stats": {
                 "lp": draws.log_posterior,
@@ -72,11 +73,13 @@ def posterior_archive(inference: Inference, draws: Draws, attributes: Mapping[st
         coords={
             "setup": [setup.name for setup in board.setups],
             "reading": board.reading_names,
+            **({} if all_sure else {"factor": problem.posterior.factors}),
             "parameter": list(problem.parameters.names),
         },
         dims={
             "noise": ["setup"],
             "frequency": ["reading"],
+            "factor": ["factor"],
             "tau": ["parameter"],
             "rhat": ["parameter"],
             "ess": ["parameter"],

@@ -19,7 +19,8 @@ from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
-from bayesplate.results.modes import mode_rows, unlabelled_peaks
+from bayesplate.results.modes import mode_rows
+from bayesplate.results.peaks import assigned_peaks
 from bayesplate.results.summary import (
     FORMAT,
     ErrorFigures,
@@ -84,6 +85,7 @@ def summarise(
     board = problem.board
     system = paper_system(board, problem.estimate, compared=False)
     rows = mode_rows(problem, draws, assessment)
+    peaks, spectra = assigned_peaks(problem, draws)
     return Summary(
         format=FORMAT,
         name=board.name,
@@ -106,7 +108,8 @@ def summarise(
         linear_means=law_means(*assessment.means["linear"]),
         exact_means=law_means(*assessment.means["exact"]),
         modes=rows,
-        unlabelled=unlabelled_peaks(board, assessment.named),
+        peaks=peaks,
+        spectra=spectra,
         error=ErrorFigures(
             in_sample_rms_cents=float(np.sqrt(np.mean([row.residual_cents**2 for row in rows]))),
             leave_one_out_rms_cents=rms([row.left_out_cents for row in rows]),

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from html import escape
 
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
-from bayesplate.results.modes import ModeRow, UnlabelledPeak
+from bayesplate.results.modes import ModeRow
+from bayesplate.results.peaks import AssignedPeak, Spectrum
 from bayesplate.results.words import GPA, constant_name, interval, plus_minus
 
 FORMAT = 1
@@ -147,7 +148,10 @@ class Summary(Run):
         None where there are too many modes, or no estimate is positive.
     linear_means, exact_means : LawMeans
     modes : tuple of ModeRow
-    unlabelled : tuple of UnlabelledPeak
+    peaks : tuple of AssignedPeak
+        Those whose label is not sure, with the modes that they may be.
+    spectra : tuple of Spectrum
+        Of the setups that have such peaks: all modes that they may be.
     error : ErrorFigures
     sampler : SamplerHealth
     identifiability, warnings : tuple of str
@@ -166,7 +170,8 @@ class Summary(Run):
     linear_means: LawMeans
     exact_means: LawMeans
     modes: tuple[ModeRow, ...]
-    unlabelled: tuple[UnlabelledPeak, ...]
+    peaks: tuple[AssignedPeak, ...]
+    spectra: tuple[Spectrum, ...]
     error: ErrorFigures
     sampler: SamplerHealth
     identifiability: tuple[str, ...]

@@ -8,6 +8,7 @@ import numpy as np
 
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.modes import ModeRow
+from bayesplate.results.peaks import LEAST
 from bayesplate.results.summary import Summary
 from bayesplate.results.words import (
     CONSTANTS,
@@ -18,9 +19,15 @@ from bayesplate.results.words import (
     mode_name,
     narrow_name,
     number,
+    percent,
     plus_minus,
     two_digits,
 )
+
+_MARKS = {"card": "", "doubtful": " ?", "proposed": " *"}
+_MARKED = {"doubtful": "; ? label in doubt", "proposed": "; * label proposed here"}
+MOST_LISTED = 3
+"""Modes that a table gives for one peak."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +75,7 @@ def modes_table(summary: Summary) -> Table:
         rounding = (MISSING if half is None else f"± {half:.1f}",) if is_rounded else ()
         rows.append(
             (
-                mode_name(mode.label, mode.setup, several=several),
+                mode_name(mode.label, mode.setup, several=several) + _MARKS[mode.label_origin],
                 f"{mode.measured_hz:.6g}",
                 f"{mode.predicted_hz.mean:.1f}",
                 number(mode.residual_cents, 1, signed=True),
@@ -78,8 +85,11 @@ def modes_table(summary: Summary) -> Table:
             )
         )
     rounded = ("rounding",) if is_rounded else ()
+    marked = "".join(
+        words for origin, words in _MARKED.items() if origin in {mode.label_origin for mode in summary.modes}
+    )
     return Table(
-        "Modes, Hz; errors, cents (17 cents are about 1 %)",
+        f"Modes, Hz; errors, cents (17 cents are about 1 %){marked}",
         ("mode", "measured", "predicted", "error", "90 % interval", *rounded, "left out"),
         tuple(rows),
     )
@@ -98,14 +108,21 @@ def noise_cents(summary: Summary, mode: ModeRow) -> float:
     return float(cents(np.asarray(summary.noise[mode.setup].q50)))
 
 
-def unlabelled_table(summary: Summary) -> Table | None:
-    """Peaks without a label beside the nearest predicted mode; None if there are none."""
-    if not summary.unlabelled:
+def peaks_table(summary: Summary) -> Table | None:
+    """Peaks whose label is not sure beside the modes that they may be; None if there are none."""
+    if not summary.peaks:
         return None
-    rows = [
-        (f"{peak.measured_hz:.6g}", peak.nearest, f"{peak.predicted_hz:.1f}", f"{peak.cents:+.0f}")
-        for peak in summary.unlabelled
-    ]
+    several = len(summary.spectra) > 1
+    rows = []
+    for peak in summary.peaks:
+        told = [f"{one.label} {percent(one.probability)}" for one in peak.assignments[:MOST_LISTED]]
+        if peak.spurious_probability >= LEAST:
+            told.append(f"no mode {percent(peak.spurious_probability)}")
+        name = f"{peak.hz:.6g}" + (f" {peak.setup}" if several else "")
+        miss = number(peak.residual_cents, 1, signed=True)
+        rows.append((name, peak.stated or MISSING, ", ".join(told), f"{peak.predicted_hz.mean:.1f}", miss))
     return Table(
-        "Peaks without a label: kept, not fitted", ("measured Hz", "nearest mode", "predicted Hz", "cents"), tuple(rows)
+        "Peaks and the modes that they may be",
+        ("peak, Hz", "on the card", "probability", "predicted, Hz", "cents"),
+        tuple(rows),
     )

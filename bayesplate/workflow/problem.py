@@ -199,7 +199,8 @@ class Problem:
         posterior = self.posed.posterior
 
         def hertz(rows: Floats) -> Floats:
-            return np.exp(np.concatenate(posterior.log_frequencies(rows), axis=1))
+            stated = zip(posterior.log_frequencies(rows), self.board.setups, strict=True)
+            return np.exp(np.concatenate([part[:, : len(setup.readings)] for part, setup in stated], axis=1))
 
         return self._by_point(hertz, theta, (len(self.labels),), outside=np.nan)
 

@@ -23,7 +23,7 @@ from bayesplate.results.folder import json_text
 from bayesplate.results.notebook import html
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
-from bayesplate.results.tables import Table, constants_table, modes_table, unlabelled_table
+from bayesplate.results.tables import Table, constants_table, modes_table, peaks_table
 from bayesplate.results.words import percent, two_digits
 
 __all__ = [
@@ -62,8 +62,8 @@ def show_check(report: CheckReport) -> Shown:
 
 def show_fit(summary: Summary) -> Shown:
     """The summary of `bayesplate.workflow.fit.fit` for a person."""
-    unlabelled = unlabelled_table(summary)
-    tables = (constants_table(summary), modes_table(summary), *([unlabelled] if unlabelled else []))
+    peaks = peaks_table(summary)
+    tables = (constants_table(summary), modes_table(summary), *([peaks] if peaks else []))
     error, model = summary.error, summary.model
     left_out = error.leave_one_out_rms_cents
     noise = ", ".join(percent(entry.q50, 2) for entry in summary.noise.values())
