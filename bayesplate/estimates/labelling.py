@@ -25,7 +25,7 @@ from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.measured import Peak, Reading
 from bayesplate.plate.setup import Setup
 
-_LIKELY = 0.5
+LIKELY = 0.5
 """Probability from which on a label is proposed: no two peaks can have the same one."""
 _N_DRAWS = 64
 _MOST_ROUNDS = 8
@@ -99,7 +99,7 @@ def _labelled(board: Board, setup: Setup, estimate: Estimate) -> Setup:
     every = model.every_log_frequency(values, "linear")
     usable = np.isfinite(every).all(axis=1)
     noise = np.full(int(usable.sum()), widening * setup.noise.median)
-    return with_labels(setup, peaks, peaks.probabilities(every[usable], noise), _LIKELY)
+    return with_labels(setup, peaks, peaks.probabilities(every[usable], noise), LIKELY)
 
 
 def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.float64], least: float) -> Setup:
@@ -108,7 +108,9 @@ def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.f
     Parameters
     ----------
     setup : Setup
+        Labels that were proposed for it before are forgotten.
     peaks : PeakLikelihood
+        Of this setup.
     probabilities : (n_peaks, n_modes) array
         Of each peak to be each mode.
     least : float
@@ -119,20 +121,32 @@ def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.f
     Setup
     """
     likely = [_likely(peaks.labels, row, least) for row in probabilities]
-    readings, rest = list(setup.readings), dict(enumerate(setup.peaks))
-    doubtful = {int(at): label for at, label in zip(peaks.readings, likely, strict=True) if at >= 0}
-    taken = {reading.label for at, reading in enumerate(readings) if doubtful.get(at) is None}
-    for label, at, bare in zip(likely, peaks.readings, peaks.bare, strict=True):
-        if label is None or label in taken:
-            continue
-        beams = (label.m - setup.first_label.m, label.n - setup.first_label.n)
-        if at >= 0:
-            stated = readings[at].stated or readings[at].label
-            readings[at] = replace(readings[at], label=label, beams=beams, stated=None if label == stated else stated)
+    of_reading = {int(at): label for at, label in zip(peaks.readings, likely, strict=True) if at >= 0}
+    of_bare = {int(at): label for at, label in zip(peaks.bare, likely, strict=True) if at >= 0}
+    stated = {at: reading for at, reading in enumerate(setup.readings) if reading.confidence > 0}
+    taken = {one.stated or one.label for at, one in stated.items() if of_reading.get(at) is None}
+    readings, bare, rest = [], [], []
+    for at, reading in enumerate(setup.readings):
+        peak = Peak(reading.frequency, reading.sign, reading.amplitude, reading.damping)
+        bare += [] if at in stated else [(peak, of_reading[at])]
+    bare += [(peak, of_bare[i]) for i, peak in enumerate(setup.peaks)]
+    for at, reading in stated.items():
+        given = reading.stated or reading.label
+        found = of_reading.get(at)
+        used = given if found is None or found in taken else found
+        readings.append(replace(_at(setup, reading, used), stated=None if used == given else given))
+    for peak, found in sorted(bare, key=lambda one: one[0].frequency.mean):
+        if found is None or found in taken:
+            rest.append(peak)
         else:
-            peak = rest.pop(int(bare))
-            readings.append(Reading(label, beams, peak.frequency, peak.sign, confidence=0.0))
-    return replace(setup, readings=tuple(readings), peaks=tuple(rest.values()))
+            reading = Reading(found, (0, 0), peak.frequency, peak.sign, 0.0, None, peak.amplitude, peak.damping)
+            readings.append(_at(setup, reading, found))
+    return replace(setup, readings=tuple(readings), peaks=tuple(rest))
+
+
+def _at(setup: Setup, reading: Reading, label: Label) -> Reading:
+    """A reading with another label."""
+    return replace(reading, label=label, beams=(label.m - setup.first_label.m, label.n - setup.first_label.n))
 
 
 def _likely(labels: Sequence[Label | None], probabilities: NDArray[np.float64], least: float) -> Label | None:

@@ -92,6 +92,36 @@ class SetupModel:
         """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         return log_frequency(self.law(law).squared(self.system.weights(values)))
 
+    @property
+    def every_beams(self) -> tuple[Beams | None, ...]:
+        """Orders of the beam functions of the labelled modes, then of the others."""
+        return (*(reading.beams for reading in self.setup.readings), *(other.beams for other in self.others))
+
+    def labelled_as(self, setup: Setup) -> SetupModel:
+        """The same modes where other readings have labels: columns change their places, and nothing is solved.
+
+        Parameters
+        ----------
+        setup : Setup
+            This one with other labels, each of a mode that the model has.
+        """
+        beams = self.every_beams
+        labelled = [beams.index(reading.beams) for reading in setup.readings]
+        rest = [i for i in range(len(beams)) if i not in labelled]
+        order, places = [*labelled, *rest], self.every_place
+        exact = self.exact
+        if exact is not None:
+            exact = ExactLaw(replace(exact.reduced, places=tuple(places[i] for i in order)))
+        return replace(
+            self,
+            system=replace(self.system, setup=setup),
+            places=tuple(places[i] for i in labelled),
+            linear=LinearLaw(self.linear.stiffness[order], self.linear.mass[order]),
+            exact=exact,
+            others=tuple(OtherMode(places[i], beams[i]) for i in rest),
+            residues=None if self.residues is None else self.residues[order],
+        )
+
     def sensitivities(self, values: Values) -> NDArray[np.float64]:
         """d ln f / d ln D at the point where the model was made: (n_modes, 3) array, columns D_x, D_y, D_s.
 

@@ -31,6 +31,8 @@ class Reading:
         Probability, before the fit, that the label is right; 0 for a label that the program proposes for a bare peak.
     stated : Label or None
         The label on the card, where another is proposed.
+    amplitude, damping : float or None
+        Of the peak: see `Peak`.
     """
 
     label: Label
@@ -39,6 +41,8 @@ class Reading:
     sign: str = ""
     confidence: float = 1.0
     stated: Label | None = None
+    amplitude: float | None = None
+    damping: float | None = None
 
     @property
     def is_sure(self) -> bool:

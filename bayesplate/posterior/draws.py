@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.board import density
 from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
-from bayesplate.posterior.inference import Inference, PosedProblem
+from bayesplate.posterior.inference import Inference, PosedProblem, labelled_by
 
 Floats = NDArray[np.float64]
 
 MOST_DRAWS_A_CHAIN = 4000
+MOST_DRAWS_OF_LABELS = 2000
+"""From which the probabilities of labels are taken."""
 _LINE_OF_PREDICTIVE_DRAWS = 1
 
 
@@ -107,6 +109,23 @@ def named_draws(inference: Inference, seed: int) -> Draws:
         log_likelihood=shaped(posterior.log_likelihood_of(by_setup, flat)),
         predictive=shaped(np.concatenate(predictive, axis=1)),
     )
+
+
+def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draws]:
+    """An inference whose peaks have the labels that its own draws make likely, and these draws by name.
+
+    Parameters
+    ----------
+    inference : Inference
+    seed : int
+        Of the predictive draws.
+    """
+    draws = named_draws(inference, seed)
+    flat = [every.reshape(-1, every.shape[-1]) for every in draws.every_log_frequency]
+    step = max(1, len(draws.flat) // MOST_DRAWS_OF_LABELS)
+    noise = draws.noise.reshape(len(draws.flat), -1)
+    labelled = labelled_by(inference, [every[::step] for every in flat], noise[::step])
+    return labelled, draws if labelled is inference else named_draws(labelled, seed)
 
 
 def posterior_mean_values(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,10 +18,11 @@ from bayesplate.estimates.identifiability import (
     require_identifiable,
     require_labels,
 )
-from bayesplate.estimates.labelling import with_proposed_labels
+from bayesplate.estimates.labelling import LIKELY, with_labels, with_proposed_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.model import SetupModel
 from bayesplate.plate.board import Board
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
@@ -33,6 +34,8 @@ from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sam
 from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior, linear_suffices
+
+Floats = NDArray[np.float64]
 
 _N_CHECKS = 256
 
@@ -155,6 +158,54 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     return PosedProblem(
         board, prior, estimate, found, posterior, approximation.centre, approximation.covariance, is_forced
     )
+
+
+def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noise: Floats) -> Inference:
+    """The same draws where the peaks have the labels that these make likely.
+
+    Labels that are proposed say nothing to the likelihood; they tell which mode a residual is of.
+
+    Parameters
+    ----------
+    inference : Inference
+    every_log_frequency : sequence of (n_draws, n_every) array
+        ln f (Hz) of all modes, setup after setup, at draws of the posterior.
+    noise : (n_draws, n_setups) array
+
+    Returns
+    -------
+    Inference
+        This one where no label changes.
+    """
+    problem = inference.problem
+    setups = []
+    for i, (setup, peaks) in enumerate(zip(problem.board.setups, problem.posterior.peaks, strict=True)):
+        if peaks is not None:
+            probabilities = peaks.probabilities(every_log_frequency[i], noise[:, i])
+            setup = with_labels(setup, peaks, probabilities, LIKELY)
+        setups.append(setup)
+    board = replace(problem.board, setups=tuple(setups))
+    if board.setups == problem.board.setups or sum(len(setup.readings) for setup in setups) < N_RIGIDITIES:
+        return inference
+    estimate = weighted_least_squares(board)
+    before = problem.posterior
+    models = tuple(model.labelled_as(setup) for model, setup in zip(before.models, setups, strict=True))
+    posterior = Posterior(board, before.prior, models, before.law, before.robust)
+    surrogate = inference.surrogate
+    if surrogate is not None:
+        surrogate = replace(surrogate, coefficients=surrogate.coefficients[:, _columns(before.models, models)])
+    found = identifiability(estimate.sensitivities, estimate.scales)
+    again = replace(problem, board=board, estimate=estimate, identifiability=found, posterior=posterior)
+    return replace(inference, problem=again, surrogate=surrogate)
+
+
+def _columns(before: Sequence[SetupModel], after: Sequence[SetupModel]) -> list[int]:
+    """Where the columns of some models stood before they were labelled anew."""
+    columns, first = [], 0
+    for old, new in zip(before, after, strict=True):
+        columns += [first + old.every_place.index(place) for place in new.every_place]
+        first += len(old.every_place)
+    return columns
 
 
 def _widening(board: Board) -> float:

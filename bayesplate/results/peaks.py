@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.labels import Label
 from bayesplate.plate.setup import Setup
-from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.draws import MOST_DRAWS_OF_LABELS, Draws
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.results.modes import Prediction, over
 
@@ -19,7 +19,6 @@ UNNAMED = "cannot tell"
 """A mode whose shape is no clear product of beam functions."""
 LEAST = 0.005
 """Probability below which a mode is not listed."""
-_MOST_DRAWS = 2000
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,7 @@ def assigned_peaks(problem: PosedProblem, draws: Draws) -> tuple[tuple[AssignedP
             continue
         every = draws.every_log_frequency[i]
         flat, noise = every.reshape(-1, every.shape[-1]), draws.noise[..., i].ravel()
-        step = max(1, len(flat) // _MOST_DRAWS)
+        step = max(1, len(flat) // MOST_DRAWS_OF_LABELS)
         flat, noise = flat[::step], noise[::step]
         probabilities = likelihood.probabilities(flat, noise)
         predicted = [_predicted(np.exp(column)) for column in flat[:, likelihood.columns].T]

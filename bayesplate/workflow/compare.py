@@ -13,7 +13,7 @@ from bayesplate.errors import NotConvergedError
 from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
-from bayesplate.posterior.draws import Draws, named_draws
+from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.mode_errors import mode_errors
@@ -188,4 +188,4 @@ def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: Tell) -
     if not inference.convergence.passed:
         reasons = "\n".join(inference.convergence.reasons)
         raise NotConvergedError(f"the sampler did not converge, so nothing is compared:\n{reasons}")
-    return inference, named_draws(inference, settings.seed)
+    return with_likely_labels(inference, settings.seed)

@@ -13,7 +13,7 @@ from bayesplate.errors import CheckpointError
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
-from bayesplate.posterior.draws import Draws, named_draws
+from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
@@ -153,7 +153,7 @@ def fitted(
         inference = infer(under, SamplerSettings(seed=seed), checkpoint=checkpoint, progress=progress)
         if not inference.convergence.passed:
             refuse(inference)
-        return inference, named_draws(inference, seed)
+        return with_likely_labels(inference, seed)
 
     inference, draws = sampled(problem.posed)
     errors = linearisation(inference, draws)
