@@ -17,6 +17,8 @@ from bayesplate.estimates.proposals import MISSED, SPURIOUS, UNUSUAL, probabilit
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
+from bayesplate.plate.setup import Peak
+from bayesplate.quantities import Quantity
 
 PLATE = ritz.Plate.from_moduli(10e9, 0.8e9, 0.75e9, 0.4, rho=430.0, h=3e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2))
@@ -122,3 +124,14 @@ def test_the_cheapest_assignment_is_that_of_enumeration():
 
         assert cost[0] == pytest.approx(cost_of(list(best), peaks, modes, sd))
         assert tuple((i, j) for i, j in enumerate(picked[0]) if j >= 0) == best
+
+
+def test_a_peak_takes_along_what_is_known_of_it():
+    """As a reading its uncertainty and its sign, without a label all of it, whatever the order of the peaks."""
+    high = Peak(Quantity.from_mean(86.0, 0.3), "-", damping=0.01)
+    low = Peak(Quantity.from_mean(35.0, 0.1), "+")
+    board = made_boards.board_of(PLATE, [replace(made_boards.setup_of(ritz.ALL_FREE, {}), peaks=(high, low))])
+    (setup,) = proposed._labelled(board, board.setups[0], (Label(1, 1), None)).setups
+
+    assert [(one.label, one.frequency, one.sign) for one in setup.readings] == [(Label(1, 1), low.frequency, "+")]
+    assert setup.peaks == (high,)

@@ -122,7 +122,7 @@ def test_what_no_card_can_state_is_refused(name):
 
 
 def test_peaks_and_what_is_believed_of_them_are_written_where_they_say_something():
-    """The bare ones first as a list, then tables, in their order; one confidence as a number, several by label."""
+    """The bare ones first as a list, then tables, in their order; the confidence of some labels by label."""
     text, bare = card_text(everything()), card_text(replace(everything(), setups=everything().setups[:1]))
 
     assert "unlabelled_hz = [448.8, { readings = [594.1, 594.4], resolution = 0.5 }]" in text
@@ -131,9 +131,28 @@ def test_peaks_and_what_is_believed_of_them_are_written_where_they_say_something
     assert 'label_confidence = { "(1,0)" = 0.9, "(2,0)" = 0.75 }' in text
     assert "missed_probability = 0.1\nspurious_probability = 0.05\n" in text
     assert not any(key in bare for key in ("unlabelled", "peaks", "confidence", "missed", "spurious"))
-    assert "label_confidence = 0.98\n" in card_text(prepare("spruce-free-2R").board)
-    alike = replace(everything().setups[1], readings=tuple(replace(r, confidence=0.5) for r in READINGS))
-    assert "label_confidence = 0.5\n" in card_text(replace(everything(), setups=(alike,)))
 
 
-READINGS = everything().setups[1].readings
+@pytest.mark.parametrize(
+    ("confidence", "written"),
+    [
+        ((0.5, 0.5, 0.5), "label_confidence = 0.5\n"),
+        ((0.5, 0.5, 1.0), 'label_confidence = { "(1,0)" = 0.5, "(1,1)" = 0.5 }\n'),
+        ((0.5, 0.75, 0.5), 'label_confidence = { "(1,0)" = 0.5, "(1,1)" = 0.75, "(2,0)" = 0.5 }\n'),
+    ],
+)
+def test_a_confidence_that_all_labels_share_is_one_number(confidence, written):
+    setup = everything().setups[1]
+    readings = tuple(replace(one, confidence=c) for one, c in zip(setup.readings, confidence, strict=True))
+    board = replace(everything(), setups=(replace(setup, readings=readings),))
+
+    assert written in card_text(board)
+    assert tuple(one.confidence for one in again(board).setups[0].readings) == confidence
+
+
+@pytest.mark.parametrize("more", [{"sign": "+"}, {"amplitude": 0.5}, {"damping": 0.01}])
+def test_a_peak_of_which_more_is_known_than_its_frequency_keeps_it(more):
+    peaks = (Peak(Quantity.exact(448.8), **more), Peak(Quantity.exact(594.1)))
+    board = replace(everything(), setups=(replace(everything().setups[0], peaks=peaks),))
+
+    assert again(board).setups[0].peaks == peaks
