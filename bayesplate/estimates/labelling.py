@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.estimates.identifiability import identifiability
-from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
+from bayesplate.estimates.least_squares import MOST_STEPS, Estimate, weighted_least_squares
 from bayesplate.estimates.proposals import proposals
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
@@ -23,11 +23,16 @@ from bayesplate.labels import Label
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.measured import Peak, Reading
+from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.setup import Setup
 
 LIKELY = 0.5
 """Probability from which on a label is proposed: no two peaks can have the same one."""
 _N_DRAWS = 64
+_MOST_TRIED = 3
+_STEPS = 4
+"""Of least squares that begin where others ended."""
+_N_LEVELS = 17
 _MOST_ROUNDS = 8
 
 
@@ -51,12 +56,17 @@ def with_proposed_labels(board: Board, prior: PriorCard) -> Board:
     """
     if not any(takes_part(setup) for setup in board.setups):
         return board
-    first = _first(board, prior)
-    if first is None:
-        return board
+    found = [_settled(board, first) for first in _first(board, prior)]
+    return max(found, key=_log_likelihood) if len(found) > 1 else (found or [board])[0]
+
+
+def _settled(board: Board, first: Board) -> Board:
+    """The labels that come out of the first ones."""
     before: list[tuple[Setup, ...]] = []
+    labelled, start = board, None
     for _ in range(_MOST_ROUNDS):
-        estimate = weighted_least_squares(first)
+        estimate = weighted_least_squares(first, MOST_STEPS if start is None else _STEPS, start)
+        start = estimate.rigidities
         labelled = replace(board, setups=tuple(_labelled(board, setup, estimate) for setup in board.setups))
         if labelled.setups in before or sum(len(setup.readings) for setup in labelled.setups) < len(RIGIDITIES):
             break
@@ -65,24 +75,46 @@ def with_proposed_labels(board: Board, prior: PriorCard) -> Board:
     return labelled
 
 
-def _first(board: Board, prior: PriorCard) -> Board | None:
-    """Setups whose labels determine the constants, or the most probable labels of the setup with most peaks."""
+def _first(board: Board, prior: PriorCard) -> list[Board]:
+    """Setups whose labels determine the constants, or the likeliest labels of the setup with most peaks."""
     if sum(len(setup.readings) for setup in board.setups) >= len(RIGIDITIES):
         labelled = _of_labelled(board)
         estimate = weighted_least_squares(labelled)
         if not identifiability(estimate.sensitivities, estimate.scales).blind():
-            return labelled
+            return [labelled]
     fullest = max(board.setups, key=lambda setup: len(setup.peaks) + len(setup.readings))
     bare = tuple(Peak(reading.frequency, reading.sign) for reading in fullest.readings)
     given = {reading.frequency.mean: reading.label for reading in fullest.readings if reading.is_sure}
     alone = replace(fullest, readings=(), peaks=(*bare, *fullest.peaks))
     found = proposals(replace(board, setups=(alone,)), prior, np.random.default_rng(0), given)
-    return found[0].board if found else None
+    return [one.board for one in found[:_MOST_TRIED]]
 
 
 def _of_labelled(board: Board) -> Board:
     """The board with those setups only that have a reading."""
     return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
+
+
+def _log_likelihood(board: Board) -> float:
+    """ln of the likelihood of a board with labels at its own estimate, at the noise that suits it best."""
+    if sum(len(setup.readings) for setup in board.setups) < len(RIGIDITIES):
+        return -np.inf
+    estimate = weighted_least_squares(_of_labelled(board))
+    levels = np.exp(np.linspace(-1.0, 3.0, _N_LEVELS))
+    total = np.zeros(_N_LEVELS)
+    for setup in board.setups:
+        log_sd = setup.noise.log_sd
+        noise = setup.noise.median * levels**log_sd
+        model = setup_model(system_of(board, setup), estimate.values)
+        model = with_others(model, estimate.values) if takes_part(setup) else model
+        every = np.repeat(model.every_log_frequency(estimate.values, "linear"), _N_LEVELS, axis=0)
+        sure = np.array([reading.is_sure for reading in setup.readings], dtype=bool)
+        errors = ReadingErrors.of(setup).at(sure)
+        by_level = errors.log_likelihood(every[:, : sure.size][:, sure], noise).sum(axis=1)
+        peaks = PeakLikelihood.of(model)
+        by_level = by_level if peaks is None else by_level + peaks.log_likelihood(every, noise)
+        total += by_level - 0.5 * np.log(levels) ** 2
+    return float(total.max())
 
 
 def _labelled(board: Board, setup: Setup, estimate: Estimate) -> Setup:

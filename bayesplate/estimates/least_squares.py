@@ -68,7 +68,9 @@ def log_measured(board: Board) -> NDArray[np.float64]:
     return np.log(np.concatenate([setup.measured for setup in board.setups]))
 
 
-def weighted_least_squares(board: Board, most_steps: int = MOST_STEPS) -> Estimate:
+def weighted_least_squares(
+    board: Board, most_steps: int = MOST_STEPS, start: NDArray[np.float64] | None = None
+) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
 
     Parameters
@@ -77,6 +79,8 @@ def weighted_least_squares(board: Board, most_steps: int = MOST_STEPS) -> Estima
         Every setup with at least one reading.
     most_steps : int
         After which they end, settled or not.
+    start : (3,) array, optional
+        Rigidities to begin with, N m; by default rough ones from the readings.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def weighted_least_squares(board: Board, most_steps: int = MOST_STEPS) -> Estima
     """
     inputs = board.nominal()
     systems = [system_of(board, setup) for setup in board.setups]
-    log_next = np.log(starting_rigidities(board))
+    log_next = np.log(starting_rigidities(board) if start is None else start)
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
     for _ in range(most_steps):

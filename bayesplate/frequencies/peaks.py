@@ -178,13 +178,14 @@ class PeakLikelihood:
 
         sd = self.errors.sd(noise).mean(axis=1, keepdims=True)
         missed = self.missed + (1.0 - self.missed) * ndtr((there - self.log_highest) / sd)
-        log_errors = self.errors.log_likelihood_of_each(there, noise)
-        log_pair = log_errors + self.log_prior
 
         def assigned(peaks: Rows, modes: Rows) -> tuple[Rows, Rows, Assignments]:
             order = modes[np.argsort(there[:, modes], axis=1)]
-            ordered = np.take_along_axis(log_pair[:, peaks], order[:, None, :], axis=2)
-            return peaks, order, Assignments(ordered, self.log_alone[peaks], np.take_along_axis(missed, order, axis=1))
+            ordered = np.take_along_axis(there, order, axis=1)
+            log_errors = self.errors.at(peaks).log_likelihood_of_each(ordered, noise)
+            log_prior = np.swapaxes(self.log_prior.T[order][:, :, peaks], 1, 2)
+            alone, lonely = self.log_alone[peaks], np.take_along_axis(missed, order, axis=1)
+            return peaks, order, Assignments(log_errors + log_prior, alone, lonely)
 
         return [[assigned(*group) for group in groups] for groups in self.orders]
 

@@ -139,6 +139,10 @@ class ReadingErrors:
         -------
         (n_draws, n_readings, n_modes) array
         """
+        scale = _join(noise, self.own_sd)[:, :, None]
+        if not self.rounded.any():
+            z = (self.log_frequency[:, None] - predicted[:, None, :]) / scale
+            return np.asarray(self._density.log(z) - np.log(scale))
         n_draws, n_modes = predicted.shape
         each = np.repeat(predicted.reshape(-1, 1), self.frequency.size, axis=1)
         found = self.log_likelihood(each, np.repeat(noise, n_modes))

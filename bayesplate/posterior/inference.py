@@ -76,7 +76,8 @@ class PosedProblem:
     def doubts(self) -> tuple[str, ...]:
         """What is unusual about the constants and the readings, before anything is sampled: a sentence each."""
         constants = unusual(self.board, self.prior, self.estimate.rigidities)
-        return (*constants, *slip_remarks(self.posterior, self.centre))
+        is_sure = not any(self.posterior.peaks)  # otherwise the assignments say what a label may be
+        return (*constants, *(slip_remarks(self.posterior, self.centre) if is_sure else ()))
 
     def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""
