@@ -36,7 +36,7 @@ _N_LEVELS = 17
 _MOST_ROUNDS = 8
 
 
-def with_proposed_labels(board: Board, prior: PriorCard) -> Board:
+def with_proposed_labels(board: Board, prior: PriorCard, least: float = LIKELY) -> Board:
     """The board with a reading for each peak that is likely one certain mode.
 
     From the constants that the labelled modes give, with their uncertainty, each peak is assigned where it likely
@@ -47,6 +47,8 @@ def with_proposed_labels(board: Board, prior: PriorCard) -> Board:
     board : Board
     prior : PriorCard
         For the first labels of a board that has too few.
+    least : float
+        Probability from which on a label is given in the end; on the way there it is one half.
 
     Returns
     -------
@@ -56,23 +58,23 @@ def with_proposed_labels(board: Board, prior: PriorCard) -> Board:
     """
     if not any(takes_part(setup) for setup in board.setups):
         return board
-    found = [_settled(board, first) for first in _first(board, prior)]
+    found = [_settled(board, first, least) for first in _first(board, prior)]
     return max(found, key=_log_likelihood) if len(found) > 1 else (found or [board])[0]
 
 
-def _settled(board: Board, first: Board) -> Board:
+def _settled(board: Board, first: Board, least: float) -> Board:
     """The labels that come out of the first ones."""
     before: list[tuple[Setup, ...]] = []
     labelled, start = board, None
     for _ in range(_MOST_ROUNDS):
         estimate = weighted_least_squares(first, MOST_STEPS if start is None else _STEPS, start)
         start = estimate.rigidities
-        labelled = replace(board, setups=tuple(_labelled(board, setup, estimate) for setup in board.setups))
+        labelled = _labelled(board, estimate, LIKELY)
         if labelled.setups in before or sum(len(setup.readings) for setup in labelled.setups) < len(RIGIDITIES):
             break
         before.append(labelled.setups)
         first = _of_labelled(labelled)
-    return labelled
+    return labelled if least == LIKELY else _labelled(board, estimate, least)
 
 
 def _first(board: Board, prior: PriorCard) -> list[Board]:
@@ -117,8 +119,12 @@ def _log_likelihood(board: Board) -> float:
     return float(total.max())
 
 
-def _labelled(board: Board, setup: Setup, estimate: Estimate) -> Setup:
-    """A setup with the labels that its peaks likely have at an estimate, which may be that of other setups."""
+def _labelled(board: Board, estimate: Estimate, least: float) -> Board:
+    """The board with the labels that its peaks likely have at an estimate, which may be that of some setups only."""
+    return replace(board, setups=tuple(_labelled_setup(board, setup, estimate, least) for setup in board.setups))
+
+
+def _labelled_setup(board: Board, setup: Setup, estimate: Estimate, least: float) -> Setup:
     if not takes_part(setup):
         return setup
     model = with_others(setup_model(system_of(board, setup), estimate.values), estimate.values)
@@ -131,7 +137,7 @@ def _labelled(board: Board, setup: Setup, estimate: Estimate) -> Setup:
     every = model.every_log_frequency(values, "linear")
     usable = np.isfinite(every).all(axis=1)
     noise = np.full(int(usable.sum()), widening * setup.noise.median)
-    return with_labels(setup, peaks, peaks.probabilities(every[usable], noise), LIKELY)
+    return with_labels(setup, peaks, peaks.probabilities(every[usable], noise), least)
 
 
 def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.float64], least: float) -> Setup:

@@ -19,6 +19,7 @@ from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answer_
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.shifts.settled import with_settled_labels
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
@@ -140,6 +141,8 @@ def diagnose(
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
+    settled, left_out = with_settled_labels(problem.prepared.board, problem.prior)
+    problem = with_board(problem, settled)
     begun = opened(problem, seed, out, force=force, resume=resume, first=BEFORE)
     folder = begun.folder
 
@@ -161,7 +164,7 @@ def diagnose(
     finals = verdict.stands_for[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals)
     refits: dict[int, Fitted] = {}
-    notes = list(problem.posed.doubts)
+    notes = [*left_out, *problem.posed.doubts]
     for answer in finals:
         try:
             name = "-".join((*answer.members, str(answer.index)))

@@ -183,6 +183,7 @@ def fingerprint(problem: Problem, posed: PosedProblem) -> str:
         "effects": list(posed.board.effects),
         "forms": [repr(effect) for effect in posed.board.chosen],
         "readings": [repr(setup.readings) for setup in posed.board.setups],
+        "peaks": [repr((setup.peaks, setup.missed, setup.spurious)) for setup in posed.board.setups],
         "attached": [repr(setup.attached) for setup in posed.board.setups],
         "law": posed.posterior.law,
         "law_alone": posed.is_forced,
