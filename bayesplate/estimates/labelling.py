@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.estimates.identifiability import identifiability
-from bayesplate.estimates.least_squares import MOST_STEPS, Estimate, weighted_least_squares
-from bayesplate.estimates.proposals import proposals
+from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
+from bayesplate.estimates.wide_search import Guess, search_widely
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
@@ -29,7 +29,6 @@ from bayesplate.plate.setup import Setup
 LIKELY = 0.5
 """Probability from which on a label is proposed: no two peaks can have the same one."""
 _N_DRAWS = 64
-_MOST_TRIED = 3
 _STEPS = 4
 """Of least squares that begin where others ended."""
 _N_LEVELS = 17
@@ -58,38 +57,42 @@ def with_proposed_labels(board: Board, prior: PriorCard, least: float = LIKELY) 
     """
     if not any(takes_part(setup) for setup in board.setups):
         return board
-    found = [_settled(board, first, least) for first in _first(board, prior)]
+    found = [_settled(board, guess, least) for guess in _guesses(board, prior)]
     return max(found, key=_log_likelihood) if len(found) > 1 else (found or [board])[0]
 
 
-def _settled(board: Board, first: Board, least: float) -> Board:
-    """The labels that come out of the first ones."""
+def _settled(board: Board, guess: Guess, least: float) -> Board:
+    """The labels that come out of a first guess of the constants."""
     before: list[tuple[Setup, ...]] = []
-    labelled, start = board, None
-    for _ in range(_MOST_ROUNDS):
-        estimate = weighted_least_squares(first, MOST_STEPS if start is None else _STEPS, start)
-        start = estimate.rigidities
-        labelled = _labelled(board, estimate, LIKELY)
-        if labelled.setups in before or sum(len(setup.readings) for setup in labelled.setups) < len(RIGIDITIES):
-            break
+    while True:
+        labelled = _labelled(board, guess, LIKELY)
+        n_readings = sum(len(setup.readings) for setup in labelled.setups)
+        if labelled.setups in before or len(before) == _MOST_ROUNDS or n_readings < len(RIGIDITIES):
+            return labelled if least == LIKELY else _labelled(board, guess, least)
         before.append(labelled.setups)
-        first = _of_labelled(labelled)
-    return labelled if least == LIKELY else _labelled(board, estimate, least)
+        start = np.array([guess.values[name] for name in RIGIDITIES])
+        estimate = weighted_least_squares(_of_labelled(labelled), _STEPS, start)
+        if identifiability(estimate.sensitivities, estimate.scales).blind():
+            return labelled if least == LIKELY else _labelled(board, guess, least)
+        guess = _guess_of(board, estimate)
 
 
-def _first(board: Board, prior: PriorCard) -> list[Board]:
-    """Setups whose labels determine the constants, or the likeliest labels of the setup with most peaks."""
+def _guesses(board: Board, prior: PriorCard) -> list[Guess]:
+    """The constants that the labelled modes determine, or those of all the prior where the peaks are likely."""
     if sum(len(setup.readings) for setup in board.setups) >= len(RIGIDITIES):
-        labelled = _of_labelled(board)
-        estimate = weighted_least_squares(labelled)
+        estimate = weighted_least_squares(_of_labelled(board))
         if not identifiability(estimate.sensitivities, estimate.scales).blind():
-            return [labelled]
-    fullest = max(board.setups, key=lambda setup: len(setup.peaks) + len(setup.readings))
-    bare = tuple(Peak(reading.frequency, reading.sign) for reading in fullest.readings)
-    given = {reading.frequency.mean: reading.label for reading in fullest.readings if reading.is_sure}
-    alone = replace(fullest, readings=(), peaks=(*bare, *fullest.peaks))
-    found = proposals(replace(board, setups=(alone,)), prior, np.random.default_rng(0), given)
-    return [one.board for one in found[:_MOST_TRIED]]
+            return [_guess_of(board, estimate)]
+    return search_widely(board, prior, np.random.default_rng(0))
+
+
+def _guess_of(board: Board, estimate: Estimate) -> Guess:
+    """An estimate with its uncertainty; residuals beyond the expected noise widen both."""
+    spare = max(estimate.residuals.size - len(RIGIDITIES), 1)
+    widening = max(float(np.sqrt(np.sum((estimate.residuals / estimate.scales) ** 2) / spare)), 1.0)
+    covariance = widening**2 * identifiability(estimate.sensitivities, estimate.scales).covariance
+    logs = np.random.default_rng(0).multivariate_normal(np.log(estimate.rigidities), covariance, _N_DRAWS)
+    return Guess(estimate.values, logs, widening * max(setup.noise.median for setup in board.setups))
 
 
 def _of_labelled(board: Board) -> Board:
@@ -119,24 +122,21 @@ def _log_likelihood(board: Board) -> float:
     return float(total.max())
 
 
-def _labelled(board: Board, estimate: Estimate, least: float) -> Board:
-    """The board with the labels that its peaks likely have at an estimate, which may be that of some setups only."""
-    return replace(board, setups=tuple(_labelled_setup(board, setup, estimate, least) for setup in board.setups))
+def _labelled(board: Board, guess: Guess, least: float) -> Board:
+    """The board with the labels that its peaks likely have at a guess of the constants."""
+    return replace(board, setups=tuple(_labelled_setup(board, setup, guess, least) for setup in board.setups))
 
 
-def _labelled_setup(board: Board, setup: Setup, estimate: Estimate, least: float) -> Setup:
+def _labelled_setup(board: Board, setup: Setup, guess: Guess, least: float) -> Setup:
     if not takes_part(setup):
         return setup
-    model = with_others(setup_model(system_of(board, setup), estimate.values), estimate.values)
+    model = with_others(setup_model(system_of(board, setup), guess.values), guess.values)
     peaks = PeakLikelihood.of(model)
     assert peaks is not None
-    widening = _widening(estimate)
-    covariance = widening**2 * identifiability(estimate.sensitivities, estimate.scales).covariance
-    logs = np.random.default_rng(0).multivariate_normal(np.log(estimate.rigidities), covariance, _N_DRAWS)
-    values = {**estimate.values, **dict(zip(RIGIDITIES, np.exp(logs).T, strict=True))}
+    values = {**guess.values, **dict(zip(RIGIDITIES, np.exp(guess.log_rigidities).T, strict=True))}
     every = model.every_log_frequency(values, "linear")
     usable = np.isfinite(every).all(axis=1)
-    noise = np.full(int(usable.sum()), widening * setup.noise.median)
+    noise = np.full(int(usable.sum()), guess.noise)
     return with_labels(setup, peaks, peaks.probabilities(every[usable], noise), least)
 
 
@@ -190,9 +190,3 @@ def _at(setup: Setup, reading: Reading, label: Label) -> Reading:
 def _likely(labels: Sequence[Label | None], probabilities: NDArray[np.float64], least: float) -> Label | None:
     best = int(np.argmax(probabilities))
     return labels[best] if probabilities[best] > least else None
-
-
-def _widening(estimate: Estimate) -> float:
-    """How far the residuals exceed what the readings' uncertainties let expect, at least 1."""
-    spare = max(estimate.residuals.size - len(RIGIDITIES), 1)
-    return float(max(np.sqrt(np.sum((estimate.residuals / estimate.scales) ** 2) / spare), 1.0))

@@ -7,9 +7,8 @@ then fitted by full solves and weighed against each other with the constants lef
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +31,6 @@ from bayesplate.plate.setup import Reading, Setup
 Floats = NDArray[np.float64]
 Assignment = tuple[Label | None, ...]
 """Label of each peak, in their order; None for a peak that is no mode of the plate."""
-
-NO_LABELS: Mapping[float, Label] = MappingProxyType({})
 
 FEWEST_PEAKS = 4
 """Three fix the constants whatever they are called."""
@@ -76,9 +73,7 @@ class Proposal:
     board: Board
 
 
-def proposals(
-    board: Board, prior: PriorCard, rng: np.random.Generator, given: Mapping[float, Label] = NO_LABELS
-) -> list[Proposal]:
+def proposals(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Proposal]:
     """Ways to label the peaks of a board that has one setup and no label yet, the most probable first.
 
     Parameters
@@ -86,8 +81,6 @@ def proposals(
     board : Board
     prior : PriorCard
     rng : numpy.random.Generator
-    given : dict of Label, optional
-        Labels that are known already, by the frequency of their peak, Hz.
 
     Returns
     -------
@@ -99,8 +92,7 @@ def proposals(
         return []
     bare = replace(board, effects=(), chosen=())
     weighed: dict[Assignment, tuple[float, Board]] = {}
-    known = [given.get(hertz) for hertz in sorted(setup.unlabelled)]
-    waiting = _rough_assignments(bare, setup, prior, rng, known)
+    waiting = _rough_assignments(bare, setup, prior, rng)
     while waiting:
         labels = waiting.pop(0)
         if labels in weighed or sum(label is not None for label in labels) < FEWEST_PEAKS:
@@ -110,7 +102,7 @@ def proposals(
         modes = _modes_at(labelled, estimate, max(setup.unlabelled))
         weighed[labels] = _log_weight(labelled, estimate, labels, modes, prior), _labelled(board, setup, labels)
         better = _assign(np.log(np.sort(setup.unlabelled)), modes, np.maximum(2.0 * estimate.scales.max(), 0.01))
-        if _agree(better, known) and better not in weighed and len(weighed) + len(waiting) < _MOST_FITTED:
+        if better not in weighed and len(weighed) + len(waiting) < _MOST_FITTED:
             waiting.append(better)
     if not weighed:
         return []
@@ -139,14 +131,7 @@ def _labelled(board: Board, setup: Setup, labels: Assignment) -> Board:
     return replace(board, setups=(replace(setup, readings=readings, peaks=rest),))
 
 
-def _agree(labels: Assignment, known: Sequence[Label | None]) -> bool:
-    """Whether an assignment gives the peaks of known label these labels."""
-    return all(one is None or one == label for one, label in zip(known, labels, strict=True))
-
-
-def _rough_assignments(
-    board: Board, setup: Setup, prior: PriorCard, rng: np.random.Generator, known: Sequence[Label | None]
-) -> list[Assignment]:
+def _rough_assignments(board: Board, setup: Setup, prior: PriorCard, rng: np.random.Generator) -> list[Assignment]:
     """Assignments by Rayleigh quotients at draws from the prior, the likeliest first."""
     values = prior_draws(board, prior, rng, _N_DRAWS)
     products = rayleigh_coefficients(setup)
@@ -167,11 +152,9 @@ def _rough_assignments(
     cost += _prior_cost(prior, {name: v[possible][rows] for name, v in values.items() if np.ndim(v)}, shifts)
     names = [Label(i + setup.first_label.m, j + setup.first_label.n) for i, j in beams]
     best: dict[Assignment, float] = {}
-    n_looked_at = len(cost) if any(known) else 40 * _N_FITTED
-    for k in np.argsort(cost)[:n_looked_at]:
+    for k in np.argsort(cost)[: 40 * _N_FITTED]:
         labels = tuple(names[order[rows[k], j]] if j >= 0 else None for j in picked[k])
-        if _agree(labels, known):
-            best.setdefault(labels, float(cost[k]))
+        best.setdefault(labels, float(cost[k]))
     nearest = min(best.values(), default=0.0)
     return [labels for labels, one in best.items() if one < nearest + _WORTH_A_FIT][:_N_FITTED]
 
