@@ -7,7 +7,7 @@ proposed here says nothing there. But a search for the posterior has to begin so
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,29 @@ _N_LEVELS = 17
 _MOST_ROUNDS = 8
 
 
-def with_proposed_labels(board: Board, prior: PriorCard, least: float = LIKELY) -> Board:
+@dataclass(frozen=True, eq=False)
+class Proposed:
+    """A board with labels for its peaks, and how far other ways to label them would move the constants.
+
+    Attributes
+    ----------
+    board : Board
+        Readings with a proposed label follow the labelled ones of their setup, with the confidence 0; peaks without a
+        likely label stay peaks.
+    spread : (3, 3) array
+        Covariance of ln D between the likely ways to take the peaks; zero where there is but one.
+    """
+
+    board: Board
+    spread: NDArray[np.float64]
+
+
+def propose_labels(board: Board, prior: PriorCard, least: float = LIKELY) -> Proposed:
     """The board with a reading for each peak that is likely one certain mode.
 
     From the constants that the labelled modes give, with their uncertainty, each peak is assigned where it likely
-    belongs; the constants are fitted anew to all of them; and again, until no label changes.
+    belongs; the constants are fitted anew to all of them; and again, until no label changes. Where the labels do not
+    determine the constants, all of the prior is searched for constants to begin with.
 
     Parameters
     ----------
@@ -51,14 +69,23 @@ def with_proposed_labels(board: Board, prior: PriorCard, least: float = LIKELY) 
 
     Returns
     -------
-    Board
-        The same where every label is sure and no peak lacks one. Otherwise readings with a proposed label follow the
-        labelled ones of their setup, with the confidence 0; peaks without a likely label stay peaks.
+    Proposed
+        The same board where every label is sure and no peak lacks one.
     """
+    none = np.zeros((len(RIGIDITIES), len(RIGIDITIES)))
     if not any(takes_part(setup) for setup in board.setups):
-        return board
+        return Proposed(board, none)
     found = [_settled(board, guess, least) for guess in _guesses(board, prior)]
-    return max(found, key=_log_likelihood) if len(found) > 1 else (found or [board])[0]
+    if len(found) < 2:
+        return Proposed((found or [board])[0], none)
+    judged = [one for one in (_judged(each) for each in found) if one is not None]
+    if not judged:
+        return Proposed(found[0], none)
+    likelihoods, constants = np.array([one[0] for one in judged]), np.array([one[1] for one in judged])
+    best = int(np.argmax(likelihoods))
+    weights = np.exp(likelihoods - likelihoods[best])
+    off = constants - constants[best]
+    return Proposed(judged[best][2], (off.T * weights / weights.sum()) @ off)
 
 
 def _settled(board: Board, guess: Guess, least: float) -> Board:
@@ -100,10 +127,10 @@ def _of_labelled(board: Board) -> Board:
     return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
 
 
-def _log_likelihood(board: Board) -> float:
-    """ln of the likelihood of a board with labels at its own estimate, at the noise that suits it best."""
+def _judged(board: Board) -> tuple[float, NDArray[np.float64], Board] | None:
+    """ln of the likelihood of a labelled board at its own estimate, at the noise that suits it best, and ln D there."""
     if sum(len(setup.readings) for setup in board.setups) < len(RIGIDITIES):
-        return -np.inf
+        return None
     estimate = weighted_least_squares(_of_labelled(board))
     levels = np.exp(np.linspace(-1.0, 3.0, _N_LEVELS))
     total = np.zeros(_N_LEVELS)
@@ -119,7 +146,7 @@ def _log_likelihood(board: Board) -> float:
         peaks = PeakLikelihood.of(model)
         by_level = by_level if peaks is None else by_level + peaks.log_likelihood(every, noise)
         total += by_level - 0.5 * np.log(levels) ** 2
-    return float(total.max())
+    return float(total.max()), np.log(estimate.rigidities), board
 
 
 def _labelled(board: Board, guess: Guess, least: float) -> Board:

@@ -3,7 +3,7 @@
 Peaks without labels may be many different modes, and each way to take them is a peak of the likelihood of its own. All
 of the prior is searched for these: a population of draws is weighted by the summed likelihood of the peaks
 (`bayesplate.frequencies.peaks`) under a large noise, walks, and is weighted anew under a smaller one. The frequencies
-come from a table over D_x / D_s and D_y / D_s, which is all that those of a bare plate depend on but for a common factor.
+come from a table over D_x / D_s and D_y / D_s: but for a common factor those of a bare plate depend on nothing else.
 
 References
 ----------

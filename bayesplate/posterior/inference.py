@@ -18,7 +18,7 @@ from bayesplate.estimates.identifiability import (
     require_identifiable,
     require_labels,
 )
-from bayesplate.estimates.labelling import LIKELY, with_labels, with_proposed_labels
+from bayesplate.estimates.labelling import LIKELY, propose_labels, with_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
@@ -135,12 +135,13 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     faults = coefficient_faults(board)
     if faults:
         raise InputError(faults)
-    board = with_proposed_labels(board, prior)
+    proposed = propose_labels(board, prior)
+    board = proposed.board
     require_labels(board)
     estimate = weighted_least_squares(board)
     found = identifiability(estimate.sensitivities, estimate.scales)
     require_identifiable(board, found)
-    approximation = laplace_approximation(board, estimate, robust)
+    approximation = laplace_approximation(board, estimate, robust, proposed.spread)
     require_identifiable(board, _identifiable_at(board, approximation, estimate))
     is_forced = law is not None
     if law is None:

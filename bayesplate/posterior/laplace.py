@@ -47,7 +47,9 @@ class LaplaceApproximation:
     models: tuple[SetupModel, ...]
 
 
-def laplace_approximation(board: Board, estimate: Estimate, robust: bool = False) -> LaplaceApproximation:
+def laplace_approximation(
+    board: Board, estimate: Estimate, robust: bool = False, spread: Floats | None = None
+) -> LaplaceApproximation:
     """Locate the posterior of a board.
 
     The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
@@ -61,6 +63,8 @@ def laplace_approximation(board: Board, estimate: Estimate, robust: bool = False
         At the nominal inputs.
     robust : bool
         Student's distribution for the noise.
+    spread : (3, 3) array, optional
+        Covariance of ln D beyond that: between several ways to take peaks for modes.
 
     Returns
     -------
@@ -80,7 +84,7 @@ def laplace_approximation(board: Board, estimate: Estimate, robust: bool = False
         scales = reading_sd(board.setups, noise)
         residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         scales = scales / np.sqrt(student_weights(residuals / scales))
-    covariance = _covariance(board, models, "linear", scales, centre)
+    covariance = _covariance(board, models, "linear", scales, centre, spread)
     models = exact_models(board, models, centre, covariance, is_rough=bool(parameters.inputs))
     if parameters.inputs:  # what is rough finds the place where the models are then made for good
         columns = parameters.fitted_columns
@@ -91,7 +95,7 @@ def laplace_approximation(board: Board, estimate: Estimate, robust: bool = False
         centre[columns] = refit(predict, log_measured(board), scales, start, bounds)
         values = {name: np.ravel(value)[0] for name, value in parameters.values(centre[None, :]).items()}
         models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
-        covariance = _covariance(board, models, "linear", scales, centre)
+        covariance = _covariance(board, models, "linear", scales, centre, spread)
         models = exact_models(board, models, centre, covariance)
     return LaplaceApproximation(centre, covariance, models)
 
@@ -143,7 +147,9 @@ def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: 
     return predict
 
 
-def _covariance(board: Board, models: Sequence[SetupModel], law: LawName, scales: Floats, centre: Floats) -> Floats:
+def _covariance(
+    board: Board, models: Sequence[SetupModel], law: LawName, scales: Floats, centre: Floats, spread: Floats | None
+) -> Floats:
     """Covariance of all columns: of the weighted fit for the fitted ones, of the prior for the noise."""
     parameters = Parameters(board)
     columns = parameters.fitted_columns
@@ -152,6 +158,8 @@ def _covariance(board: Board, models: Sequence[SetupModel], law: LawName, scales
     covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
     for i, setup in enumerate(board.setups, start=N_RIGIDITIES):
         covariance[i, i] = setup.noise.log_sd**2
+    if spread is not None:
+        covariance[:N_RIGIDITIES, :N_RIGIDITIES] += spread
     return covariance
 
 

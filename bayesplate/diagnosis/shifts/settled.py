@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from bayesplate.cards import PriorCard
 from bayesplate.diagnosis.shifts.forms import forms, with_forms
-from bayesplate.estimates.labelling import with_proposed_labels
+from bayesplate.estimates.labelling import propose_labels
 from bayesplate.frequencies.peaks import takes_part
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board
@@ -45,7 +45,7 @@ def with_settled_labels(board: Board, prior: PriorCard) -> tuple[Board, tuple[st
     """
     if not any(takes_part(setup) for setup in board.setups):
         return board, ()
-    every = [_labels(with_proposed_labels(plate, prior, CERTAIN)) for plate in _plates(board)]
+    every = [_labels(propose_labels(plate, prior, CERTAIN).board) for plate in _plates(board)]
     agreed = {key: label for key, label in every[0].items() if all(other.get(key) == label for other in every)}
     setups = tuple(_settled(setup, agreed) for setup in board.setups)
     return replace(board, setups=tuple(setups)), tuple(
