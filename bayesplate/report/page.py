@@ -35,6 +35,7 @@ from bayesplate.report.residuals import predictive_picture, residuals_picture
 from bayesplate.report.saving import save_pictures
 from bayesplate.report.shares import shares_picture
 from bayesplate.report.signatures import before_after_picture, signatures_picture
+from bayesplate.report.spectrum import spectrum_pictures
 from bayesplate.report.style import Picture, visible
 from bayesplate.report.symbols import in_page
 from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, short_sentences
@@ -137,7 +138,7 @@ def pictures(
         "constants": [constants_picture(summary, draws.moduli)],
         "board": [board_picture(board)],
         "modes": modes_pictures(inference, draws, summary),
-        "errors": [residuals_picture(summary)],
+        "errors": [*spectrum_pictures(summary), residuals_picture(summary)],
         "folded": [
             shares_picture(summary, problem.identifiability),
             *percentiles_pictures(inference, draws),

@@ -51,7 +51,9 @@ def test_a_spectrum_of_a_hundred_modes_neither_underflows_nor_overflows() -> Non
     one = Assignments(pair, np.full(peaks.size, np.log(1e-3)), np.full(modes.shape, 1e-3))
     assert np.isfinite(one.log_sum()).all()
     # A peak and its mode that both stand alone are a thousandth of a thousandth, beside the half of their pair.
-    assert one.pairs()[0, np.arange(50), 2 * np.arange(50)] == pytest.approx(1.0 - 1e-6 / (0.5 * np.exp(-0.005)), abs=1e-9)
+    assert one.pairs()[0, np.arange(50), 2 * np.arange(50)] == pytest.approx(
+        1.0 - 1e-6 / (0.5 * np.exp(-0.005)), abs=1e-9
+    )
 
 
 def test_a_peak_that_no_mode_explains_stands_alone() -> None:

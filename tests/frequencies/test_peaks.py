@@ -1,0 +1,200 @@
+"""The likelihood of peaks against enumeration of all that they may be: labels, signs, doubts, the cut."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from bayesplate.frequencies.model import OtherMode
+from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
+from bayesplate.frequencies.residues import NODAL_LINE
+from bayesplate.modes.naming import Place
+from bayesplate.modes.plate import Parity
+from bayesplate.plate.measured import Peak, Reading
+from bayesplate.plate.setup import Setup
+from bayesplate.quantities import Quantity
+
+NOISE = np.array([0.01, 0.03, 0.002])
+PLACE = Place(Parity(0, 0), 0, 1.0)
+MODES = np.log(
+    [[100.0, 130.0, 131.0, 180.0, 240.0], [99.0, 131.0, 129.0, 182.0, 235.0], [101.0, 130.5, 132.0, 178.0, 239.0]]
+)
+"""ln f of five modes at three draws; the first two are labelled where a setup has readings, and two of them cross."""
+BEAMS = ((1, 1), (2, 0), (0, 2), (2, 1), (1, 2))
+MISSED, SPURIOUS = 0.25, 0.05
+
+
+def exact(hertz: float) -> Quantity:
+    return Quantity.exact(hertz)
+
+
+def setup_of(readings=(), peaks=(), resolution=0.0) -> Setup:
+    made = Setup.from_frequencies({(1, 1): 100.0}, edges="free", resolution=resolution)
+    return replace(made, readings=tuple(readings), peaks=tuple(peaks), missed=MISSED, spurious=SPURIOUS)
+
+
+def reading(beams, hertz, sign="", confidence=1.0) -> Reading:
+    return replace(Reading.of(beams, exact(hertz), sign), confidence=confidence)
+
+
+def model_of(setup: Setup, residues=None) -> SimpleNamespace:
+    n = len(setup.readings)
+    labelled = [one.beams for one in setup.readings]
+    rest = [beams for beams in BEAMS if beams not in labelled]
+    others = tuple(OtherMode(PLACE, beams) for beams in rest)
+    return SimpleNamespace(setup=setup, others=others, residues=residues, every_place=(PLACE,) * (n + len(others)))
+
+
+def every_of(setup: Setup, modes=MODES):
+    """Columns in the order of a model: labelled first."""
+    labelled = [BEAMS.index(one.beams) for one in setup.readings]
+    return modes[:, [*labelled, *(i for i in range(len(BEAMS)) if i not in labelled)]]
+
+
+def enumerated(peaks, modes, seen, noise, cut, alone=SPURIOUS, pair=lambda i, j: 1.0):
+    """The sum over sets of pairs that rise, from peaks (Hz) and modes (ln f) in any order, and each pair's share."""
+    order = np.argsort(modes)
+    peaks, total, pairs = sorted(peaks), 0.0, np.zeros((len(peaks), len(modes)))
+    gone = [1.0 - seen[j] * norm.cdf((np.log(cut) - modes[j]) / noise) for j in range(len(modes))]
+    for size in range(min(len(peaks), len(modes)) + 1):
+        for rows in combinations(range(len(peaks)), size):
+            for columns in combinations(order, size):
+                weight = np.prod([gone[j] for j in order if j not in columns])
+                weight *= np.prod([alone * peaks[i] / cut for i in range(len(peaks)) if i not in rows])
+                for i, j in zip(rows, columns, strict=True):
+                    weight *= (1.0 - SPURIOUS) * seen[j] * norm.pdf(np.log(peaks[i]), modes[j], noise) * pair(i, j)
+                total += weight
+                pairs[list(rows), list(columns)] += weight
+    return total, pairs / total
+
+
+def test_bare_peaks_are_summed_over_all_modes() -> None:
+    hertz = [99.5, 130.2, 150.0, 181.0]
+    setup = setup_of(peaks=[Peak(exact(one)) for one in hertz])
+    likelihood = PeakLikelihood.of(model_of(setup))
+    found = likelihood.log_likelihood(MODES, NOISE)
+    shares = [likelihood.probabilities(MODES[[i]], NOISE[[i]]) for i in range(3)]
+    for draw in range(3):
+        total, pairs = enumerated(hertz, MODES[draw], [1.0 - MISSED] * 5, NOISE[draw], 181.0)
+        assert found[draw] == pytest.approx(np.log(total), abs=1e-9)
+        assert shares[draw] == pytest.approx(pairs, abs=1e-9)
+    assert likelihood.probabilities(MODES, NOISE) == pytest.approx(np.mean(shares, axis=0), abs=1e-12)
+
+
+def test_sure_labels_take_their_mode_away() -> None:
+    setup = setup_of([reading((1, 1), 100.0), reading((2, 0), 130.0)], [Peak(exact(131.0)), Peak(exact(178.0))])
+    likelihood = PeakLikelihood.of(model_of(setup))
+    found = likelihood.log_likelihood(every_of(setup), NOISE)
+    for draw in range(3):
+        total, _ = enumerated([131.0, 178.0], MODES[draw, 2:], [1.0 - MISSED] * 3, NOISE[draw], 178.0)
+        assert found[draw] == pytest.approx(np.log(total), abs=1e-9)
+    assert [str(label) for label in likelihood.labels] == ["(0,2)", "(2,1)", "(1,2)"]
+
+
+def test_a_doubtful_label_counts_by_its_confidence() -> None:
+    setup = setup_of([reading((2, 0), 130.0, confidence=0.9)], [Peak(exact(180.0))])
+    likelihood = PeakLikelihood.of(model_of(setup))
+    found = likelihood.log_likelihood(every_of(setup), NOISE)
+    by_label = np.full((2, 5), 1.0)
+    by_label[0] = 0.1 / 5
+    by_label[0, BEAMS.index((2, 0))] = 0.9
+    for draw in range(3):
+
+        def pair(i, j):
+            return by_label[i, j] / (by_label[0, 0] if i == 0 else 1.0)
+
+        # As no mode the peak has the chance of any other label too, which is taken out of the sum as a factor.
+        total, pairs = enumerated([130.0, 180.0], MODES[draw], [0.75] * 5, NOISE[draw], 180.0, pair=pair)
+        assert found[draw] == pytest.approx(np.log(total * 0.1 / 5), abs=1e-9)
+        mine = likelihood.probabilities(every_of(setup)[[draw]], NOISE[[draw]])
+        in_order = [BEAMS.index((label.m, label.n)) for label in likelihood.labels]
+        assert mine == pytest.approx(pairs[:, in_order], abs=1e-9)
+
+
+def test_a_proposed_label_says_nothing() -> None:
+    bare = setup_of(peaks=[Peak(exact(130.0)), Peak(exact(180.0))])
+    proposed = setup_of([reading((2, 0), 130.0, confidence=0.0), reading((2, 1), 180.0, confidence=0.0)])
+    one, other = (PeakLikelihood.of(model_of(setup)) for setup in (bare, proposed))
+    expected = one.log_likelihood(MODES, NOISE)
+    assert other.log_likelihood(every_of(proposed), NOISE) == pytest.approx(expected, abs=1e-12)
+
+
+RESIDUES = np.array([0.6, -0.4, 0.5, -0.02, 0.3])
+
+
+def test_signs_keep_peaks_and_modes_apart_and_nodal_lines_hide_modes() -> None:
+    signed = {99.5: "+", 130.2: "-", 131.5: "+", 181.0: "-"}
+    setup = setup_of(peaks=[Peak(exact(hertz), sign) for hertz, sign in signed.items()])
+    found = PeakLikelihood.of(model_of(setup, RESIDUES)).log_likelihood(MODES, NOISE)
+    seen = (1.0 - MISSED) * RESIDUES**2 / (RESIDUES**2 + NODAL_LINE**2)
+    for draw in range(3):
+        expected = 0.0
+        for sign, wanted in (("+", RESIDUES > 0), ("-", RESIDUES < 0)):
+            hertz = [one for one, own in signed.items() if own == sign]
+            total, _ = enumerated(hertz, MODES[draw, wanted], seen[wanted], NOISE[draw], 181.0, 0.5 * SPURIOUS)
+            expected += np.log(total)
+        assert found[draw] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_peak_of_unknown_sign_is_tried_with_both() -> None:
+    known = [Peak(exact(99.5), "+"), Peak(exact(181.0), "-")]
+    unknown = setup_of(peaks=[*known, Peak(exact(130.2))])
+    tried = [setup_of(peaks=[*known, Peak(exact(130.2), sign)]) for sign in "+-"]
+    found, *parts = (
+        PeakLikelihood.of(model_of(setup, RESIDUES)).log_likelihood(MODES, NOISE) for setup in (unknown, *tried)
+    )
+    assert found == pytest.approx(np.logaddexp(*parts), abs=1e-12)
+
+
+def test_a_wrong_sign_is_never_that_mode() -> None:
+    residues = np.array([0.6, -0.4, 0.5, -0.3, 0.3])
+    setup = setup_of(peaks=[Peak(exact(100.0), "-"), Peak(exact(180.0), "-")])
+    shares = PeakLikelihood.of(model_of(setup, residues)).probabilities(MODES[:1], NOISE[:1])
+    assert (shares[:, residues > 0] == 0).all()
+    assert shares[1, 3] > 0.9
+
+
+def test_a_rounded_peak_has_the_probability_of_its_interval() -> None:
+    setup = setup_of(peaks=[Peak(exact(130.0))], resolution=2.0)
+    mode, noise = MODES[0, 0], NOISE[0]
+    inside = norm.cdf(np.log(131.0), mode, noise) - norm.cdf(np.log(129.0), mode, noise)
+    gone = 1.0 - 0.75 * norm.cdf((np.log(130.0) - mode) / np.hypot(noise, 2.0 / 130.0 / np.sqrt(12.0)))
+    expected = (1.0 - SPURIOUS) * 0.75 * inside + SPURIOUS * 2.0 / 130.0 * gone
+    model = SimpleNamespace(**{**vars(model_of(setup)), "others": (OtherMode(PLACE, (1, 1)),), "every_place": (PLACE,)})
+    found = PeakLikelihood.of(model).log_likelihood(MODES[:1, :1], NOISE[:1])
+    assert found == pytest.approx(np.log(expected), abs=1e-9)
+
+
+def test_a_mode_above_the_highest_peak_was_not_missed() -> None:
+    setup = setup_of(peaks=[Peak(exact(100.0))])
+    likelihood = PeakLikelihood.of(model_of(setup))
+    near, far = MODES[:1].copy(), MODES[:1].copy()
+    far[:, 4] += 2.0
+    assert likelihood.log_likelihood(far, NOISE[:1]) == pytest.approx(
+        likelihood.log_likelihood(near, NOISE[:1]), abs=1e-9
+    )
+    below = near.copy()
+    below[:, 4] = np.log(60.0)
+    fall = likelihood.log_likelihood(near, NOISE[:1]) - likelihood.log_likelihood(below, NOISE[:1])
+    assert fall == pytest.approx(-np.log(MISSED), abs=1e-6)
+
+
+def test_no_frequency_no_probability() -> None:
+    setup = setup_of(peaks=[Peak(exact(100.0))])
+    modes = MODES.copy()
+    modes[1, 3] = np.nan
+    found = PeakLikelihood.of(model_of(setup)).log_likelihood(modes, NOISE)
+    assert np.isfinite(found).tolist() == [True, False, True]
+
+
+def test_sure_readings_alone_take_no_part() -> None:
+    sure = setup_of([reading((1, 1), 100.0)])
+    assert not takes_part(sure)
+    assert PeakLikelihood.of(model_of(sure)) is None
+    assert takes_part(setup_of([reading((1, 1), 100.0, confidence=0.99)]))
+    assert takes_part(replace(sure, peaks=(Peak(exact(130.0)),)))
