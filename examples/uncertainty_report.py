@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +73,8 @@ def run(folder: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
     """
     result = bayesplate.fit(card, out=folder, force=True, seed=seed)
     board, draws = result.inference.problem.board, result.draws
-    alone = exact_inputs(card, seed)
+    means = {name: float(np.mean(values)) for name, values in draws.inputs.items()}
+    alone = exact_inputs(card, seed, means)
     budget = {}
     for name, values in draws.moduli.items():
         powers = {one: power for one, power in POWERS[name].items() if one in draws.inputs}
@@ -110,10 +110,10 @@ def percent(quantity: Quantity) -> float:
     return 100 * quantity.sd / abs(quantity.mean)
 
 
-def exact_inputs(card: str, seed: int) -> dict[str, float]:
-    """Standard deviation of each constant, per cent, as if every input were exact: what the frequencies leave open."""
+def exact_inputs(card: str, seed: int, means: Mapping[str, float]) -> dict[str, float]:
+    """Standard deviation of each constant, per cent, with every input exact: what the frequencies leave open."""
     prepared = prepare(card)
-    sure = {name: replace(quantity, sd=0.0) for name, quantity in prepared.board.inputs.items()}
+    sure = {name: Quantity.exact(mean) for name, mean in means.items()}
     problem = pose(prepared.board.with_priors(sure), prepared.prior)
     draws = named_draws(infer(problem, SamplerSettings(seed=seed)), seed)
     return {name: 100 * float(np.std(np.log(values))) for name, values in draws.moduli.items()}

@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from bayesplate.results.contract import Elastic, Rigidity, Spread
-from bayesplate.results.modes import ModeRow, Prediction, UnlabelledPeak, over
+from bayesplate.results.modes import ModeRow, Prediction, over
+from bayesplate.results.peaks import AssignedPeak, Assignment, PredictedMode, Spectrum
 from bayesplate.results.summary import (
     ErrorFigures,
     LawMeans,
@@ -78,7 +79,28 @@ SUMMARY = Summary(
         mode("(1,1)", 400.0, 402.0, 2.0),
         mode("(2,0)", 310.0, 310.0, 2.0, rounding_cents=None, left_out_cents=None),
     ),
-    unlabelled=(UnlabelledPeak("bench", 860.0, "(3,1)", 850.0, over(860.0, 850.0)),),
+    peaks=(
+        AssignedPeak(
+            "bench",
+            860.0,
+            "(3,1)",
+            (Assignment("(3,1)", 0.75), Assignment("(2,2)", 0.125)),
+            0.125,
+            Prediction(850.0, 845.0, 855.0),
+            over(860.0, 850.0),
+        ),
+    ),
+    spectra=(
+        Spectrum(
+            "bench",
+            0.2,
+            0.02,
+            (
+                PredictedMode("bench", "(2,2)", Prediction(800.0, 795.0, 805.0), 0.125),
+                PredictedMode("bench", "(3,1)", Prediction(850.0, 845.0, 855.0), 0.75),
+            ),
+        ),
+    ),
     error=ErrorFigures(7.5, 12.25, 0.5, 0.125, None, None),
     sampler=SamplerHealth(4, 32, 2000, 30.5, 1.0025, 6000.0, 0.5),
     identifiability=("the modes tell E_y least well",),

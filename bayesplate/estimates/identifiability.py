@@ -91,11 +91,9 @@ def require_labels(board: Board) -> None:
     """
     for setup in board.setups:
         if not setup.readings:
-            peaks = (
-                f"its {len(setup.unlabelled)} peaks have none (bayesplate modes proposes some)"
-                if setup.unlabelled
-                else "it has no peaks either"
-            )
+            n = len(setup.peaks)
+            are = "is" if n == 1 else "are"
+            peaks = f"and its {n} peak{'s' * (n != 1)} {are} none with certainty" if n else "it has no peaks either"
             raise NotIdentifiableError(
                 f"{board.name}: setup {setup.name!r} has no labelled mode, {peaks}; give at least one label"
             )

@@ -75,7 +75,9 @@ def propose_labels(board: Board, prior: PriorCard, least: float = LIKELY) -> Pro
     none = np.zeros((len(RIGIDITIES), len(RIGIDITIES)))
     if not any(takes_part(setup) for setup in board.setups):
         return Proposed(board, none)
-    found = [_settled(board, guess, least) for guess in _guesses(board, prior)]
+    tried: list[tuple[Setup, ...]] = []
+    every = (_settled(board, guess, least, tried) for guess in _guesses(board, prior))
+    found = [one for one in every if one is not None]
     if len(found) < 2:
         return Proposed((found or [board])[0], none)
     judged = [one for one in (_judged(each) for each in found) if one is not None]
@@ -88,15 +90,18 @@ def propose_labels(board: Board, prior: PriorCard, least: float = LIKELY) -> Pro
     return Proposed(judged[best][2], (off.T * weights / weights.sum()) @ off)
 
 
-def _settled(board: Board, guess: Guess, least: float) -> Board:
-    """The labels that come out of a first guess of the constants."""
+def _settled(board: Board, guess: Guess, least: float, tried: list[tuple[Setup, ...]]) -> Board | None:
+    """The labels that come out of a first guess of the constants; None where they came up from another guess."""
     before: list[tuple[Setup, ...]] = []
     while True:
         labelled = _labelled(board, guess, LIKELY)
         n_readings = sum(len(setup.readings) for setup in labelled.setups)
         if labelled.setups in before or len(before) == _MOST_ROUNDS or n_readings < len(RIGIDITIES):
             return labelled if least == LIKELY else _labelled(board, guess, least)
+        if labelled.setups in tried:
+            return None
         before.append(labelled.setups)
+        tried.append(labelled.setups)
         start = np.array([guess.values[name] for name in RIGIDITIES])
         estimate = weighted_least_squares(_of_labelled(labelled), _STEPS, start)
         if identifiability(estimate.sensitivities, estimate.scales).blind():
@@ -110,7 +115,8 @@ def _guesses(board: Board, prior: PriorCard) -> list[Guess]:
         estimate = weighted_least_squares(_of_labelled(board))
         if not identifiability(estimate.sensitivities, estimate.scales).blind():
             return [_guess_of(board, estimate)]
-    return search_widely(board, prior, np.random.default_rng(0))
+    n_peaks = sum(len(setup.readings) + len(setup.peaks) for setup in board.setups)
+    return search_widely(board, prior, np.random.default_rng(0)) if n_peaks >= len(RIGIDITIES) else []
 
 
 def _guess_of(board: Board, estimate: Estimate) -> Guess:

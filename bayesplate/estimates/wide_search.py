@@ -38,8 +38,11 @@ Floats = NDArray[np.float64]
 
 NOISES = (0.08, 0.04, 0.02, 0.01)
 """Relative, one after the other; the last is what the tables err by, with a usual noise."""
-MOST_FOUND = 6
-_N_DRAWS, _N_STEPS = 3000, 3
+LOUD = 0.02
+"""Noise from which on guesses are taken: a plate that lacks an effect misses its peaks by more than the last one."""
+MOST_FOUND = 4
+"""Ways to take the peaks that are looked at under one noise."""
+_N_DRAWS, _N_STEPS, _N_LOOKED_AT = 3000, 3, 1000
 _N_NODES, _N_TRAINED = 11, 3
 _RANGE = 0.005
 """Of the prior draws, on either side, that the tables leave out."""
@@ -80,7 +83,7 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
     Returns
     -------
     list of Guess
-        At most six; empty where no draw has a frequency for every mode.
+        Those under a smaller noise first; empty where no draw has a frequency for every mode.
     """
     nominal = board.nominal()
     log_prior = _density(prior, nominal)
@@ -93,20 +96,29 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
         return np.sum([one.log_likelihood(x, noise) for one in setups], axis=0)
 
     weighted = np.zeros(len(population))
+    guesses: list[Guess] = []
     for noise in NOISES:
         found = log_likelihood(population, noise)
         log_weights = found - weighted
         if not np.isfinite(log_weights).any():
-            return []
+            break
         shares = np.exp(log_weights - np.nanmax(log_weights))
         chosen = rng.choice(len(population), size=_N_DRAWS, p=shares / shares.sum())
         population, weighted = population[chosen], found[chosen]
         for _ in range(_N_STEPS):
             population, weighted = _walked(population, weighted, log_prior, log_likelihood, noise, rng)
-    ways = np.concatenate([one.assignments(population, NOISES[-1]) for one in setups], axis=1)
+        if noise <= LOUD:
+            guesses = [*_guesses(nominal, population, setups, noise), *guesses]
+    return guesses
+
+
+def _guesses(nominal: Values, population: Floats, setups: Sequence[_Spectrum], noise: float) -> list[Guess]:
+    """Members that take the peaks alike, the most frequent ways first."""
+    some = population[:: max(1, len(population) // _N_LOOKED_AT)]
+    ways = np.concatenate([one.assignments(some, noise) for one in setups], axis=1)
     order = Counter(map(tuple, ways.tolist())).most_common(MOST_FOUND)
-    members = (population[(ways == np.array(way)).all(axis=1)] for way, _ in order)
-    return [_guess(nominal, each) for each in members]
+    members = (some[(ways == np.array(way)).all(axis=1)] for way, _ in order)
+    return [_guess(nominal, each, noise) for each in members]
 
 
 def _density(prior: PriorCard, nominal: Values) -> Callable[[Floats], Floats]:
@@ -143,9 +155,9 @@ def _walked(
     return np.where(taken[:, None], proposed, population), np.where(taken, there, log_likelihood_there)
 
 
-def _guess(nominal: Values, members: Floats) -> Guess:
+def _guess(nominal: Values, members: Floats, noise: float) -> Guess:
     middle = np.exp(np.median(members, axis=0))
-    return Guess({**nominal, **dict(zip(RIGIDITIES, middle, strict=True))}, members[:64], NOISES[-1])
+    return Guess({**nominal, **dict(zip(RIGIDITIES, middle, strict=True))}, members[:64], noise)
 
 
 @dataclass(frozen=True, eq=False)

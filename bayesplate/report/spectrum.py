@@ -41,7 +41,7 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
     """
     peaks = [peak for peak in summary.peaks if peak.setup == spectrum.setup]
     several = len(summary.spectra) > 1
-    figure, (panel,) = stacked([2.5], left=0.2, right=0.2, bottom=0.4, top=0.1)
+    figure, (panel,) = stacked([2.6], left=0.2, right=0.2, bottom=0.4, top=0.1)
     highest = max(peak.hz for peak in peaks)
     shown = [mode for mode in spectrum.modes if mode.predicted_hz.mean < 1.05 * highest]
     lowest = min(min(peak.hz for peak in peaks), shown[0].predicted_hz.mean)

@@ -134,8 +134,24 @@ def reliability(
             continue
         mean, true = inside.mean(axis=0)
         sd = float(np.sqrt(np.sum(inside[:, 0] * (1.0 - inside[:, 0]))) / len(inside))
-        table.append({"n": len(inside), "mean": float(mean), "true": float(true), "sd": sd})
+        table.append({"low": low, "high": high, "n": len(inside), "mean": float(mean), "true": float(true), "sd": sd})
     return table
+
+
+def is_calibrated(records: Sequence[Record]) -> bool:
+    """Whether every bin is right within four standard errors, and no interval certainly outside 85 to 95 %."""
+    bins = all(abs(row["true"] - row["mean"]) <= 4.0 * row["sd"] + 1.0 / row["n"] for row in reliability(records))
+    held = coverage(records, "holds").values()
+    return bins and all(_may_be(hits, n, 0.85, 0.95) for hits, n in held)
+
+
+def _may_be(hits: int, n: int, low: float, high: float) -> bool:
+    """Whether a share between two is within what chance makes of it, 95 %."""
+    from scipy.stats import beta
+
+    at_least = beta.ppf(0.05, hits, n - hits + 1) if hits else 0.0
+    at_most = beta.ppf(0.95, hits + 1, n - hits) if hits < n else 1.0
+    return bool(at_least <= high and at_most >= low)
 
 
 def coverage(records: Sequence[Record], key: str) -> dict[str, tuple[int, int]]:

@@ -17,6 +17,7 @@ from statistics_checks import Truth, differences, differences_from_normal
 
 from bayesplate.cards import StatedPrior, load_prior
 from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Setup
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.inference import PosedProblem, infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
@@ -38,8 +39,13 @@ class PowerLaw:
 
     slopes: np.ndarray
     constant: np.ndarray
+    setup: Setup
 
-    def log_frequencies(self, values, law):
+    @property
+    def every_place(self):
+        return tuple(range(len(self.constant)))
+
+    def every_log_frequency(self, values, law):
         logs = np.log(np.stack([values[name] for name in ("D_x", "D_y", "D_s")], axis=-1))
         return self.constant + logs @ self.slopes.T
 
@@ -69,7 +75,7 @@ def conjugate(seed):
     hertz = dict(zip(CANTILEVER_LABELS, np.exp(log_f).tolist(), strict=True))
     board = board_of(ritz.FINNISH, [setup_of(ritz.CANTILEVER, hertz, noise=fixed_noise(NOISE))])
     mean, covariance = closed_form(log_f - constant, np.full(6, NOISE))
-    return board, PowerLaw(SLOPES, constant), log_f - constant, mean, covariance
+    return board, PowerLaw(SLOPES, constant, board.setups[0]), log_f - constant, mean, covariance
 
 
 def closed_form(data, scales):

@@ -84,7 +84,9 @@ def test_the_centre_that_a_rough_law_found_is_that_of_the_final_one(problem):
 def test_linearisation_errors_are_those_of_the_laws(problem):
     theta = draws(problem, 5)
     values = problem.parameters.values(theta)
-    apart = [m.log_frequencies(values, "linear") - m.log_frequencies(values, "exact") for m in problem.posterior.models]
+    models = problem.posterior.models
+    laws = ([m.every_log_frequency(values, law) for m in models] for law in ("linear", "exact"))
+    apart = [linear - exact for linear, exact in zip(*laws, strict=True)]
     expected = 1200 * np.concatenate(apart, axis=1) / np.log(2)
     assert linearisation_errors(problem.board, problem.posterior.models, theta) == pytest.approx(expected, rel=1e-12)
 

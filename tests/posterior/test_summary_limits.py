@@ -70,11 +70,10 @@ def test_the_linear_law_is_warned_of_from_a_quarter_of_the_noise_on(inference, s
 @pytest.mark.parametrize(("share", "suffices"), [(0.249, True), (0.251, False)])
 def test_the_linear_law_serves_below_a_quarter_of_the_noise(inference, share, suffices):
     """For every mode, rms over the draws."""
-    board = inference.problem.board
     errors = np.zeros((10, 6))
     errors[:, 4] = share * cents(0.01) * np.array([1, -1] * 5)
 
-    assert linear_suffices(board, errors, [0.01]) is suffices
+    assert linear_suffices([6], errors, [0.01]) is suffices
 
 
 @pytest.mark.parametrize(("worst", "is_told"), [(0.499, False), (0.501, True)])

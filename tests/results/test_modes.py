@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import ritz
-from made_boards import peaks_of, setup_of
+from made_boards import setup_of
 
-from bayesplate.frequencies.spectrum import NamedMode
-from bayesplate.labels import Label
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.quantities import Quantity
-from bayesplate.results.modes import mode_rows, unlabelled_peaks
+from bayesplate.results.modes import mode_rows
 
 HERTZ = {(0, 0): 57.0, (0, 1): Quantity.from_mean(100.0, 0.5)}
 SETUP = setup_of(ritz.ALL_CLAMPED, HERTZ, name="bench", resolution=1.0)
@@ -64,14 +61,3 @@ def test_the_rest_of_a_row(rows):
     assert first.left_out_cents == pytest.approx(1200 * np.log2(1.01))
     assert second.left_out_cents is None
     assert [(row.leverage, row.label_correlation) for row in (first, second)] == [(0.25, 0.99), (0.75, 0.9)]
-
-
-def test_a_peak_stands_beside_the_mode_nearest_to_it():
-    """Nearest as a ratio: 71 Hz is nearer to 100 than to 50, though less far from 50 in hertz."""
-    board = SimpleNamespace(setups=(replace(SETUP, peaks=peaks_of(71.0, 49.0)),))
-    named = (NamedMode(Label(0, 0), 50.0, 0.99), NamedMode(None, 100.0, 0.5))
-    high, low = unlabelled_peaks(board, {"bench": named})
-
-    assert (high.setup, high.nearest, high.predicted_hz) == ("bench", "cannot tell", 100.0)
-    assert high.cents == pytest.approx(1200 * np.log2(0.71))
-    assert (low.nearest, low.measured_hz) == ("(0,0)", 49.0)

@@ -9,7 +9,7 @@ import pytest
 from made_summaries import SUMMARY, mode, spread
 
 from bayesplate.report import content
-from bayesplate.results.tables import constants_table, modes_table, rounding_that_decides, unlabelled_table
+from bayesplate.results.tables import constants_table, modes_table, peaks_table, rounding_that_decides
 from bayesplate.results.words import decimals, interval, number, percent, plus_minus, rounded, two_digits
 from bayesplate.workflow.shown import show_fit
 
@@ -64,16 +64,30 @@ def test_modes_of_several_setups_say_in_which():
     assert column(modes_table(SUMMARY), "mode") == ["(1,0)", "(1,1)", "(2,0)"]
 
 
-def test_peaks_without_a_label():
-    assert unlabelled_table(SUMMARY).rows == (("860", "(3,1)", "850.0", "+20"),)
-    assert unlabelled_table(replace(SUMMARY, unlabelled=())) is None
+def test_peaks_whose_label_is_not_sure():
+    told = "(3,1) 75 %, (2,2) 12 %, no mode 12 %"
+    assert peaks_table(SUMMARY).rows == (("860", "(3,1)", told, "850.0", "+20.2"),)
+    assert peaks_table(replace(SUMMARY, peaks=())) is None
+    bare = replace(SUMMARY.peaks[0], stated=None, spurious_probability=0.004)
+    assert peaks_table(replace(SUMMARY, peaks=(bare,))).rows[0][1:3] == ("–", "(3,1) 75 %, (2,2) 12 %")
+
+
+@pytest.mark.parametrize(
+    ("origin", "mark", "told"), [("doubtful", " ?", "in doubt"), ("proposed", " *", "proposed here")]
+)
+def test_labels_that_are_not_sure_are_marked(origin, mark, told):
+    table = modes_table(replace(SUMMARY, modes=(replace(SUMMARY.modes[0], label_origin=origin), *SUMMARY.modes[1:])))
+
+    assert [cell.endswith(mark) for cell in column(table, "mode")] == [True, False, False]
+    assert told in table.title
+    assert told not in modes_table(SUMMARY).title
 
 
 def test_what_fit_prints():
     shown = show_fit(SUMMARY)
 
     assert [table.title for table in shown.tables][1:] == [
-        "Modes, Hz; errors, cents (17 cents are about 1 %)", "Peaks without a label: kept, not fitted",
+        "Modes, Hz; errors, cents (17 cents are about 1 %)", "Peaks and the modes that they may be",
     ]  # fmt: skip
     assert (shown.remarks, shown.warnings) == (SUMMARY.identifiability, SUMMARY.warnings)
     assert shown.closing == (

@@ -46,7 +46,7 @@ WITHIN = {"diagnosis": ("shifts", "evidence", "decision", "wording")}
 """Folders that are divided again: each part sees the parts before it, and every file stands in one."""
 NAMES_ALONE = {
     # `system_of` says which theory is to be cited
-    "results": {"modes": set(), "frequencies": {"LawName", "NamedMode", "cents", "system_of"}},
+    "results": {"modes": set(), "frequencies": {"LawName", "PeakLikelihood", "cents", "system_of"}},
 }
 """Of some rooms before it a room takes these names and no others: in results nothing is solved."""
 CALLED = {Path("modes/__init__.py"): {"workflow"}}
@@ -254,7 +254,7 @@ BAD_FILES = [
     ("results/bad.py", "def f():\n    import pickle", "imports pickle"),
     (
         "results/bad.py",
-        "from bayesplate.frequencies.spectrum import NamedMode, spectra",
+        "from bayesplate.frequencies.spectrum import cents, spectra",
         "results takes spectra from frequencies",
     ),
     ("results/bad.py", "from bayesplate.modes.plate import Weights", "results takes Weights from modes"),

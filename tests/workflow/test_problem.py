@@ -37,7 +37,10 @@ def points(problem: bayesplate.Problem, n: int, seed: int = 1) -> np.ndarray:
 def near(problem: bayesplate.Problem, n: int) -> np.ndarray:
     """Points where the posterior lies."""
     posed = problem.posed
-    return np.random.default_rng(1).multivariate_normal(posed.centre, 0.01 * posed.covariance, n)
+    theta = np.random.default_rng(1).multivariate_normal(posed.centre, 0.01 * posed.covariance, n)
+    columns, bounds = posed.parameters.fitted_columns, posed.parameters.fitted_bounds
+    theta[:, columns] = np.clip(theta[:, columns], bounds.lower + 1e-6, bounds.upper - 1e-6)
+    return theta
 
 
 def test_one_point_gives_what_many_give(problem):
