@@ -83,22 +83,22 @@ def known_fits(
     tuple of KnownFit
         The board as it stands first.
     """
-    board, known, own = problem.board, computable(problem.board), stated(problem.board)
+    known, own = computable(problem.board), stated(problem.board)
     n_fits = 1 + len(known) + (len(known) > 1) + len(own)
     found: list[KnownFit] = []
 
-    def add(start: Floats, effects: Sequence[str] = (), without: Sequence[str] = (), solved: Models = ()) -> KnownFit:
-        found.append(known_fit(board, problem.posterior.models, start, effects, without, solved))
+    def add(one: KnownFit) -> KnownFit:
+        found.append(one)
         if tell is not None:
             tell(len(found) / n_fits)
-        return found[-1]
+        return one
 
-    first = add(np.log(problem.estimate.rigidities), solved=problem.posterior.models).log_rigidities
-    each = [add(first, (name,), solved=laws[name].models if name in laws else ()) for name in known]
+    first = add(known_fit(problem, solved=problem.posterior.models)).log_rigidities
+    each = [add(known_fit(problem, (name,), solved=laws[name].models if name in laws else ())) for name in known]
     if len(known) > 1:
-        add(first + sum(one.log_rigidities - first for one in each), known)
+        add(known_fit(problem, known, start=first + sum(one.log_rigidities - first for one in each)))
     for name in own:
-        add(first, without=(name,))
+        add(known_fit(problem, without=(name,)))
     return tuple(found)
 
 
@@ -123,23 +123,22 @@ def stated(board: Board) -> tuple[str, ...]:
 
 
 def known_fit(
-    board: Board,
-    placed: Models,
-    start: Floats,
+    problem: PosedProblem,
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
+    *,
+    start: Floats | None = None,
     solved: Models = (),
 ) -> KnownFit:
     """Fit the constants of a board with some effects at their known sizes, and without some of its own.
 
     Parameters
     ----------
-    board : Board
-    placed : sequence of SetupModel
-        Of the board as it stands, where its labelled modes have their places.
-    start : (3,) array
-        ln of D_x, D_y, D_s (N m) where the fit begins.
+    problem : PosedProblem
+        The board as it stands.
     effects, without : sequence of str
+    start : (3,) array, optional
+        ln of D_x, D_y, D_s (N m) where the fit begins; by default the estimate of the board as it stands.
     solved : sequence of SetupModel
         With the exact law, made near the start; by default they are solved there.
 
@@ -147,12 +146,13 @@ def known_fit(
     -------
     KnownFit
     """
-    model = with_known_sizes(without_effects(board, without), effects)
-    inputs, target, scales = model.nominal(), log_measured(model), reading_scales(model)
-    law = _law(solved or _solved(model, placed, start), inputs)
+    board = with_known_sizes(without_effects(problem.board, without), effects)
+    inputs, target, scales = board.nominal(), log_measured(board), reading_scales(board)
+    start = np.log(problem.estimate.rigidities) if start is None else start
+    law = _law(solved or _solved(problem, board, start), inputs)
     fitted = refit(law, target, scales, start)
     if np.abs(fitted - start).max() > _NEAR:
-        law = _law(_solved(model, placed, fitted), inputs)
+        law = _law(_solved(problem, board, fitted), inputs)
         fitted = refit(law, target, scales, fitted)
     errors = prediction_errors(law, target, normal_misfit(target, scales), fitted[None, :])
     D_x, D_y, D_s = np.exp(fitted)
@@ -187,23 +187,25 @@ def _values(log_rigidities: Floats, inputs: Values) -> Values:
     return {**inputs, **dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))}
 
 
-def _solved(board: Board, placed: Models, at: Floats) -> Models:
+def _solved(problem: PosedProblem, board: Board, at: Floats) -> Models:
     """Every setup solved at given ln D, with the exact law around them for the constants alone.
 
-    A mode keeps its class and its rank there, as long as the plate keeps its symmetry: where two modes lie close, their
-    shapes would exchange names from one model to the next, and errors of different modes would be compared.
+    The mesh is that of the board as it stands, so that its matrices serve again. A mode keeps its class and its rank
+    there, as long as the plate keeps its symmetry: where two modes lie close, their shapes would exchange names from
+    one model to the next, and errors of different modes would be compared.
     """
     inputs = board.nominal()
-    values = _values(at, inputs)
-    models = tuple(setup_model(system_of(board, setup), values) for setup in board.setups)
+    values, meshed = _values(at, inputs), _values(np.log(problem.estimate.rigidities), inputs)
+    models = []
+    for setup, before in zip(board.setups, problem.posterior.models, strict=True):
+        system = system_of(board, setup)
+        model = setup_model(system, values, system.plate(meshed))
+        keeps = symmetry_of([model]) == symmetry_of([before])
+        models.append(replace(model, places=before.places) if keeps else model)
     weighted = np.concatenate([one.sensitivities(values) for one in models]) / reading_scales(board)[:, None]
     fixed = board.with_priors({name: Quantity.exact(float(value)) for name, value in inputs.items()})
     parameters = Parameters(fixed)
     covariance = np.eye(parameters.n_dim)
     covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.linalg.inv(weighted.T @ weighted)
     centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
-    kept = tuple(
-        replace(one, places=before.places) if symmetry_of([one]) == symmetry_of([before]) else one
-        for one, before in zip(models, placed, strict=True)
-    )
-    return exact_models(fixed, kept, centre, covariance, is_rough=True)
+    return exact_models(fixed, models, centre, covariance, is_rough=True)
