@@ -1,9 +1,9 @@
 """What physics knows of measured boards: the error with shear and air computed, nothing fitted but the constants.
 
 Transverse shear and air act on every board, and their sizes are known: from what is published, and from the board. A
-sensor weighs what its card states. Each is computed, alone and with the others, and the three constants are fitted again.
-Where the error falls, an ideal plate lacked the effect; where it rises, something that acts the other way is lacking,
-and no search can be trusted that does not find it. It is printed either way.
+sensor weighs what its card states. Each is computed, alone and with the others, and the three constants are fitted
+again. Where the error falls, the ideal plate lacked the effect; where it rises, something that acts the other way is
+lacking, or the size is another one on that board. It is printed either way.
 
     python examples/known_effects.py --out known-effects
 
@@ -67,13 +67,15 @@ def rows(found: Mapping[str, Sequence[KnownModel]]) -> list[tuple[str | float | 
 def markdown(found: Mapping[str, Sequence[KnownModel]]) -> str:
     """The table as Markdown, rounded."""
     lines = [COLUMNS, tuple("---" for _ in COLUMNS)]
-    for board, model, in_sample, left_out, *changes in rows(found):
-        cells = [_cents(in_sample), _cents(left_out), *(f"{change:+.1f}" for change in changes)]
-        lines.append((f"{board}", f"{model}", *cells))
+    for board, models in found.items():
+        for one in models:
+            errors = (_cents(one.in_sample_rms_cents), _cents(one.leave_one_out_rms_cents))
+            changes = (f"{value:+.1f}" if one is not models[0] else "-" for value in one.change_percent.values())
+            lines.append((board, model_words(one), *errors, *changes))
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
-def _cents(value: str | float | None) -> str:
+def _cents(value: float | None) -> str:
     return "-" if value is None else f"{value:.1f}"
 
 

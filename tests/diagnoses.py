@@ -45,7 +45,7 @@ def known_model(error: float, left_out: float | None, *effects: str, without: tu
         without=without,
         in_sample_rms_cents=error,
         leave_one_out_rms_cents=left_out,
-        change_percent={"E_x": 1.25 * factor, "E_y": -2.5 * factor, "G_xy": 0.0},
+        change_percent={"E_x": 1.25 * factor, "E_y": 0.0 - 2.5 * factor, "G_xy": 0.0},
     )
 
 

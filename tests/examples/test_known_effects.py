@@ -47,7 +47,7 @@ def test_it_writes_its_table(example, tmp_path, monkeypatch, capsys):
     lines = (tmp_path / "known-effects.md").read_text(encoding="utf-8").splitlines()
     assert "\n".join(lines) in capsys.readouterr().out
     first = asked[0]
-    assert lines[2] == f"| {first} | as it stands | 21.2 | 46.5 | +0.0 | +0.0 | +0.0 |"
+    assert lines[2] == f"| {first} | as it stands | 21.2 | 46.5 | - | - | - |"
     assert lines[4] == f"| {first} | with air loading | 42.8 | 94.0 | +1.2 | -2.5 | +0.0 |"
     assert len(lines) == 2 + 2 * len(KNOWN)
     with (tmp_path / "known-effects.csv").open(newline="", encoding="utf-8") as stream:

@@ -25,8 +25,8 @@ WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
 KEYS = {
-    "format", "verdict", "claim", "effects", "known", "before", "after", "gain_null_percentile", "elastic_shift", "candidates",
-    "recommendation",
+    "format", "verdict", "claim", "effects", "known", "before", "after", "gain_null_percentile", "elastic_shift",
+    "candidates", "recommendation",
 }  # fmt: skip
 ERRORS = {
     "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
