@@ -34,7 +34,7 @@ Models = Sequence[SetupModel]
 COMPUTED = ("transverse_shear", "air_loading")
 """Effects of every board whose sizes are known: from its own size, and from what is published."""
 STATED = ("attached_mass", "air_loading")
-"""Effects that a card declares by what it states of the bench."""
+"""Effects that a card may state in full, so that they are declared."""
 
 _NEAR = 0.1
 """Change of ln D up to which a law holds that was made before it: half a side of the smallest box it is trained in."""
@@ -116,9 +116,7 @@ def stated(board: Board) -> tuple[str, ...]:
     return tuple(
         name
         for name in STATED
-        if name in board.effects
-        and EFFECTS[name].is_implied(board)
-        and not any(one.source for one in board.uncertain if one.effect == name)
+        if name in board.effects and not any(one.source for one in board.uncertain if one.effect == name)
     )
 
 

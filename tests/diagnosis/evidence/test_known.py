@@ -171,7 +171,9 @@ def test_only_what_is_not_declared_is_computed(fiemme):
 def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path):
     problem = Problem.from_card(card_of(tmp_path, after=ATTACHED.format(mass=5))).posed
     assert problem.board.effects == (MASS,)
-    found = known_fits(problem, {})
+    told: list[float] = []
+    found = known_fits(problem, {}, told.append)
+    assert told == pytest.approx(np.arange(1.0, 6.0) / 5.0)
     assert [(one.effects, one.without) for one in found][-2:] == [((SHEAR, AIR), ()), ((), (MASS,))]
     assert are_alike(found[-1], *by_hand(FIEMME))
     assert abs(found[0].moduli / found[-1].moduli - 1.0).max() > 0.005
