@@ -17,6 +17,7 @@ from bayesplate.diagnosis.wording.diagnosis import (
     NullControlSummary,
     PValues,
 )
+from bayesplate.diagnosis.wording.known import KnownModel
 from bayesplate.effects import EFFECTS
 from bayesplate.results.contract import Spread
 
@@ -34,6 +35,28 @@ AFTER = Errors(
     log_score=-15.5,
     hits_90=1.0,
 )
+
+
+def known_model(error: float, left_out: float | None, *effects: str, without: tuple[str, ...] = ()) -> KnownModel:
+    """The board with effects of known sizes."""
+    factor = 1.0 if effects or without else 0.0
+    return KnownModel(
+        effects=effects,
+        without=without,
+        in_sample_rms_cents=error,
+        leave_one_out_rms_cents=left_out,
+        change_percent={"E_x": 1.25 * factor, "E_y": 0.0 - 2.5 * factor, "G_xy": 0.0},
+    )
+
+
+KNOWN = (
+    known_model(21.25, 46.5),
+    known_model(9.5, 12.25, "transverse_shear"),
+    known_model(42.75, 94.0, "air_loading"),
+    known_model(38.5, 88.0, "transverse_shear", "air_loading"),
+    known_model(30.25, 61.0, without=("attached_mass",)),
+)
+"""Shear lowers the error, air raises it, and the sensor is there."""
 WORDS = {
     "membrane_tension": "membrane tension",
     "air_loading": "air loading",
@@ -122,6 +145,7 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         reason="the reason of it",
         sentences=tuple(EFFECTS[name].sentence for name in effects),
         declared=(),
+        known=KNOWN if word == "named" else KNOWN[:1],
         probability_of_none=0.02,
         probability_of_none_with_halved_priors=0.02,
         probability_of_none_with_doubled_priors=0.03,

@@ -110,10 +110,31 @@ def system_of(board: Board, setup: Setup) -> System:
     return System(setup, effects_of(board, setup))
 
 
-@lru_cache(maxsize=16)
 def _plate(
     ends_x: Ends, ends_y: Ends, theory: Theory, effects: tuple[Effect, ...], n_x: int, n_y: int
 ) -> PlateMatrices:
+    shaping = tuple(effect for effect in effects if not _only_projects(effect))
+    projected = tuple(one.projection for one in contributions_of(effects).projected)
+    return _assembled(ends_x, ends_y, theory, shaping, n_x, n_y).with_projected(projected)
+
+
+def _only_projects(effect: Effect) -> bool:
+    """Whether all that an effect does to a plate is to add projected masses, which need no matrices of their own."""
+    is_plain = effect.theory == "thin" and not effect.releases and not effect.turns_grain and effect.outline() is None
+    added = effect.contributions()
+    return (
+        is_plain
+        and not effect.variations()
+        and all(effect.keeps_symmetry())
+        and all(isinstance(one, ProjectedMass) for one in added)
+    )
+
+
+@lru_cache(maxsize=16)
+def _assembled(
+    ends_x: Ends, ends_y: Ends, theory: Theory, effects: tuple[Effect, ...], n_x: int, n_y: int
+) -> PlateMatrices:
+    """The plate's matrices without projected masses: with the air and without, they are the same."""
     is_sheared = theory == "shear-flexible"
     symmetry = [effect.keeps_symmetry() for effect in effects]
     x = line(ends_x, n_x, is_sheared, all(along_x for along_x, _ in symmetry), _held(ends_x, effects))
@@ -121,12 +142,11 @@ def _plate(
     added = contributions_of(effects)
     stiffness = tuple(one.matrix(x, y) for one in added.stiffness)
     masses = tuple(one.matrix(x, y) for one in added.masses)
-    projected = tuple(one.projection for one in added.projected)
     fabric = fabric_of(effects)
     if is_sheared:
-        return assemble_shear_flexible(x, y, stiffness, masses, projected, fabric)
+        return assemble_shear_flexible(x, y, stiffness, masses, fabric)
     own_stiffness, own_mass = thin_terms(x, y, fabric), thin_masses(x, y, fabric)
-    return assemble(x, y, (*own_stiffness, *stiffness), (*own_mass, *masses), projected)
+    return assemble(x, y, (*own_stiffness, *stiffness), (*own_mass, *masses))
 
 
 def _held(ends: Ends, effects: tuple[Effect, ...]) -> Holds:

@@ -9,8 +9,9 @@ even and odd functions: no two modes of one class cross, and none of different c
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -168,6 +169,11 @@ class PlateMatrices:
     def block(self, parity: Parity) -> Block:
         """The block of a class."""
         return next(block for block in self.blocks if block.parity == parity)
+
+    def with_projected(self, terms: Sequence[Projection]) -> PlateMatrices:
+        """The same plate with these as all of its mass terms without a matrix; its own matrices are shared."""
+        on_deflections = tuple(partial(term, self.line_x, self.line_y) for term in terms)
+        return replace(self, blocks=tuple(replace(block, projected=on_deflections) for block in self.blocks))
 
 
 def is_rigid(beams: Beams, ends_x: Ends, ends_y: Ends) -> bool:

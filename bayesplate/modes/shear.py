@@ -17,7 +17,7 @@ is nothing to lock.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from bayesplate.modes.element import Products
@@ -30,7 +30,6 @@ from bayesplate.modes.plate import (
     KronSum,
     Parity,
     PlateMatrices,
-    Projection,
     Term,
     count_rigid,
     kron_sum,
@@ -131,7 +130,6 @@ def assemble_shear_flexible(
     y: Line,
     stiffness: Sequence[Term] = (),
     masses: Sequence[KronSum] = (),
-    projected: Sequence[Projection] = (),
     fabric: Fabric = UNIFORM,
 ) -> PlateMatrices:
     """The shear-flexible plate on two sheared lines, joined by further terms.
@@ -143,8 +141,6 @@ def assemble_shear_flexible(
     stiffness : sequence of Term
     masses : sequence of KronSum
         Further terms; they come after the plate's own.
-    projected : sequence of Projection
-        Further mass terms.
     fabric : Fabric
         Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`.
 
@@ -154,9 +150,8 @@ def assemble_shear_flexible(
     """
     groups = shear_groups(fabric.is_turned)
     measures = fabric.measures({*groups[0], *groups[1]}, x, y)
-    on_deflections = tuple(partial(term, x, y) for term in projected)
     blocks = tuple(
-        _block(Parity(i, j), x, y, measures, groups, stiffness, masses, on_deflections)
+        _block(Parity(i, j), x, y, measures, groups, stiffness, masses)
         for i in range(len(x.parts))
         for j in range(len(y.parts))
     )
@@ -182,7 +177,6 @@ def _block(
     groups: tuple[tuple[Group, ...], tuple[Group, ...]],
     further_stiffness: Sequence[Term],
     further_masses: Sequence[KronSum],
-    projected: tuple[Any, ...],
 ) -> Block:
     from scipy.sparse import coo_array
 
@@ -221,7 +215,7 @@ def _block(
     terms = [*stiffnesses, *further]
     stored, indices, indptr = on_one_pattern([*terms, *inertias, *(on_deflection(term) for term in further_masses)])
     stiff, inert = stored[: len(terms)], stored[len(terms) :]
-    return Block(parity, stiff, inert, indices, indptr, spread_x, spread_y, count_rigid(parity, x, y), projected)
+    return Block(parity, stiff, inert, indices, indptr, spread_x, spread_y, count_rigid(parity, x, y))
 
 
 def _functions(side: Line, parity: int) -> tuple[Any, Any, Any]:

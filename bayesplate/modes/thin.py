@@ -8,7 +8,7 @@ with K_xx = int w_xx^2, K_yy = int w_yy^2, K_mix = 2 int w_xx w_yy (the 2 is ins
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 
 from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.line import Line, line
@@ -19,7 +19,6 @@ from bayesplate.modes.plate import (
     KronSum,
     Parity,
     PlateMatrices,
-    Projection,
     Term,
     count_rigid,
     kron_sum,
@@ -112,9 +111,7 @@ def _integral(measure: Measure, x: Line, y: Line, a: Beams, b: Beams, factor: fl
     )
 
 
-def assemble(
-    x: Line, y: Line, stiffness: Sequence[Term], masses: Sequence[KronSum], projected: Sequence[Projection] = ()
-) -> PlateMatrices:
+def assemble(x: Line, y: Line, stiffness: Sequence[Term], masses: Sequence[KronSum]) -> PlateMatrices:
     """A thin plate from any terms, class by class.
 
     Parameters
@@ -124,8 +121,6 @@ def assemble(
     stiffness : sequence of Term
     masses : sequence of KronSum
         The first is the board's own.
-    projected : sequence of Projection
-        Further mass terms.
 
     Returns
     -------
@@ -139,7 +134,6 @@ def assemble(
             stored, indices, indptr = on_one_pattern(matrices)
             n = len(stiffness)
             parity = Parity(i, j)
-            on_deflections = tuple(partial(term, x, y) for term in projected)
             rigid = count_rigid(parity, x, y)
-            blocks.append(Block(parity, stored[:n], stored[n:], indices, indptr, part_x, part_y, rigid, on_deflections))
+            blocks.append(Block(parity, stored[:n], stored[n:], indices, indptr, part_x, part_y, rigid))
     return PlateMatrices(x, y, tuple(blocks))

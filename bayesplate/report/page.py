@@ -16,7 +16,7 @@ import numpy as np
 
 from bayesplate.cards import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.exports import write_before_after
+from bayesplate.diagnosis.wording.exports import write_before_after, write_known
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.shapes import labelled_shapes
@@ -108,6 +108,7 @@ def write_report(
         write_exports(folder, quoted(summary, diagnosis), title)
         if diagnosis is not None:
             write_before_after(folder, diagnosis, title)
+            write_known(folder, diagnosis, title)
         write_text(page, render(card, inference, draws, summary, shown, diagnosis))
         save_pictures(every, folder / FIGURES, "png")
     return page

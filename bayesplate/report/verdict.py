@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.known import known_sentence, known_table
 from bayesplate.diagnosis.wording.tables import (
     answers_table,
     candidates_table,
@@ -31,8 +32,10 @@ class DiagnosisSection:
     verdicts : tuple of (str, str, bool)
         Each word that a verdict may be, what it means, and whether it is the one given.
     sentences : tuple of str
+    known : str
+        What known effects do to the error; empty if there are none.
     tables : tuple of Table
-        Probabilities, errors, conditions of the claim, shift of the constants, sizes.
+        Known effects, probabilities, errors, conditions of the claim, shift of the constants, sizes.
     explained : tuple of str
         What two words of these tables mean.
     model : str
@@ -45,6 +48,7 @@ class DiagnosisSection:
     heading: str
     verdicts: tuple[tuple[str, str, bool], ...]
     sentences: tuple[str, ...]
+    known: str
     tables: tuple[Table, ...]
     explained: tuple[str, ...]
     model: str
@@ -63,6 +67,7 @@ _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviation
 def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     """The section of a diagnosis."""
     tables = (
+        known_table(diagnosis.known),
         answers_table(diagnosis),
         errors_table(diagnosis),
         claim_table(diagnosis),
@@ -73,6 +78,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
         heading=VERDICTS[diagnosis.verdict].heading,
         verdicts=tuple((word, one.heading, word == diagnosis.verdict) for word, one in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),
+        known=known_sentence(diagnosis.known),
         tables=tuple(table for table in tables if table is not None),
         explained=(_LOG_SCORE, *((_SHIFT,) if diagnosis.is_refitted else ())),
         model=shown_model(diagnosis),

@@ -25,7 +25,8 @@ PAGE = "report.html"
 FIGURES = "figures"
 CONSTANTS = ("constants.csv", "constants.tex")
 BEFORE_AFTER = ("before-after.csv", "before-after.tex")
-RESULTS = (SUMMARY, ARCHIVE, DIAGNOSIS, PAGE, *CONSTANTS, *BEFORE_AFTER)
+KNOWN_EFFECTS = ("known-effects.csv", "known-effects.tex")
+RESULTS = (SUMMARY, ARCHIVE, DIAGNOSIS, PAGE, *CONSTANTS, *BEFORE_AFTER, *KNOWN_EFFECTS)
 """What a run leaves besides its figures, and the next one in the same folder replaces."""
 BESIDE = ("compare.json", "modes.png", "modes.svg")
 """Files of commands that share the folder with a fit: they do not make it a used one."""

@@ -16,6 +16,7 @@ from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
 from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answer_words, answers, decide
+from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
@@ -40,7 +41,7 @@ from bayesplate.workflow.stages import Stages
 _NULL_LINE = 7
 _MOST_ASKED = 4
 _MOST_FINALISTS = 3
-_FIT, _SEARCH, _CONTROL = 3.0, 3.0, 1.0
+_FIT, _SEARCH, _KNOWN, _CONTROL = 3.0, 3.0, 0.5, 1.0
 """How long the parts take beside each other, for the time that is left."""
 
 
@@ -146,7 +147,7 @@ def diagnose(
     begun = opened(problem, seed, out, force=force, resume=resume, first=BEFORE)
     folder = begun.folder
 
-    stages = Stages(progress, _FIT + _SEARCH + _CONTROL + _FIT)
+    stages = Stages(progress, _FIT + _SEARCH + _KNOWN + _CONTROL + _FIT)
 
     def run(under: Problem, name: str, stage: str) -> Fitted:
         def refuse(inference: Inference) -> None:
@@ -157,7 +158,11 @@ def diagnose(
 
     before = run(problem, BEFORE, "fit without further effects")
     stages.begin("search for effects", _SEARCH)
-    found = search(prepare_search(baseline_of(before.inference.problem), tell=stages.reached))
+    ground = prepare_search(baseline_of(before.inference.problem), tell=stages.reached)
+    found = search(ground)
+    stages.begin("effects that are known", _KNOWN)
+    solved = {name: one.laws[0] for name, one in ground.candidates.items()}
+    known = known_fits(before.inference.problem, solved, stages.reached)
     stages.begin("the same search on simulated boards", _CONTROL)
     control = null_control(found.ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
@@ -172,7 +177,7 @@ def diagnose(
             refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
             notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
-    case = _case(found, verdict, control, before, refits, tuple(notes))
+    case = _case(found, verdict, control, known, before, refits, tuple(notes))
     diagnosis, after = diagnosis_of(case), refits.get(verdict.index, before)
     if folder is not None:
         if after is not before:
@@ -190,6 +195,7 @@ def _case(
     found: Found,
     verdict: Verdict,
     control: NullControl,
+    known: Sequence[KnownFit],
     before: Fitted,
     refits: Mapping[int, Fitted],
     notes: tuple[str, ...],
@@ -206,6 +212,7 @@ def _case(
         after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
         claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
         recommendation=advice(found, verdict),
+        known=known,
         finalists=[(one, refits[one.index].summary) for one in verdict.stands_for if one.index in refits],
         drawn={index: one.draws for index, one in refits.items()},
         notes=notes,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
 from bayesplate.diagnosis.wording.told import alike_sentence, verdict_sentence, warnings
 from bayesplate.posterior.convergence import Gate
@@ -90,7 +91,7 @@ def show_compare(comparison: Comparison) -> Shown:
 
 def show_diagnosis(diagnosis: Diagnosis) -> Shown:
     """The result of `bayesplate.workflow.diagnose.diagnose` for a person."""
-    told = (*diagnosis.sentences, alike_sentence(diagnosis), diagnosis.recommendation)
+    told = (known_sentence(diagnosis.known), *diagnosis.sentences, alike_sentence(diagnosis), diagnosis.recommendation)
     remarks = tuple(sentence for sentence in told if sentence)
     return Shown(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))
 

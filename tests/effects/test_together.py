@@ -159,6 +159,23 @@ def test_three_masses_in_any_order_give_the_same_frequencies():
     assert np.abs(found / found[0] - 1.0).max() < 1e-9
 
 
+@pytest.mark.parametrize("edges", ["CFFF", "CCCC"])
+@pytest.mark.usefixtures("coarse")
+def test_what_changes_no_matrix_shares_those_of_the_plate_without_it(edges):
+    """The air, a frame that moves and another Poisson ratio: projected masses and weights, nothing to assemble."""
+    plates = {}
+    for name in ("", *TOGETHER[edges]):
+        declared = declare(replace(BOARDS[edges], effects=tuple(filter(None, (name,)))))
+        values = declared.nominal() | {"D_x": np.asarray(30.0), "D_y": np.asarray(2.0), "D_s": np.asarray(5.0)}
+        plates[name] = system_of(declared, declared.setups[0]).plate(values)
+    bare = plates.pop("").blocks[0]
+    shared = {name for name, plate in plates.items() if plate.blocks[0].terms is bare.terms}
+
+    assert shared == ({*KINDS["projected mass"], "poisson_ratio"} & set(TOGETHER[edges]))
+    assert {name for name in shared if plates[name].blocks[0].projected} == shared & KINDS["projected mass"]
+    assert bare.projected == ()
+
+
 def left_at_nothing(plate: Plate, effects: Sequence[str]) -> float:
     """Largest relative change of a frequency that effects leave where they do nothing.
 

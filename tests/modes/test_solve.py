@@ -250,7 +250,7 @@ def test_free_plate_answers_for_its_rounding_alone(projected):
     one move by 5e-3.
     """
     side = line(("free", "free"), 8, is_sheared=True, is_split=False)
-    plate = assemble_shear_flexible(side, side, projected=projected)
+    plate = assemble_shear_flexible(side, side).with_projected(projected)
     mass = np.array([1.0, 1e-4, 1e-4, *(0.3 for _ in projected)])
     weights = Weights(np.array([1.0, 0.1, 0.05, 0.3, 4e3, 2e2]), mass)
     modes = solve(plate, weights, 6)

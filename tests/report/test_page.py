@@ -264,6 +264,14 @@ def test_the_first_lines_are_of_the_constants_to_quote(clamped, verdict):
     assert ("by 4.2 cents" in first, "by 21 cents" in first) == (verdict == "named", verdict != "named")
 
 
+def test_a_page_says_what_known_effects_do_to_the_error(clamped):
+    page = Read(clamped.page("A board", diagnosis=DIAGNOSES["named"]))
+    text = " ".join(page.text.split())
+    assert "air loading raises it from 46 to 94 cents" in text
+    assert "What physics knows, computed and not fitted" in text
+    assert "What physics knows" not in Read(clamped.page("A board", diagnosis=DIAGNOSES["none needed"])).text
+
+
 def test_a_page_says_which_member_of_a_group_the_rest_is_of(clamped):
     text = " ".join(Read(clamped.page("A board", diagnosis=DIAGNOSES["indistinguishable group"])).text.split())
     assert "with membrane tension, which is only one of the explanations. Quote the averaged constants." in text
@@ -287,6 +295,8 @@ def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path):
     assert added == {"named": {"before-after", "signatures"}, "none": {"signatures"}, "hidden": set()}
     assert len(named.all("img")) == len(FIGURES) + 2
     assert (tmp_path / "named" / "before-after.csv").exists()
+    assert (tmp_path / "named" / "known-effects.csv").exists()
+    assert not (tmp_path / "none" / "known-effects.csv").exists()
 
 
 def test_visible_keeps_joined_emoji_and_turns_breaks_into_spaces():

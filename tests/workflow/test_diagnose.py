@@ -17,6 +17,7 @@ from bayesplate.diagnosis.evidence.search import prepare_search
 from bayesplate.errors import InputError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.workflow.check import check
 from bayesplate.workflow.diagnose import diagnose as run_diagnose
 from bayesplate.workflow.fit import fit
 
@@ -24,8 +25,8 @@ WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
 KEYS = {
-    "format", "verdict", "claim", "effects", "before", "after", "gain_null_percentile", "elastic_shift", "candidates",
-    "recommendation",
+    "format", "verdict", "claim", "effects", "known", "before", "after", "gain_null_percentile", "elastic_shift",
+    "candidates", "recommendation",
 }  # fmt: skip
 ERRORS = {
     "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
@@ -98,8 +99,24 @@ def test_diagnosis_json_keeps_its_contract(which, request):
         assert (one["rejected_because"] is None) == (one["name"] in found["effects"])
         assert one["amplitude"] is None or set(one["amplitude"]) >= {"q05", "q50", "q95", "unit"}
         assert one["bias_percent"] is None or set(one["bias_percent"]) == MODULI
+    assert [one["effects"] for one in found["known"]] == [
+        [], ["transverse_shear"], ["air_loading"], ["transverse_shear", "air_loading"],
+    ]  # fmt: skip
+    assert all(set(one["change_percent"]) == MODULI and one["without"] == [] for one in found["known"])
     assert 0.0 <= found["gain_null_percentile"] <= 100.0
     assert found["recommendation"] == "" or found["recommendation"].endswith(".")
+
+
+def test_known_effects_are_computed_before_anything_is_fitted_again(with_shear, calm):
+    """Falls and rises are in the file and in what is printed; the board as it stands is the one that `check` shows."""
+    stands, shear, air, both = told(with_shear)["known"]
+    assert stands["in_sample_rms_cents"] == pytest.approx(check(WITH_SHEAR).in_sample_rms_cents, abs=0.01)
+    assert shear["leave_one_out_rms_cents"] < 0.5 * stands["leave_one_out_rms_cents"] < air["leave_one_out_rms_cents"]
+    assert shear["in_sample_rms_cents"] < both["in_sample_rms_cents"] < air["in_sample_rms_cents"]
+    printed = " ".join(calm.stdout.split())
+    assert "transverse shear lowers the left-out error from" in printed
+    assert "air loading raises it from" in printed
+    assert "Where the error rises, something that acts the other way is lacking" in printed
 
 
 def test_what_is_printed_as_json_is_what_is_written(with_shear):

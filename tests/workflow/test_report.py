@@ -11,7 +11,10 @@ def test_a_new_run_takes_the_old_report_away(quick_fit):
     """Also where the new one writes none: a page must not stand beside numbers that are not its own."""
     run = quick_fit(BOARD, "--quiet")
     (run.folder / "figures").mkdir()
-    for name in ("report.html", "constants.csv", "constants.tex", "before-after.csv", "before-after.tex"):
+    tables = [
+        f"{table}.{ending}" for table in ("constants", "before-after", "known-effects") for ending in ("csv", "tex")
+    ]
+    for name in ("report.html", *tables):
         (run.folder / name).write_bytes(b"old")
     (run.folder / "figures" / "board.svg").write_bytes(b"old")
     (run.folder / "figures" / "mine.txt").write_bytes(b"mine")

@@ -9,6 +9,7 @@ from typing import Any
 from bayesplate.diagnosis.decision.claim import Condition
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry
+from bayesplate.diagnosis.wording.known import KnownModel
 from bayesplate.results.contract import NOT_IN_JSON, Spread, as_json
 
 FORMAT = 1
@@ -150,6 +151,9 @@ class Diagnosis:
         What each of `effects` is.
     declared : tuple of str
         Effects that were part of the model from the beginning.
+    known : tuple of KnownModel
+        What physics knows of the others, computed before the search and not fitted: the board as it stands first, then
+        with transverse shear, with air loading, with both, and without each effect that the card itself states.
     probability_of_none : float
     probability_of_none_with_halved_priors, probability_of_none_with_doubled_priors : float
     p_value : PValues
@@ -187,6 +191,7 @@ class Diagnosis:
     reason: str
     sentences: tuple[str, ...]
     declared: tuple[str, ...]
+    known: tuple[KnownModel, ...]
     probability_of_none: float
     probability_of_none_with_halved_priors: float
     probability_of_none_with_doubled_priors: float

@@ -1,15 +1,19 @@
-"""Errors and constants before and after a diagnosis, as CSV and LaTeX for other programs."""
+"""Errors and constants before and after a diagnosis, and with known effects, as CSV and LaTeX for other programs."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.known import KnownModel, known_table, model_words
 from bayesplate.diagnosis.wording.words import MERITS
 from bayesplate.effects.words import effect_name
+from bayesplate.plate.material import MODULI
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.exports import Cell, csv_text, latex, tabular
-from bayesplate.results.folder import BEFORE_AFTER, write_text
+from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS, write_text
+from bayesplate.results.words import MISSING
 
 _GPA = 1e-9
 
@@ -32,6 +36,36 @@ def write_before_after(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[
     for name, text in texts.items():
         write_text(folder / name, text)
     return tuple(folder / name for name in texts)
+
+
+def write_known(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[Path, ...]:
+    """Write the table of known effects into a folder that is there, twice; nothing where there are none to compute."""
+    known = diagnosis.known
+    if len(known) < 2:
+        return ()
+    texts = dict(zip(KNOWN_EFFECTS, (known_csv(known), known_tex(known, title)), strict=True))
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    return tuple(folder / name for name in texts)
+
+
+def known_csv(known: Sequence[KnownModel]) -> str:
+    """Errors in cents and changes of the moduli in percent at full precision, model by model."""
+    header = ["model", "in_sample_rms_cents", "leave_one_out_rms_cents", *(f"{name}_percent" for name in MODULI)]
+    rows: list[list[Cell]] = [list(header)]
+    for one in known:
+        errors = (one.in_sample_rms_cents, one.leave_one_out_rms_cents)
+        rows.append([model_words(one), *errors, *one.change_percent.values()])
+    return csv_text(rows)
+
+
+def known_tex(known: Sequence[KnownModel], title: str) -> str:
+    """The same rounded, as a tabular that needs no package; errors in cents."""
+    table = known_table(known)
+    assert table is not None
+    columns = [f"${name[0]}_{{{name[2:]}}}$, \\%" for name in MODULI]
+    cells = [["--" if cell == MISSING else latex(cell) for cell in row] for row in table.rows]
+    return tabular(f"% {latex(table.title)}; {latex(title)}", [*table.columns[:3], *columns], cells)
 
 
 def before_after_csv(diagnosis: Diagnosis) -> str:

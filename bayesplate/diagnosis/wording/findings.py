@@ -14,6 +14,7 @@ from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words,
 from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.diagnosis.evidence.known import KnownFit
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, inclusion_with_width
@@ -28,6 +29,7 @@ from bayesplate.diagnosis.wording.diagnosis import (
 )
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of, rms
 from bayesplate.diagnosis.wording.fates import ratio_words
+from bayesplate.diagnosis.wording.known import known_models
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_names, joined
 from bayesplate.frequencies.laws import cents
@@ -66,6 +68,8 @@ class Case:
     claim : Claim
         Of the explanation that was fitted again.
     recommendation : str
+    known : sequence of KnownFit
+        The board as it stands first.
     finalists : sequence of (Answer, Summary)
         Explanations that were fitted again, best first, each with the summary of its fit.
     drawn : dict of Draws
@@ -81,6 +85,7 @@ class Case:
     after: Side
     claim: Claim
     recommendation: str
+    known: Sequence[KnownFit] = ()
     finalists: Sequence[tuple[Answer, Summary]] = ()
     drawn: Mapping[int, Draws] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -117,6 +122,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
         reason=verdict.reason,
         sentences=_sentences(case, taken),
         declared=found.ground.baseline.board.effects,
+        known=known_models(case.known),
         probability_of_none=found.none,
         probability_of_none_with_halved_priors=halved[""],
         probability_of_none_with_doubled_priors=doubled[""],

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from bayesplate.diagnosis.wording.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.known import known_table
 from bayesplate.diagnosis.wording.words import CONDITIONS, MERITS, MISSING, Merit, names_of, worth_showing
 from bayesplate.effects.words import effect_name
 from bayesplate.plate.parameter import unit_of_people
@@ -30,6 +31,7 @@ def every_table(diagnosis: Diagnosis) -> tuple[Table, ...]:
     """The tables of a terminal or a notebook, the constants to quote first."""
     tables = (
         averaged_table(diagnosis),
+        known_table(diagnosis.known),
         answers_table(diagnosis),
         errors_table(diagnosis),
         claim_table(diagnosis),

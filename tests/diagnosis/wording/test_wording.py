@@ -17,6 +17,7 @@ from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import Amplitude
 from bayesplate.diagnosis.wording.diagnosis import Errors, diagnosis_json
 from bayesplate.diagnosis.wording.exports import before_after_csv, before_after_tex, write_before_after
+from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import (
     answers_table,
     averaged_table,
@@ -39,7 +40,7 @@ from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
     "format", "name", "seed", "card_sha256", "verdict", "claim", "conditions", "effects", "refitted", "reason",
-    "sentences", "declared", "probability_of_none", "probability_of_none_with_halved_priors",
+    "sentences", "declared", "known", "probability_of_none", "probability_of_none_with_halved_priors",
     "probability_of_none_with_doubled_priors", "p_value", "before", "after", "gain_null_percentile", "null_control",
     "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates", "recommendation", "notes",
 ]  # fmt: skip
@@ -66,6 +67,10 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert list(content["before"]) == list(content["after"]) == ERRORS
     assert [list(one) for one in content["candidates"]] == [EFFECT, EFFECT, EFFECT, EXCHANGED]
     assert list(content["candidates"][0]["amplitude"]) == ["parameter", "form", "q05", "q50", "q95", "unit"]
+    assert [list(one) for one in content["known"]] == 5 * [
+        ["effects", "without", "in_sample_rms_cents", "leave_one_out_rms_cents", "change_percent"]
+    ]
+    assert list(content["known"][0]["change_percent"]) == ["E_x", "E_y", "G_xy"]
     assert list(content["p_value"]) == ["before", "after"]
     assert list(content["null_control"]) == [
         "n_sets",
@@ -272,13 +277,15 @@ def test_a_setup_is_named_where_there_are_several():
 def test_the_terminal_shows_only_tables_that_there_are():
     shown, bare = show_diagnosis(NAMED), show_diagnosis(DIAGNOSES["undetectable"])
     assert [table.title.partition(":")[0] for table in shown.tables] == [
-        "The constants, averaged over all explanations by their probability, GPa", "What may be the case",
-        "Error before and after", "May a lower error be claimed? Only if every condition is met",
+        "The constants, averaged over all explanations by their probability, GPa",
+        "What physics knows, computed and not fitted", "What may be the case", "Error before and after",
+        "May a lower error be claimed? Only if every condition is met",
         "Shift of the constants by membrane tension, GPa", "Sizes of what was fitted again",
         "Candidates at their usual size",
     ]  # fmt: skip
     assert [table.title for table in bare.tables[1:]] == ["What may be the case", "Error: a-board"]
-    assert shown.remarks == (*NAMED.sentences, NEXT)
+    assert shown.remarks == (known_sentence(NAMED.known), *NAMED.sentences, NEXT)
+    assert bare.remarks == (NEXT,)
 
 
 def test_before_and_after_in_one_csv():
@@ -336,7 +343,8 @@ def test_it_shows_itself():
     assert repr(NAMED) == "<Diagnosis of a-board, named: membrane_tension, error reduced>"
     assert repr(DIAGNOSES["none needed"]) == "<Diagnosis of a-board, none needed>"
     page = _Tags(NAMED._repr_html_())
-    assert page.tags.count("table") == 7
+    assert page.tags.count("table") == 8
+    assert known_sentence(NAMED.known) in page.text
     for words in ("An effect was found", "point to membrane tension", "46.5", f"{AFTER.leave_one_out_rms_cents}", NEXT):
         assert words in page.text
 

@@ -1,0 +1,209 @@
+"""What physics knows and nobody needs to search: shear, air, a stated sensor; computed, and the error they lead to.
+
+The sizes of a computed effect are the medians of their priors; all other inputs stand at their nominal values, as in
+`bayesplate.estimates.least_squares`. Nothing is fitted but the three constants, so that an error may rise as well as
+fall.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.shifts.baseline import symmetry_of
+from bayesplate.diagnosis.shifts.laws import FormLaw
+from bayesplate.effects import EFFECTS, effects_of
+from bayesplate.estimates.least_squares import log_measured, reading_scales
+from bayesplate.estimates.leave_one_out import Errors, prediction_errors
+from bayesplate.estimates.refit import Predict, normal_misfit, refit
+from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.material import RIGIDITIES, moduli
+from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.laplace import exact_models
+from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+Models = Sequence[SetupModel]
+
+COMPUTED = ("transverse_shear", "air_loading")
+"""Effects of every board whose sizes are known: from its own size, and from what is published."""
+STATED = ("attached_mass", "air_loading")
+"""Effects that a card may state in full, so that they are declared."""
+
+_NEAR = 0.1
+"""Change of ln D up to which a law holds that was made before it: half a side of the smallest box it is trained in."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownFit:
+    """The three constants fitted to a board with known effects of fixed sizes.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Computed beyond those that the board declares.
+    without : tuple of str
+        Declared ones that are left out.
+    log_rigidities : (3,) array
+        ln of D_x, D_y, D_s (N m).
+    moduli : (3,) array, Pa
+        E_x, E_y, G_xy.
+    errors : Errors
+        Of ln f, in sample and left out.
+    """
+
+    effects: tuple[str, ...]
+    without: tuple[str, ...]
+    log_rigidities: Floats
+    moduli: Floats
+    errors: Errors
+
+
+def known_fits(
+    problem: PosedProblem, laws: Mapping[str, FormLaw], tell: Callable[[float], None] | None = None
+) -> tuple[KnownFit, ...]:
+    """The board as it stands; with each known effect that it lacks, with all of them; without each stated one.
+
+    Parameters
+    ----------
+    problem : PosedProblem
+    laws : dict of FormLaw
+        Of effects that were solved already, by name.
+    tell : callable, optional
+        Told after every fit which share of them is done.
+
+    Returns
+    -------
+    tuple of KnownFit
+        The board as it stands first.
+    """
+    known, own = computable(problem.board), stated(problem.board)
+    n_fits = 1 + len(known) + (len(known) > 1) + len(own)
+    found: list[KnownFit] = []
+
+    def add(one: KnownFit) -> KnownFit:
+        found.append(one)
+        if tell is not None:
+            tell(len(found) / n_fits)
+        return one
+
+    first = add(known_fit(problem, solved=problem.posterior.models)).log_rigidities
+    each = [add(known_fit(problem, (name,), solved=laws[name].models if name in laws else ())) for name in known]
+    if len(known) > 1:
+        add(known_fit(problem, known, start=first + sum(one.log_rigidities - first for one in each)))
+    for name in own:
+        add(known_fit(problem, without=(name,)))
+    return tuple(found)
+
+
+def computable(board: Board) -> tuple[str, ...]:
+    """Effects of known size that are not declared and can act in a setup of the board."""
+    return tuple(
+        name
+        for name in COMPUTED
+        if name not in board.effects and not all(EFFECTS[name].refusal(board, setup) for setup in board.setups)
+    )
+
+
+def stated(board: Board) -> tuple[str, ...]:
+    """Effects that are declared because the card states them, with no size left to a prior of the library."""
+    return tuple(
+        name
+        for name in STATED
+        if name in board.effects and not any(one.source for one in board.uncertain if one.effect == name)
+    )
+
+
+def known_fit(
+    problem: PosedProblem,
+    effects: Sequence[str] = (),
+    without: Sequence[str] = (),
+    *,
+    start: Floats | None = None,
+    solved: Models = (),
+) -> KnownFit:
+    """Fit the constants of a board with some effects at their known sizes, and without some of its own.
+
+    Parameters
+    ----------
+    problem : PosedProblem
+        The board as it stands.
+    effects, without : sequence of str
+    start : (3,) array, optional
+        ln of D_x, D_y, D_s (N m) where the fit begins; by default the estimate of the board as it stands.
+    solved : sequence of SetupModel
+        With the exact law, made near the start; by default they are solved there.
+
+    Returns
+    -------
+    KnownFit
+    """
+    board = with_known_sizes(without_effects(problem.board, without), effects)
+    inputs, target, scales = board.nominal(), log_measured(board), reading_scales(board)
+    start = np.log(problem.estimate.rigidities) if start is None else start
+    law = _law(solved or _solved(problem, board, start), inputs)
+    fitted = refit(law, target, scales, start)
+    if np.abs(fitted - start).max() > _NEAR:
+        law = _law(_solved(problem, board, fitted), inputs)
+        fitted = refit(law, target, scales, fitted)
+    errors = prediction_errors(law, target, normal_misfit(target, scales), fitted[None, :])
+    D_x, D_y, D_s = np.exp(fitted)
+    constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
+    return KnownFit(tuple(effects), tuple(without), fitted, constants, errors)
+
+
+def with_known_sizes(board: Board, effects: Sequence[str]) -> Board:
+    """A board with further effects, every size of theirs fixed at the median of its prior."""
+    added = replace(board, effects=(*board.effects, *effects))
+    acting = (one for setup in board.setups for one in effects_of(added, setup) if one.name in effects)
+    sizes = (size for one in acting for size in one.parameters())
+    return added.with_parameters(replace(size, prior=Quantity.exact(size.prior.median)) for size in sizes)
+
+
+def without_effects(board: Board, effects: Sequence[str]) -> Board:
+    """A board without some of its declared effects."""
+    return replace(
+        board,
+        effects=tuple(name for name in board.effects if name not in effects),
+        chosen=tuple(one for one in board.chosen if one.name not in effects),
+        parameters=tuple(one for one in board.parameters if one.effect not in effects),
+    )
+
+
+def _law(models: Models, inputs: Values) -> Predict:
+    """ln f (Hz) of the readings from (n, 3) ln D by the exact law, all else at its nominal value."""
+    return lambda x: np.concatenate([one.log_frequencies(_values(x, inputs), "exact") for one in models], axis=1)
+
+
+def _values(log_rigidities: Floats, inputs: Values) -> Values:
+    return {**inputs, **dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))}
+
+
+def _solved(problem: PosedProblem, board: Board, at: Floats) -> Models:
+    """Every setup solved at given ln D, with the exact law around them for the constants alone.
+
+    The mesh is that of the board as it stands, so that its matrices serve again. A mode keeps its class and its rank
+    there, as long as the plate keeps its symmetry: where two modes lie close, their shapes would exchange names from
+    one model to the next, and errors of different modes would be compared.
+    """
+    inputs = board.nominal()
+    values, meshed = _values(at, inputs), _values(np.log(problem.estimate.rigidities), inputs)
+    models = []
+    for setup, before in zip(board.setups, problem.posterior.models, strict=True):
+        system = system_of(board, setup)
+        model = setup_model(system, values, system.plate(meshed))
+        keeps = symmetry_of([model]) == symmetry_of([before])
+        models.append(replace(model, places=before.places) if keeps else model)
+    weighted = np.concatenate([one.sensitivities(values) for one in models]) / reading_scales(board)[:, None]
+    fixed = board.with_priors({name: Quantity.exact(float(value)) for name, value in inputs.items()})
+    parameters = Parameters(fixed)
+    covariance = np.eye(parameters.n_dim)
+    covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.linalg.inv(weighted.T @ weighted)
+    centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
+    return exact_models(fixed, models, centre, covariance, is_rough=True)
