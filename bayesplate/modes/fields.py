@@ -26,6 +26,24 @@ Field = Callable[[Floats, Floats], Floats]
 Outline = Callable[[Floats], tuple[Floats, Floats]]
 """Where the plate begins and ends along y, as fractions of its widest width, at points x of [0, 1]."""
 
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """What a field's integrals gain where the outline moves: half of those in one outline less those in another.
+
+    Attributes
+    ----------
+    gained, lost : Outline
+        As far from the plate's own on its two sides.
+    field : Field or None
+        None is uniform.
+    """
+
+    gained: Outline
+    lost: Outline
+    field: Field | None = None
+
+
 Group = Literal["along", "bending", "shear", "mass", "rotary"]
 """Terms of a plate that take the same field; "along" is the bending that the modulus along the grain resists."""
 
@@ -53,7 +71,7 @@ class Fabric:
         Whether terms that couple bending and twist, and the two shear strains, join the plate's own.
     """
 
-    fields: Mapping[Group, Sequence[Field | None]] = field(default_factory=dict)
+    fields: Mapping[Group, Sequence[Field | Moved | None]] = field(default_factory=dict)
     outline: Outline | None = None
     is_turned: bool = False
 
@@ -63,7 +81,15 @@ class Fabric:
         made = {each: self._measure(*each, x, y) for each in {each for pairs in taken.values() for each in pairs}}
         return {group: [made[each] for each in pairs] for group, pairs in taken.items()}
 
-    def _measure(self, factor: Field | None, ghost: float, x: Line, y: Line) -> Measure:
+    def _measure(self, factor: Field | Moved | None, ghost: float, x: Line, y: Line) -> Measure:
+        if isinstance(factor, Moved):
+            half = 0.5 * (1.0 - ghost)
+            both = ((half, factor.gained), (-half, factor.lost))
+            return tuple(
+                (_times(share, along_x), along_y)
+                for share, outline in both
+                for along_x, along_y in _inside(x, y, factor.field, outline)
+            )
         uniform = (products(tuple(x.nodes)), products(tuple(y.nodes)))
         if self.outline is not None:
             inside = _inside(x, y, factor, self.outline)
