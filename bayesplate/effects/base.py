@@ -18,7 +18,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.fields import Field, Group, Moved, Outline
+from bayesplate.modes.fields import EdgeStrip, Field, Group, Outline
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import KronSum, Projection, Term, Weights
 from bayesplate.plate.board import Board, Values
@@ -69,7 +69,7 @@ class Variation:
 
     Attributes
     ----------
-    field : Field, Moved or None
+    field : Field, EdgeStrip or None
         None is uniform.
     weight : callable or None
         From the values to a number or an (n_draws,) array; None is one.
@@ -77,7 +77,7 @@ class Variation:
         Of smallness: an expansion that ends with the second order leaves out higher ones, and so do products of two.
     """
 
-    field: Field | Moved | None
+    field: Field | EdgeStrip | None
     weight: Callable[[Values], Floats] | None = None
     order: int = 0
 

@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
-from bayesplate.effects.field_components import FieldProfile, coordinates, field_parameters, field_profile, held_in
+from bayesplate.effects.field_components import FieldProfile, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.modes.fields import Group, Moved, Outline
+from bayesplate.modes.fields import EdgeStrip, Group, Outline
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.random_field import conditioned, width_readings
@@ -21,6 +21,8 @@ from bayesplate.plate.setup import Ends, Setup
 _SOURCE = "normal: what the readings leave open of a smooth width, in standard deviations"
 _GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")
 _N_POINTS = 400
+_STRIP_SDS = 5.0
+"""Width of the strip in steps of a component: fewer, and it could weigh less than nothing."""
 _FIRST_ORDER_ALONE = 2
 """Order of smallness at which what an outline gains is counted: its second is left out, and so are products with it."""
 
@@ -30,11 +32,12 @@ class OutlineProfile(Effect):
     """The energies of the true outline: a width W (w0(s) + sum z_k psi_k(s)), s from 0 to 1 along the whole board.
 
     The widths read at stations condition a random field (`FieldProfile`): w0 is what is expected, with a mean of one,
-    and enters exactly; what is open enters to first order, as half the difference of two outlines.
+    and enters exactly; what is open enters to first order, as the energies of a strip along the edge, which gain or lose
+    weight.
 
     The functions are those of the rectangle as wide as the widest place; what lies outside the outline is all but
     removed. Where both edges along x are free the board is taken to narrow from both alike (readings of a width do not
-    say which edge recedes), otherwise from the free one.
+    say which edge recedes), otherwise from the free one. The mean width is taken to be known apart from the field.
 
     Attributes
     ----------
@@ -114,57 +117,58 @@ class OutlineProfile(Effect):
         """The widest width for the sides of the rectangle; the mass goes with the mean width, which stays."""
         return values if self.profile is None else {**values, "length_y": values["length_y"] * self._widest}
 
-    @property
-    def goes_with(self) -> tuple[str, ...]:
-        """The mean width, where the field goes with it."""
-        return ("length_y",) if self.profile is not None and self.profile.with_mean is not None else ()
-
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """What every energy gains where the outline moves, besides what it is."""
-        if self.profile is None or not self.profile.open:
+        """What every energy gains at the edges where the outline moves, besides what it is."""
+        if self.profile is None or not self.profile.components:
             return {}
         moved = tuple(
             Variation(
-                Moved(partial(self._limits, k=k, step=1.0), partial(self._limits, k=k, step=-1.0)),
-                partial(self._coordinate, k=k),
+                EdgeStrip(partial(self._limits, inside=k), partial(self._direction, k=k)),
+                partial(self._share, k=k),
                 _FIRST_ORDER_ALONE,
             )
-            for k in range(len(self.profile.open))
+            for k in range(len(self.profile.components))
         )
         return dict.fromkeys(_GROUPS, (Variation(None), *moved))
 
-    def _coordinate(self, values: Values, k: int) -> Floats:
+    def _share(self, values: Values, k: int) -> Floats:
+        """Weight of the strip of a component that is gained."""
         assert self.profile is not None
-        of_components = [self.value(values, one.key) for one in self.parameters()]
-        mean = np.asarray(values["length_y"]) / self._widest
-        return np.asarray(coordinates(self.profile, mean, of_components)[k])
+        return self.value(values, self.parameters()[k].key) / _STRIP_SDS
+
+    def _direction(self, x: Floats, y: Floats, k: int) -> Floats:
+        """Where a component widens the board, 1, and where it narrows it, -1."""
+        return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
     @cached_property
     def _widest(self) -> float:
-        """Of all outlines, over the mean width."""
-        assert self.profile is not None
-        at = np.linspace(0.0, 1.0, _N_POINTS + 1)
-        steps = [np.abs(one(at, np.full_like(at, 0.5))) for one in self.profile.open]
-        return float((self._widths(at) + np.max(steps, axis=0, initial=0.0)).max())
+        """Widest place over the mean width."""
+        return float(self._widths(np.linspace(0.0, 1.0, _N_POINTS + 1)).max())
 
-    def _limits(self, x: Floats, k: int = 0, step: float = 0.0) -> tuple[Floats, Floats]:
-        missing = 1.0 - np.minimum(self._widths(self.part_x.on_whole(x), k, step) / self._widest, 1.0)
+    def _limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
+        """The outline, or the one within by the strip of a component."""
+        at = self.part_x.on_whole(x)
+        strip = 0.0 if inside is None else _STRIP_SDS * np.abs(self._step(at, inside))
+        missing = 1.0 - (np.minimum(self._widths(at), self._widest) - strip) / self._widest
         low, high = {
             ("free", True): (0.5 * missing, 1.0 - 0.5 * missing),
             ("free", False): (missing, np.ones_like(missing)),
         }.get((self.ends_y[0], self.ends_y[1] == "free"), (np.zeros_like(missing), 1.0 - missing))
         return low, high
 
-    def _widths(self, at: Floats, k: int = 0, step: float = 0.0) -> Floats:
-        """Widths over their mean, with a step of what is open."""
+    def _widths(self, at: Floats) -> Floats:
+        """Expected widths over their mean."""
         assert self.profile is not None
-        middle = np.full_like(at, 0.5)
-        widths = 1.0 + self.profile.expected(at, middle)
-        return np.asarray(widths + step * self.profile.open[k](at, middle) if step else widths)
+        return 1.0 + self.profile.expected(at, np.full_like(at, 0.5))
+
+    def _step(self, at: Floats, k: int) -> Floats:
+        """Widths over their mean that one step of a component gains."""
+        assert self.profile is not None
+        return self.profile.components[k](at, np.full_like(at, 0.5))
 
 
 def _profile(board: Board) -> FieldProfile | None:
     """What the board's readings tell of its width along it; None where they have no places."""
     width, length = board.inputs["length_y"], board.inputs["length_x"]
     read = width_readings(width, length)
-    return None if read is None else field_profile(conditioned(read), held_in(board), 1, width.is_exact)
+    return None if read is None else field_profile(conditioned(read), held_in(board), 1, mean_is_known=True)

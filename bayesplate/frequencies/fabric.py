@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.frequencies.terms import along_grain
-from bayesplate.modes.fields import Fabric, Field, Group, Moved, layout
+from bayesplate.modes.fields import EdgeStrip, Fabric, Field, Group, layout
 from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import shear_groups
 from bayesplate.modes.thin import thin_groups
@@ -120,7 +120,7 @@ def _order(joined: Joined) -> int:
     return sum(one.order for one in joined)
 
 
-def _fields(joined: Joined) -> tuple[Field | Moved | None, ...]:
+def _fields(joined: Joined) -> tuple[Field | EdgeStrip | None, ...]:
     return tuple(one.field for one in joined)
 
 
@@ -128,14 +128,14 @@ def _weight(joined: Joined, values: Values) -> Floats:
     return reduce(np.multiply, (one.weight(values) for one in joined if one.weight), np.ones(1))
 
 
-def _times(first: Field | Moved | None, second: Field | Moved | None) -> Field | Moved | None:
+def _times(first: Field | EdgeStrip | None, second: Field | EdgeStrip | None) -> Field | EdgeStrip | None:
     if first is None or second is None:
         return first or second
-    if isinstance(first, Moved):
+    if isinstance(first, EdgeStrip):
         first, second = second, first
-    if isinstance(first, Moved):
-        raise ValueError("fields: wanted one outline that moves, got two")
-    if isinstance(second, Moved):
+    if isinstance(first, EdgeStrip):
+        raise ValueError("fields: wanted one strip along the outline, got two")
+    if isinstance(second, EdgeStrip):
         return replace(second, field=_product(first, second.field))
     return _product(first, second)
 
