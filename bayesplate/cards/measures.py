@@ -31,7 +31,9 @@ DENSITY = Number(1, 30_000, "kg/m3", "in kg/m3: 1 g/cm3 is 1000 kg/m3")
 
 @dataclass(frozen=True)
 class QuantityReader:
-    """Reads a quantity: a number, { mean, sd }, a list of readings, or { readings, resolution, at_x_mm, at_y_mm, place_sd_mm }.
+    """Reads a quantity: a number, { mean, sd }, a list of readings, or a table of readings with what is said of them.
+
+    That table is { readings, resolution, at_x_mm, at_y_mm, place_sd_mm }.
 
     `places` names the coordinates that readings of this quantity may (and then must) have, and with them an uncertainty
     of the places; `furthest` is the ratio up

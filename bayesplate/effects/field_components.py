@@ -101,6 +101,7 @@ def field_profile(found: ConditionedField, held: tuple[Held, ...], power: int, m
     mean_is_known : bool
         Whether the mean is no parameter, so that nothing can go with it.
     """
+
     def surface(coefficients: Floats) -> Surface:
         return Surface(found.degrees, tuple(float(one) for one in coefficients))
 

@@ -32,8 +32,8 @@ class OutlineProfile(Effect):
     """The energies of the true outline: a width W (w0(s) + sum z_k psi_k(s)), s from 0 to 1 along the whole board.
 
     The widths read at stations condition a random field (`FieldProfile`): w0 is what is expected, with a mean of one,
-    and enters exactly; what is open enters to first order, as the energies of a strip along the edge, which gain or lose
-    weight.
+    and enters exactly; what is open enters to first order, as the energies of a strip along the edge, which gain or
+    lose weight.
 
     The functions are those of the rectangle as wide as the widest place; what lies outside the outline is all but
     removed. Where both edges along x are free the board is taken to narrow from both alike (readings of a width do not

@@ -1,4 +1,4 @@
-"""Thickness profile: the board is thicker in some places than in others, as readings tell, or as a taper to be found."""
+"""Thickness profile: the board is thicker in some places than in others, as read, or as a taper to be found."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss, legder, legval
+from numpy.polynomial.legendre import legder, leggauss, legval
 from numpy.typing import NDArray
 
 from bayesplate.quantities import Quantity
@@ -23,8 +23,8 @@ Degrees = tuple[tuple[int, int], ...]
 
 DEGREE = 5
 """Highest degree of the polynomials, x and y together."""
-LENGTH_SCALES = (0.5, 1.0)
-"""Over which smooth functions vary, as fractions of the sides; both alike probable before the readings."""
+LENGTH_SCALE = 0.5
+"""Over which the field varies, as a fraction of each side."""
 _N_POINTS = 24
 _SPANNED = 1e-9
 _STEPS_AMPLITUDE, _STEPS_SCATTER = np.geomspace(1e-4, 0.2, 27), np.geomspace(1e-5, 0.1, 19)
@@ -161,7 +161,7 @@ def _fractions(places: tuple[float, ...], side: Quantity) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def conditioned(read: PlacedReadings) -> ConditionedField:
-    """The field given its readings: amplitude, scatter and length scale averaged by their probabilities.
+    """The field given its readings, averaged over amplitudes and scatters by their probabilities.
 
     Where the readings do not support a field the small amplitudes are the probable ones, and the field shrinks to
     its mean.
@@ -175,7 +175,7 @@ def conditioned(read: PlacedReadings) -> ConditionedField:
     slopes = [np.zeros(relative.size)] * 2
     for _ in range(_PASSES if any(read.place_sd) else 1):
         moved = sum((sd * slope) ** 2 for sd, slope in zip(read.place_sd, slopes, strict=True))
-        mean, covariance = _averaged(relative, at_places, own + moved, degrees, read)
+        mean, covariance = _averaged(relative, at_places, own + moved, degrees, read.usual)
         slopes = [_design(degrees, x, y, order)[:, 1:] @ mean[1:] for order in ((1, 0), (0, 1))]
     sd = float(np.sqrt(covariance[0, 0]))
     with_mean = covariance[1:, 0] / sd / mean[0]
@@ -190,28 +190,19 @@ def conditioned(read: PlacedReadings) -> ConditionedField:
 
 
 def _averaged(
-    readings: Floats, at_places: Floats, own: Floats, degrees: Degrees, read: PlacedReadings
+    readings: Floats, at_places: Floats, own: Floats, degrees: Degrees, usual: UsualSizes
 ) -> tuple[Floats, Floats]:
-    """Mean and covariance of all coefficients, the constant first, over amplitudes, scatters and length scales."""
-    found = [
-        (spanned, *_regressed(readings, at_places, own, spanned, read.usual))
-        for spanned in (_smooth(degrees, length) for length in LENGTH_SCALES)
-    ]
-    highest = max(float(log_weights.max()) for _, log_weights, _, _ in found)
-    total, first, second = 0.0, np.zeros(len(degrees)), np.zeros((len(degrees),) * 2)
-    for spanned, log_weights, means, covariances in found:
-        weights = np.exp(log_weights - highest)
-        total += float(weights.sum())
-        spread = covariances + means[..., :, None] * means[..., None, :]
-        first += spanned @ np.tensordot(weights, means, axes=weights.ndim)
-        second += spanned @ np.tensordot(weights, spread, axes=weights.ndim) @ spanned.T
-    mean = first / total
-    return mean, second / total - np.outer(mean, mean)
+    """Mean and covariance of all coefficients, the constant first, over amplitudes and scatters."""
+    spanned = _smooth(degrees)
+    log_weights, means, covariances = _regressed(readings, at_places @ spanned, own, usual)
+    weights = np.exp(log_weights - log_weights.max())
+    weights /= weights.sum()
+    mean = np.tensordot(weights, means, axes=2)
+    spread = covariances + (means - mean)[..., :, None] * (means - mean)[..., None, :]
+    return spanned @ mean, spanned @ np.tensordot(weights, spread, axes=2) @ spanned.T
 
 
-def _regressed(
-    readings: Floats, at_places: Floats, own: Floats, spanned: Floats, usual: UsualSizes
-) -> tuple[Floats, Floats, Floats]:
+def _regressed(readings: Floats, design: Floats, own: Floats, usual: UsualSizes) -> tuple[Floats, Floats, Floats]:
     """Regression on the constant and on standard smooth functions, for each amplitude and scatter.
 
     Returns
@@ -219,7 +210,6 @@ def _regressed(
     tuple of arrays
         Log probability (n_a, n_s), mean (n_a, n_s, r) and covariance (n_a, n_s, r, r), the constant first.
     """
-    design = at_places @ spanned
     amplitude, scatter = _STEPS_AMPLITUDE, _STEPS_SCATTER
     variances = own + scatter[:, None] ** 2  # (n_s, n)
     weighted = design / variances[..., None]
@@ -237,20 +227,20 @@ def _regressed(
     priors = (np.log(steps / (1.0 + (steps / scale) ** 2)) for steps, scale in
               ((amplitude[:, None], usual.field), (scatter, usual.scatter)))  # fmt: skip
     mean[..., 0] += 1.0
-    return -0.5 * (misfit + log_size) + sum(priors), mean, covariance
+    return np.asarray(-0.5 * (misfit + log_size) + sum(priors)), mean, covariance
 
 
 @lru_cache(maxsize=8)
-def _smooth(degrees: Degrees, length: float) -> Floats:
+def _smooth(degrees: Degrees) -> Floats:
     """Coefficients of the constant and of independent functions that together vary as smooth ones do: (n, r) array.
 
-    Their covariance is that of exp(-d^2 / (2 length^2)) with the mean over the board taken out; its trace is one, so
-    that the amplitude is the standard deviation over the board.
+    Their covariance is that of exp(-d^2 / (2 LENGTH_SCALE^2)) with the mean over the board taken out; its trace is one,
+    so that the amplitude is the standard deviation over the board.
     """
     points, weights = leggauss(_N_POINTS)
     at, weights = 0.5 * (points + 1.0), 0.5 * weights
     values = weights * np.stack([legendre(k, at) for k in range(DEGREE + 1)])
-    one = values @ np.exp(-0.5 * ((at[:, None] - at) / length) ** 2) @ values.T
+    one = values @ np.exp(-0.5 * ((at[:, None] - at) / LENGTH_SCALE) ** 2) @ values.T
     i, j = np.array(degrees).T
     across = one[j][:, j] if j.any() else 1.0
     covariance = (one[i][:, i] * across)[1:, 1:]

@@ -155,7 +155,8 @@ def exact_models(
 
     The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies of a bare plate are homogeneous in
     the rigidities, so a common factor needs no training, and side lengths only rescale the same terms. Parameters of
-    effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of the box.
+    effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
+    the box.
 
     Parameters
     ----------
