@@ -21,8 +21,9 @@ from bayesplate.plate.setup import Ends, Setup
 _SOURCE = "normal: what the readings leave open of a smooth width, in standard deviations"
 _GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")
 _N_POINTS = 400
-_STRIP_SDS = 5.0
-"""Width of the strip in steps of a component: fewer, and it could weigh less than nothing."""
+_STRIP_SDS, _FURTHEST = 3.0, 2.94
+"""Width of the strip in steps of a component, and the steps at which a component ends: there the strip still weighs
+something, and beyond less than nothing."""
 _FIRST_ORDER_ALONE = 2
 """Order of smallness at which what an outline gains is counted: its second is left out, and so are products with it."""
 
@@ -134,7 +135,8 @@ class OutlineProfile(Effect):
     def _share(self, values: Values, k: int) -> Floats:
         """Weight of the strip of a component that is gained."""
         assert self.profile is not None
-        return self.value(values, self.parameters()[k].key) / _STRIP_SDS
+        steps = self.value(values, self.parameters()[k].key)
+        return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / _STRIP_SDS)
 
     def _direction(self, x: Floats, y: Floats, k: int) -> Floats:
         """Where a component widens the board, 1, and where it narrows it, -1."""

@@ -21,7 +21,7 @@ from bayesplate.quantities import Quantity
 Floats = NDArray[np.float64]
 Degrees = tuple[tuple[int, int], ...]
 
-DEGREE = 5
+DEGREE = 6
 """Highest degree of the polynomials, x and y together."""
 LENGTH_SCALE = 0.5
 """Over which the field varies, as a fraction of each side."""
