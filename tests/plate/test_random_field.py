@@ -78,16 +78,16 @@ def test_conditioning_is_that_of_a_gaussian_process():
     weights = np.linalg.solve(noise, np.ones(10))
     mean = weights @ readings / weights.sum()
     middle = kernel[10, :10] @ np.linalg.solve(noise, readings - mean)
-    assert found.mean == pytest.approx(mean, abs=1e-4)
+    assert found.mean == pytest.approx(mean, abs=2e-4)
     assert found.sd == pytest.approx(weights.sum() ** -0.5, rel=0.02)
-    assert found.mean * course(found)(np.array(0.5), np.array(0.5)) == pytest.approx(middle, abs=2e-4)
+    assert found.mean * course(found)(np.array(0.5), np.array(0.5)) == pytest.approx(middle, abs=5e-4)
     assert abs(middle) > 1e-3
 
 
 def test_what_rounding_explains_shrinks_to_a_uniform_board():
-    """Readings that differ by half the step to which they are rounded, and the same without rounding."""
+    """Readings that differ by a quarter of the step to which they are rounded, and the same without rounding."""
     values = [4.7, 4.7, 4.75, 4.75, 4.8] * 2
-    coarse, fine = (conditioned(read(values, resolution=r)) for r in (0.2, 0.001))
+    coarse, fine = (conditioned(read(values, resolution=r)) for r in (0.4, 0.001))
     assert course(coarse).size < 0.3 * course(fine).size
     alike = conditioned(read([4.7] * 10, resolution=1e-3))
     assert course(alike).size < 1e-6
@@ -104,12 +104,14 @@ def test_each_reading_is_rounded_on_its_own():
 
 
 def test_doubtful_places_leave_more_open_where_the_field_is_steep():
-    readings = 4.7 * curved(AT_X, AT_Y)
-    steep = [conditioned(read(readings, resolution=0.01, place_sd=sd)) for sd in ((0.0, 0.0), (0.05, 0.05))]
-    level = [conditioned(read([4.7] * 10, resolution=0.01, place_sd=sd)) for sd in ((0.0, 0.0), (0.05, 0.05))]
-    steep_sd, level_sd = ([np.sqrt(np.trace(one.covariance)) for one in pair] for pair in (steep, level))
-    assert steep_sd[1] > 1.05 * steep_sd[0]
-    assert level_sd[1] == pytest.approx(level_sd[0], rel=1e-3)
+    readings = 4.7 * (1.0 + 0.2 * (GRID[0] - 0.5))
+    level = np.full(readings.size, 4.7)
+    for values, factor in ((readings, 2.0), (level, 1.0)):
+        exact, doubtful = (
+            np.trace(conditioned(read(values, *GRID, resolution=0.01, place_sd=sd)).covariance) ** 0.5
+            for sd in ((0.0, 0.0), (0.05, 0.05))
+        )
+        assert doubtful > factor * exact if factor > 1.0 else doubtful == pytest.approx(exact, rel=1e-3)
 
 
 def test_a_place_error_counts_by_the_slope():
