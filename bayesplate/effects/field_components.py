@@ -8,7 +8,7 @@ frequency sees.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -171,7 +171,7 @@ def field_parameters(effect: Effect, profile: FieldProfile, source: str) -> tupl
     """The components' parameters: standard normal, zero where the profile is the expected one."""
     standard = Quantity.from_mean(0.0, 1.0, "normal")
     return tuple(
-        effect.parameter(f"field_{k}", standard, "1", 0.0, source, f"component {k}")
+        replace(effect.parameter(f"field_{k}", standard, "1", 0.0, source, f"component {k}"), is_component=True)
         for k in range(1, len(profile.components) + 1)
     )
 

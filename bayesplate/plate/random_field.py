@@ -227,7 +227,7 @@ def _regressed(readings: Floats, design: Floats, own: Floats, usual: UsualSizes)
     priors = (np.log(steps / (1.0 + (steps / scale) ** 2)) for steps, scale in
               ((amplitude[:, None], usual.field), (scatter, usual.scatter)))  # fmt: skip
     mean[..., 0] += 1.0
-    return np.asarray(-0.5 * (misfit + log_size) + sum(priors)), mean, covariance
+    return np.asarray(-0.5 * (misfit + log_size) + sum(priors)), mean, np.asarray(covariance)
 
 
 @lru_cache(maxsize=8)
