@@ -15,7 +15,7 @@ from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
 from bayesplate.cards.writing import write_card
 from bayesplate.errors import Fault, InputError
 from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.random_field import conditioned, thickness_readings, width_readings
+from bayesplate.plate.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -262,11 +262,11 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
 
 def _means_of_fields(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """Sizes that were read at places with the mean over the board that their field has; an exact mean stays."""
-    length_x, length_y, thickness = (inputs[name] for name in ("length_x", "length_y", "thickness"))
-    read = {
-        "length_y": width_readings(length_y, length_x),
-        "thickness": thickness_readings(thickness, length_x, length_y),
-    }
+    read: dict[str, PlacedReadings | None] = {}
+    if "length_y" in inputs and inputs["length_y"].has_profile:
+        read["length_y"] = width_readings(inputs["length_y"], inputs["length_x"])
+    if "thickness" in inputs and inputs["thickness"].has_profile:
+        read["thickness"] = thickness_readings(inputs["thickness"], inputs["length_x"], inputs["length_y"])
     found = {name: conditioned(one) for name, one in read.items() if one is not None and not inputs[name].is_exact}
     return {name: replace(inputs[name], mean=field.mean, sd=field.sd) for name, field in found.items()}
 
