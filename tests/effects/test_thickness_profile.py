@@ -16,11 +16,15 @@ from made_boards import board_of
 from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.part import Part
 from bayesplate.effects.thickness_profile import ThicknessProfile
+from bayesplate.frequencies.full import full_log_frequencies
+from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.system import System
 from bayesplate.plate.board import density
 from bayesplate.plate.random_field import Surface
+from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
 
 
 def taper(x, y=0.0):
@@ -191,3 +195,21 @@ def test_a_thickness_read_alike_everywhere_is_uniform():
 def test_reduced_order_model_is_exact(card):
     """The second card has readings at places, the first tapers."""
     assert worst_cents(posed(card, ["thickness_profile"]).posterior.models) < 0.5
+
+
+@pytest.mark.parametrize("z", [-2.9, 2.9])
+def test_the_exact_law_knows_the_mean_thickness_that_the_field_goes_with(z):
+    """A field that goes with its mean alone, and three times as much as the readings say."""
+    prepared = prepare("spruce-free-2R", ["thickness_profile"])
+    effect = ThicknessProfile.of(prepared.board, prepared.board.setups[0])
+    profile = replace(effect.profile, components=(), with_mean=times(effect.profile.with_mean, 3.0))
+    parameters = tuple(one for one in prepared.board.parameters if not one.is_of_effect)
+    problem = pose(
+        replace(prepared.board, parameters=parameters, chosen=(replace(effect, profile=profile),)), prepared.prior
+    )
+    parameters, (model,) = problem.parameters, problem.posterior.models
+    theta = problem.centre.copy()
+    theta[parameters.first_input + parameters.inputs.index("thickness")] = z
+    values = {name: np.ravel(value)[0] for name, value in parameters.values(theta[None, :]).items()}
+    apart = model.log_frequencies(values, "exact")[0] - full_log_frequencies(model, values)
+    assert cents(apart) == pytest.approx(0.0, abs=0.5)
