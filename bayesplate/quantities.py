@@ -6,6 +6,7 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Literal
 
 import numpy as np
@@ -39,6 +40,8 @@ class Quantity:
         Step to which the readings were rounded, in the quantity's unit.
     at_x, at_y : tuple of float
         Places of the readings on the plate, in the unit of the place; one per reading, or empty.
+    place_sd : float
+        Standard deviation of each coordinate of these places, in their unit; 0 if they are as stated.
     """
 
     mean: float
@@ -50,6 +53,7 @@ class Quantity:
     resolution: float = 0.0
     at_x: tuple[float, ...] = ()
     at_y: tuple[float, ...] = ()
+    place_sd: float = 0.0
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.mean):
@@ -112,11 +116,13 @@ class Quantity:
         at_x: Sequence[float] = (),
         at_y: Sequence[float] = (),
         kind: Kind = "log-normal",
+        place_sd: float = 0.0,
     ) -> Quantity:
         """The mean of readings, with sd**2 = s**2 / n + resolution**2 / 12.
 
         The first term is the squared standard error; the second, the rounding error, is not averaged away, because
-        readings of one thing are rounded alike. With one reading only the rounding remains.
+        readings of one thing are rounded alike. With one reading only the rounding remains. Readings at different
+        places are rounded each on its own, and the second term is resolution**2 / (12 n).
 
         Parameters
         ----------
@@ -127,6 +133,7 @@ class Quantity:
         at_x, at_y : sequence of float
             Places of the readings, one each; empty if they have none.
         kind : {"normal", "log-normal"}
+        place_sd : float
             See the class.
         """
         values = tuple(float(value) for value in readings)
@@ -134,10 +141,11 @@ class Quantity:
             raise ValueError("readings: wanted at least one, got none")
         # statistics computes with fractions: equal readings have a variance of exactly zero
         scatter = statistics.variance(values) / len(values) if len(values) > 1 else 0.0
-        sd = math.sqrt(scatter + resolution**2 / 12)
         places_x, places_y = (tuple(float(value) for value in places) for places in (at_x, at_y))
+        n_places = len(set(zip_longest(places_x, places_y)))
+        sd = math.sqrt(scatter + resolution**2 / 12 / (len(values) if n_places > 1 else 1))
         return cls(statistics.mean(values), sd, kind, readings=values, resolution=float(resolution),
-                   at_x=places_x, at_y=places_y)  # fmt: skip
+                   at_x=places_x, at_y=places_y, place_sd=float(place_sd))  # fmt: skip
 
     @classmethod
     def of(cls, stated: Quantity | ArrayLike, kind: Kind = "log-normal") -> Quantity:
@@ -385,6 +393,7 @@ class Quantity:
             self,
             at_x=tuple(place * factor for place in self.at_x),
             at_y=tuple(place * factor for place in self.at_y),
+            place_sd=self.place_sd * factor,
         )
 
 

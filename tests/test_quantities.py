@@ -47,12 +47,23 @@ def test_exact_has_one_value() -> None:
 
 def test_readings_join_standard_error_and_rounding() -> None:
     readings = [3.0, 3.1, 2.9, 3.2]
-    rounded = Quantity.from_readings(readings, resolution=0.1, at_x=[0, 1, 2, 3])
+    rounded = Quantity.from_readings(readings, resolution=0.1)
 
     assert rounded.mean == pytest.approx(3.05)
     assert rounded.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12)
-    assert rounded.has_profile
-    assert not Quantity.from_readings(readings).has_profile
+    assert not rounded.has_profile
+
+
+def test_readings_at_different_places_are_rounded_each_on_its_own() -> None:
+    readings = [3.0, 3.1, 2.9, 3.2]
+    apart = Quantity.from_readings(readings, resolution=0.1, at_x=[0, 1, 2, 3], place_sd=5)
+    together = Quantity.from_readings(readings, resolution=0.1, at_x=[1, 1, 1, 1], at_y=[2, 2, 2, 2])
+
+    assert apart.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12 / 4)
+    assert together.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12)
+    assert apart.has_profile
+    assert apart.scaled(1e-3).place_sd == 5
+    assert apart.with_places_scaled(1e-3).place_sd == pytest.approx(0.005)
 
 
 def test_rounding_is_not_averaged_away() -> None:

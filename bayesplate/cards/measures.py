@@ -22,6 +22,7 @@ MOST_MODES = 200
 WHY_MOST_MODES = "the modes that tell the constants of a thin plate are its first tens"
 _SMALLEST_SHARE = 1e-9
 _COORDINATE = Number(-100_000, 100_000, "mm")
+_PLACE_SD = Number(0, 1000, "mm")
 _ROUNDING = "the number alone if it is exact; a reading rounded to r has sd = r / sqrt(12)"
 
 
@@ -30,9 +31,12 @@ DENSITY = Number(1, 30_000, "kg/m3", "in kg/m3: 1 g/cm3 is 1000 kg/m3")
 
 @dataclass(frozen=True)
 class QuantityReader:
-    """Reads a quantity: a number, { mean, sd }, a list of readings, or { readings, resolution, at_x_mm, at_y_mm }.
+    """Reads a quantity: a number, { mean, sd }, a list of readings, or a table of readings with what is said of them.
 
-    `places` names the coordinates that readings of this quantity may (and then must) have; `furthest` is the ratio up
+    That table is { readings, resolution, at_x_mm, at_y_mm, place_sd_mm }.
+
+    `places` names the coordinates that readings of this quantity may (and then must) have, and with them an uncertainty
+    of the places; `furthest` is the ratio up
     to which readings without places may lie apart; `resolution` is assumed where all readings are alike and none is
     stated.
     """
@@ -70,11 +74,14 @@ class QuantityReader:
             "readings": self._readings if any(key in table for key in self.places) else self._together,
             "resolution": Number(0, self.number.high, self.number.unit),
             **dict.fromkeys(self.places, _read_coordinates),
+            **({"place_sd_mm": _PLACE_SD} if self.places else {}),
         }
         read = read_table(table, readers)
         places = [key for key in self.places if key in read]
         if places and len(places) < len(self.places):
             raise Refusal(Complaint(f"{' and '.join(self.places)} together", f"only {places[0]}"))
+        if "place_sd_mm" in read and not places:
+            raise Refusal(Complaint(f"{' and '.join(self.places)} beside it", "no places", inside=("place_sd_mm",)))
         count = len(read["readings"])
         wrong = [key for key in places if len(read[key]) != count]
         if wrong:
@@ -86,7 +93,7 @@ class QuantityReader:
         """The quantity of readings that are in order, and what the card says of them."""
         assumed = self.resolution if are_alike(readings) else 0.0
         resolution, at_x, at_y = read.get("resolution", assumed), read.get("at_x_mm", ()), read.get("at_y_mm", ())
-        return Quantity.from_readings(readings, resolution, at_x, at_y, self.kind)
+        return Quantity.from_readings(readings, resolution, at_x, at_y, self.kind, read.get("place_sd_mm", 0.0))
 
     def _readings(self, value: object) -> list[float]:
         """Readings of a field: they may lie apart."""

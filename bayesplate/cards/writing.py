@@ -103,6 +103,7 @@ def quantity(one: Quantity, scale: float, place_scale: float = 1.0) -> str:
         further = {"resolution": number(one.resolution, scale)} if one.resolution else {}
         places = {"at_x_mm": one.at_x, "at_y_mm": one.at_y}
         further |= {key: array(number(at, place_scale) for at in values) for key, values in places.items() if values}
+        further |= {"place_sd_mm": number(one.place_sd, place_scale)} if one.place_sd else {}
         return table({"readings": readings, **further}) if further else readings
     if one.is_exact:
         return number(one.mean, scale)

@@ -18,7 +18,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.fields import Field, Group, Outline
+from bayesplate.modes.fields import EdgeStrip, Field, Group, Outline
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import KronSum, Projection, Term, Weights
 from bayesplate.plate.board import Board, Values
@@ -69,14 +69,17 @@ class Variation:
 
     Attributes
     ----------
-    field : Field or None
+    field : Field, EdgeStrip or None
         None is uniform.
     weight : callable or None
         From the values to a number or an (n_draws,) array; None is one.
+    order : int
+        Of smallness: an expansion that ends with the second order leaves out higher ones, and so do products of two.
     """
 
-    field: Field | None
+    field: Field | EdgeStrip | None
     weight: Callable[[Values], Floats] | None = None
+    order: int = 0
 
 
 @dataclass(frozen=True)
@@ -214,6 +217,11 @@ class Effect(ABC):
         The part of E_x alone follows the fields of "along" where there are any, and those of "bending" otherwise.
         """
         return {}
+
+    @property
+    def goes_with(self) -> tuple[str, ...]:
+        """Inputs of the board that its fields follow: another value of them is another plate, not the same scaled."""
+        return ()
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """Whether the two halves of the plate stay alike along x and along y."""

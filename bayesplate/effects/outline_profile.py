@@ -2,30 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Effect, Floats, Scope
+from bayesplate.effects.base import Effect, Floats, Scope, Variation
+from bayesplate.effects.field_components import FieldProfile, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.effects.stations import Stations
-from bayesplate.modes.fields import Outline
-from bayesplate.plate.board import Board, Values, density
+from bayesplate.modes.fields import EdgeStrip, Group, Outline
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD, Parameter
+from bayesplate.plate.random_field import conditioned, width_readings
 from bayesplate.plate.setup import Ends, Setup
 
-_MEAN_POINTS = 2000
+_SOURCE = "normal: what the readings leave open of a smooth width, in standard deviations"
+_GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")
+_N_POINTS = 400
+_STRIP_SDS, _FURTHEST = 3.0, 2.94
+"""Width of the strip in steps of a component, and the steps at which a component ends: there the strip still weighs
+something, and beyond less than nothing."""
+_FIRST_ORDER_ALONE = 2
+"""Order of smallness at which what an outline gains is counted: its second is left out, and so are products with it."""
 
 
 @dataclass(frozen=True)
 class OutlineProfile(Effect):
-    """The energies of the true outline, linear between the stations at which the width was read; no parameter.
+    """The energies of the true outline: a width W (w0(s) + sum z_k psi_k(s)), s from 0 to 1 along the whole board.
+
+    The widths read at stations condition a random field (`FieldProfile`): w0 is what is expected, with a mean of one,
+    and enters exactly; what is open enters to first order, as the energies of a strip along the edge, which gain or
+    lose weight.
 
     The functions are those of the rectangle as wide as the widest place; what lies outside the outline is all but
     removed. Where both edges along x are free the board is taken to narrow from both alike (readings of a width do not
-    say which edge recedes), otherwise from the free one. A board whose mass is given keeps it.
+    say which edge recedes), otherwise from the free one. The mean width is taken to be known apart from the field.
 
     Attributes
     ----------
@@ -33,13 +46,13 @@ class OutlineProfile(Effect):
         Conditions at y0 and y1.
     part_x : Part
         What vibrates of the board along x.
-    stations : Stations or None
-        Widths relative to their mean, at fractions of the whole length.
+    profile : FieldProfile or None
+        Of the width, along x; None: a rectangle.
     """
 
     ends_y: Ends = ("free", "free")
     part_x: Part = WHOLE
-    stations: Stations | None = None
+    profile: FieldProfile | None = None
 
     name: ClassVar[str] = "outline_profile"
     scope: ClassVar[Scope] = "board"
@@ -48,25 +61,31 @@ class OutlineProfile(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> OutlineProfile:
         """The effect with the board's readings of its width."""
-        width, length = board.inputs["length_y"], board.inputs["length_x"]
-        stations = Stations(
-            tuple(at / length.mean for at in width.at_x),
-            (0.0,) * len(width.at_x),
-            tuple(reading / width.mean for reading in width.readings),
-        )
-        return cls(BOARD, setup.ends_y, vibrating_part(board, setup, "x"), stations)
+        profile = _profile(board)
+        is_rectangle = profile is None or profile.is_uniform
+        return cls(BOARD, setup.ends_y, vibrating_part(board, setup, "x"), None if is_rectangle else profile)
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether the card's width was read at stations along the board."""
-        return bool(board.inputs["length_y"].at_x)
+        """Whether the card's width was read at stations along the board, and these support that it varies."""
+        profile = _profile(board)
+        return profile is not None and not profile.is_uniform
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
-        """That readings of the width at stations serve for their mean alone where the effect is not declared."""
-        if cls.name in board.effects or not board.inputs["length_y"].has_profile:
+        """That readings of the width at stations serve for their mean alone, and why."""
+        if not board.inputs["length_y"].has_profile:
             return ()
-        return (f"the length_y was read at several places: its mean is used, the {cls.name} is not part of this model",)
+        told = "the length_y was read at several places: its mean is used"
+        profile = _profile(board)
+        if profile is None or profile.is_uniform:
+            return (f"{told}, their differences support no {cls.name}",)
+        return () if cls.name in board.effects else (f"{told}, the {cls.name} is not part of this model",)
+
+    @classmethod
+    def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
+        """None where the readings say that the board is a rectangle."""
+        return super().candidates(board, setup) if cls.is_implied(board) else ()
 
     def in_setup(self, board: Board, setup: Setup) -> OutlineProfile | None:
         """The same outline in another setup."""
@@ -75,38 +94,64 @@ class OutlineProfile(Effect):
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
         """It needs readings with places, and an edge that is free to recede."""
-        if not cls.is_implied(board):
+        if not board.inputs["length_y"].at_x:
             return "the card gives no widths at stations: length_y_mm = { readings = [..], at_x_mm = [..] }"
         if "free" not in setup.ends_y:
             return "neither y0 nor y1 is free, and a held edge is straight"
         return ""
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """None: the readings say it all."""
-        return ()
+        """The components of what the readings leave open."""
+        return () if self.profile is None else field_parameters(self, self.profile, _SOURCE)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """The halves along x differ; across, only if one edge alone recedes."""
+        if self.profile is None:
+            return True, True
         return False, self.ends_y[0] == self.ends_y[1]
 
     def outline(self) -> Outline | None:
-        """Where the plate begins and ends along y."""
-        return self._limits
+        """Where the plate begins and ends along y, as expected."""
+        return None if self.profile is None else self._limits
 
     def adjusted(self, values: Values) -> Values:
-        """The widest width for the sides of the rectangle, and the density that leaves a given mass as it is."""
-        mean, widest = self._mean_and_widest
-        corrected = {"density": density(values) / mean} if "mass" in values else {}
-        return {**values, "length_y": values["length_y"] * widest, **corrected}
+        """The widest width for the sides of the rectangle; the mass goes with the mean width, which stays."""
+        return values if self.profile is None else {**values, "length_y": values["length_y"] * self._widest}
+
+    def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
+        """What every energy gains at the edges where the outline moves, besides what it is."""
+        if self.profile is None or not self.profile.components:
+            return {}
+        moved = tuple(
+            Variation(
+                EdgeStrip(partial(self._limits, inside=k), partial(self._direction, k=k)),
+                partial(self._share, k=k),
+                _FIRST_ORDER_ALONE,
+            )
+            for k in range(len(self.profile.components))
+        )
+        return dict.fromkeys(_GROUPS, (Variation(None), *moved))
+
+    def _share(self, values: Values, k: int) -> Floats:
+        """Weight of the strip of a component that is gained."""
+        assert self.profile is not None
+        steps = self.value(values, self.parameters()[k].key)
+        return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / _STRIP_SDS)
+
+    def _direction(self, x: Floats, y: Floats, k: int) -> Floats:
+        """Where a component widens the board, 1, and where it narrows it, -1."""
+        return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
     @cached_property
-    def _mean_and_widest(self) -> tuple[float, float]:
-        width = self._widths(np.linspace(0.0, 1.0, _MEAN_POINTS + 1))
-        return float(width.mean()), float(width.max())
+    def _widest(self) -> float:
+        """Widest place over the mean width."""
+        return float(self._widths(np.linspace(0.0, 1.0, _N_POINTS + 1)).max())
 
-    def _limits(self, x: Floats) -> tuple[Floats, Floats]:
-        widest = self._mean_and_widest[1]
-        missing = 1.0 - np.minimum(self._widths(self.part_x.on_whole(x)) / widest, 1.0)
+    def _limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
+        """The outline, or the one within by the strip of a component."""
+        at = self.part_x.on_whole(x)
+        strip = 0.0 if inside is None else _STRIP_SDS * np.abs(self._step(at, inside))
+        missing = 1.0 - (np.minimum(self._widths(at), self._widest) - strip) / self._widest
         low, high = {
             ("free", True): (0.5 * missing, 1.0 - 0.5 * missing),
             ("free", False): (missing, np.ones_like(missing)),
@@ -114,5 +159,18 @@ class OutlineProfile(Effect):
         return low, high
 
     def _widths(self, at: Floats) -> Floats:
-        assert self.stations is not None
-        return self.stations(at, np.zeros_like(at))
+        """Expected widths over their mean."""
+        assert self.profile is not None
+        return 1.0 + self.profile.expected(at, np.full_like(at, 0.5))
+
+    def _step(self, at: Floats, k: int) -> Floats:
+        """Widths over their mean that one step of a component gains."""
+        assert self.profile is not None
+        return self.profile.components[k](at, np.full_like(at, 0.5))
+
+
+def _profile(board: Board) -> FieldProfile | None:
+    """What the board's readings tell of its width along it; None where they have no places."""
+    width, length = board.inputs["length_y"], board.inputs["length_x"]
+    read = width_readings(width, length)
+    return None if read is None else field_profile(conditioned(read), held_in(board), 1, mean_is_known=True)

@@ -1,34 +1,42 @@
-"""Thickness profile: the board is thicker in some places than in others, as measured, or as a taper to be found."""
+"""Thickness profile: the board is thicker in some places than in others, as read, or as a taper to be found."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from math import comb
+from itertools import combinations_with_replacement, permutations
+from math import comb, prod
 from typing import ClassVar
 
+import numpy as np
+
 from bayesplate.effects.base import Effect, Floats, Scope, Variation
+from bayesplate.effects.field_components import FieldProfile, coordinates, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
-from bayesplate.effects.stations import Stations
 from bayesplate.modes.fields import Field, Group
-from bayesplate.plate.board import Board, Values, density
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD, Parameter
+from bayesplate.plate.random_field import conditioned, thickness_readings
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 DEFAULT_TAPER = Quantity.from_mean(0.0, 0.05, "normal")
 _SOURCE = "normal: hand-planed and belt-sanded boards of 3-5 mm differ by 0.1-0.2 mm from end to end, either way"
+_FIELD_SOURCE = "normal: what the readings leave open of a smooth thickness, in standard deviations"
 _POWERS: dict[Group, int] = {"bending": 3, "shear": 1, "mass": 1, "rotary": 3}
 """How each group of terms goes with the thickness."""
+_MOST_FACTORS = 2
+"""Components that a term of the expansion of a power multiplies: with three, terms of third order would be there."""
 
 
 @dataclass(frozen=True)
 class ThicknessProfile(Effect):
-    """Thickness h p(x, y) in stiffness and mass.
+    """Thickness h p(x, y) in stiffness and mass, p with a mean of one over the board.
 
-    With readings at places p is known, and there is no parameter: p goes through the readings (`Stations`) and is
-    relative to their mean, which is the h of the constants. A board whose mass is given keeps it.
+    With readings at places p = p0 + sum z_k phi_k is a random field that they condition (`FieldProfile`): p0 is what is
+    expected, each component phi_k has a standard normal parameter, and one more goes with the mean thickness h itself.
+    Powers of p are expanded to second order in the components, so each product of them is a term of its own.
 
     Without, p = 1 + alpha_x (s - 1/2) + alpha_y (t - 1/2), s and t from 0 to 1 along the whole sides: a taper around
     the mean thickness. Powers of p are polynomials in both tapers, so each power of s and t is a term of its own and
@@ -38,13 +46,13 @@ class ThicknessProfile(Effect):
     ----------
     part_x, part_y : Part
         What vibrates of the board.
-    stations : Stations or None
-        Readings relative to their mean, at fractions of the whole sides; None: free tapers.
+    profile : FieldProfile or None
+        None: free tapers.
     """
 
     part_x: Part = WHOLE
     part_y: Part = WHOLE
-    stations: Stations | None = None
+    profile: FieldProfile | None = None
 
     name: ClassVar[str] = "thickness_profile"
     scope: ClassVar[Scope] = "board"
@@ -54,32 +62,30 @@ class ThicknessProfile(Effect):
     def of(cls, board: Board, setup: Setup) -> ThicknessProfile:
         """The effect with the board's readings where they have places."""
         parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
-        if not cls.is_implied(board):
-            return cls(BOARD, *parts)
-        thickness, length_x, length_y = (board.inputs[n] for n in ("thickness", "length_x", "length_y"))
-        return cls(
-            BOARD,
-            *parts,
-            Stations(
-                tuple(at / length_x.mean for at in thickness.at_x),
-                tuple(at / length_y.mean for at in thickness.at_y),
-                tuple(reading / thickness.mean for reading in thickness.readings),
-            ),
-        )
+        return cls(BOARD, *parts, _profile(board))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether the card's thickness was read at places."""
-        thickness = board.inputs["thickness"]
-        return bool(thickness.at_x and thickness.at_y)
+        """Whether the card's thickness was read at places, and these tell or leave open that it varies."""
+        profile = _profile(board)
+        return profile is not None and not profile.is_uniform
 
     @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
         """That readings of the thickness at places serve for their mean alone where the effect is not declared."""
-        if cls.name in board.effects or not board.inputs["thickness"].has_profile:
+        if not board.inputs["thickness"].has_profile:
             return ()
         told = "the thickness was read at several places: its mean is used"
-        return (f"{told}, the {cls.name} is not part of this model",)
+        if cls.name not in board.effects:
+            return (f"{told}, the {cls.name} is not part of this model",)
+        profile = _profile(board)
+        return (f"{told}, their differences support no {cls.name}",) if profile and profile.is_uniform else ()
+
+    @classmethod
+    def candidates(cls, board: Board, setup: Setup) -> tuple[Effect, ...]:
+        """None where the readings say that the board is equally thick everywhere."""
+        profile = _profile(board)
+        return () if profile is not None and profile.is_uniform else super().candidates(board, setup)
 
     def in_setup(self, board: Board, setup: Setup) -> ThicknessProfile:
         """The same profile on the part of the board that vibrates in another setup."""
@@ -87,28 +93,31 @@ class ThicknessProfile(Effect):
         return replace(self, part_x=part_x, part_y=part_y)
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """None with readings, otherwise the relative growth of the thickness from end to end, along x and along y."""
-        if self.stations is not None:
-            return ()
-        return tuple(
-            self.parameter(f"taper_{axis}", DEFAULT_TAPER, "1", 0.0, _SOURCE, f"taper along {axis}") for axis in "xy"
-        )
+        """The components of the field, or the relative growth of the thickness from end to end, along x and along y."""
+        if self.profile is None:
+            return tuple(
+                self.parameter(f"taper_{axis}", DEFAULT_TAPER, "1", 0.0, _SOURCE, f"taper along {axis}")
+                for axis in "xy"
+            )
+        return field_parameters(self, self.profile, _FIELD_SOURCE)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
-        """Neither half mirrors the other, save across a board that was read along one row only."""
-        return False, self.stations is not None and not self.stations.varies_along_y
+        """Neither half mirrors the other, unless the board is equally thick."""
+        is_uniform = self.profile is not None and self.profile.is_uniform
+        return is_uniform, is_uniform
 
-    def adjusted(self, values: Values) -> Values:
-        """The density that leaves a given mass as it is."""
-        if self.stations is None or "mass" not in values:
-            return values
-        return {**values, "density": density(values) / self.stations.mean}
+    @property
+    def goes_with(self) -> tuple[str, ...]:
+        """The mean thickness, where the field goes with it."""
+        return ("thickness",) if self.profile is not None and self.profile.with_mean is not None else ()
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
-        """Powers of the known profile, or of a taper: (c + a u + b v)^n by the multinomial theorem."""
-        if self.stations is not None:
-            known = {power: (Variation(partial(self._known, power=power)),) for power in (1, 3)}
-            return {group: known[power] for group, power in _POWERS.items()}
+        """Powers of the expanded field, or of a taper: (c + a u + b v)^n by the multinomial theorem."""
+        if self.profile is not None:
+            if self.profile.is_uniform:
+                return {}
+            expanded = {n: self._expanded(n) for n in set(_POWERS.values())}
+            return {group: expanded[n] for group, n in _POWERS.items()}
         fields: dict[tuple[int, int], Field | None] = {
             (i, j): partial(_monomial, i=i, j=j) if i + j else None for i, j in _exponents(max(_POWERS.values()))
         }
@@ -117,6 +126,33 @@ class ThicknessProfile(Effect):
             for group, n in _POWERS.items()
         }
 
+    def _expanded(self, n: int) -> tuple[Variation, ...]:
+        """p^n to second order in the components: p0^(n - k) with each product of k of them."""
+        assert self.profile is not None
+        products = [
+            chosen
+            for k in range(min(n, _MOST_FACTORS) + 1)
+            for chosen in combinations_with_replacement(range(len(self.profile.open)), k)
+        ]
+        return tuple(
+            Variation(partial(self._product, n=n, chosen=chosen), partial(self._share, n=n, chosen=chosen), len(chosen))
+            for chosen in products
+        )
+
+    def _product(self, x: Floats, y: Floats, n: int, chosen: tuple[int, ...]) -> Floats:
+        assert self.profile is not None
+        at = self.part_x.on_whole(x), self.part_y.on_whole(y)
+        factors = [self.profile.open[k](*at) for k in chosen]
+        return prod(factors, start=(1.0 + self.profile.expected(*at)) ** (n - len(chosen)))
+
+    def _share(self, values: Values, n: int, chosen: tuple[int, ...]) -> Floats:
+        """Multinomial coefficient of a product of components times their coordinates."""
+        assert self.profile is not None
+        of_components = [self.value(values, one.key) for one in self.parameters()]
+        at = coordinates(self.profile, values["thickness"], of_components)
+        orderings = len(set(permutations(chosen)))
+        return np.asarray(comb(n, len(chosen)) * orderings * prod((at[k] for k in chosen), start=np.ones(1)))
+
     def _coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
         """Of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
         taper_x, taper_y = self.value(values, "taper_x"), self.value(values, "taper_y")
@@ -124,9 +160,14 @@ class ThicknessProfile(Effect):
         along_x, along_y = taper_x * self.part_x.share, taper_y * self.part_y.share
         return comb(n, i) * comb(n - i, j) * middle ** (n - i - j) * along_x**i * along_y**j
 
-    def _known(self, x: Floats, y: Floats, power: int) -> Floats:
-        assert self.stations is not None
-        return self.stations(self.part_x.on_whole(x), self.part_y.on_whole(y)) ** power
+
+def _profile(board: Board) -> FieldProfile | None:
+    """What the board's readings tell of its thickness; None where they have no places."""
+    thickness, length_x, length_y = (board.inputs[name] for name in ("thickness", "length_x", "length_y"))
+    read = thickness_readings(thickness, length_x, length_y)
+    if read is None:
+        return None
+    return field_profile(conditioned(read), held_in(board), max(_POWERS.values()), thickness.is_exact)
 
 
 def _exponents(degree: int) -> tuple[tuple[int, int], ...]:

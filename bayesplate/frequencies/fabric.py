@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache, reduce
 from itertools import product
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.frequencies.terms import along_grain
-from bayesplate.modes.fields import Fabric, Field, Group, layout
+from bayesplate.modes.fields import EdgeStrip, Fabric, Field, Group, layout
 from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import shear_groups
 from bayesplate.modes.thin import thin_groups
@@ -21,6 +22,9 @@ from bayesplate.plate.setup import Setup
 Floats = NDArray[np.float64]
 
 _GROUPS: tuple[Group, ...] = ("along", "bending", "shear", "mass", "rotary")
+
+HIGHEST_ORDER = 2
+"""Of the smallness of a product of variations that counts."""
 
 _UNIFORM = (Variation(None),)
 
@@ -32,6 +36,7 @@ Joined = tuple[Variation, ...]
 def _joined(effects: tuple[Effect, ...]) -> dict[Group, list[Joined]]:
     """Every variation of one effect with every one of the others, by group; empty where no effect varies anything.
 
+    What is smaller than expansions go is left out.
     Fields and weights are both read from this one list. What an effect does to bending it does along the grain too,
     unless it says otherwise.
     """
@@ -39,7 +44,8 @@ def _joined(effects: tuple[Effect, ...]) -> dict[Group, list[Joined]]:
     if not varying:
         return {}
     whole = [{"along": each.get("bending", _UNIFORM), **each} for each in varying]
-    return {group: list(product(*(each.get(group, _UNIFORM) for each in whole))) for group in _GROUPS}
+    every = {group: product(*(each.get(group, _UNIFORM) for each in whole)) for group in _GROUPS}
+    return {group: [joined for joined in each if _order(joined) <= HIGHEST_ORDER] for group, each in every.items()}
 
 
 def fabric_of(effects: Sequence[Effect]) -> Fabric:
@@ -110,7 +116,11 @@ def _reweighed(base: Weights, effects: Sequence[Effect], values: Values, setup: 
     return reduce(lambda weights, effect: effect.reweigh(weights, values, setup), effects, base)
 
 
-def _fields(joined: Joined) -> tuple[Field | None, ...]:
+def _order(joined: Joined) -> int:
+    return sum(one.order for one in joined)
+
+
+def _fields(joined: Joined) -> tuple[Field | EdgeStrip | None, ...]:
     return tuple(one.field for one in joined)
 
 
@@ -118,7 +128,19 @@ def _weight(joined: Joined, values: Values) -> Floats:
     return reduce(np.multiply, (one.weight(values) for one in joined if one.weight), np.ones(1))
 
 
-def _times(first: Field | None, second: Field | None) -> Field | None:
+def _times(first: Field | EdgeStrip | None, second: Field | EdgeStrip | None) -> Field | EdgeStrip | None:
     if first is None or second is None:
         return first or second
+    if isinstance(first, EdgeStrip):
+        first, second = second, first
+    if isinstance(first, EdgeStrip):
+        raise ValueError("fields: wanted one strip along the outline, got two")
+    if isinstance(second, EdgeStrip):
+        return replace(second, field=_product(first, second.field))
+    return _product(first, second)
+
+
+def _product(first: Field, second: Field | None) -> Field:
+    if second is None:
+        return first
     return lambda x, y: first(x, y) * second(x, y)

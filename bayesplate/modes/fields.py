@@ -26,6 +26,23 @@ Field = Callable[[Floats, Floats], Floats]
 Outline = Callable[[Floats], tuple[Floats, Floats]]
 """Where the plate begins and ends along y, as fractions of its widest width, at points x of [0, 1]."""
 
+
+@dataclass(frozen=True, eq=False)
+class EdgeStrip:
+    """A field on the strip between the plate's outline and a narrower one, and nowhere else.
+
+    Attributes
+    ----------
+    inner : Outline
+        Nowhere beyond the plate's own.
+    field : Field or None
+        None is uniform.
+    """
+
+    inner: Outline
+    field: Field | None = None
+
+
 Group = Literal["along", "bending", "shear", "mass", "rotary"]
 """Terms of a plate that take the same field; "along" is the bending that the modulus along the grain resists."""
 
@@ -53,7 +70,7 @@ class Fabric:
         Whether terms that couple bending and twist, and the two shear strains, join the plate's own.
     """
 
-    fields: Mapping[Group, Sequence[Field | None]] = field(default_factory=dict)
+    fields: Mapping[Group, Sequence[Field | EdgeStrip | None]] = field(default_factory=dict)
     outline: Outline | None = None
     is_turned: bool = False
 
@@ -63,13 +80,22 @@ class Fabric:
         made = {each: self._measure(*each, x, y) for each in {each for pairs in taken.values() for each in pairs}}
         return {group: [made[each] for each in pairs] for group, pairs in taken.items()}
 
-    def _measure(self, factor: Field | None, ghost: float, x: Line, y: Line) -> Measure:
+    def _measure(self, factor: Field | EdgeStrip | None, ghost: float, x: Line, y: Line) -> Measure:
+        if isinstance(factor, EdgeStrip):
+            return self._strip(factor, 1.0 - ghost, x, y)
         uniform = (products(tuple(x.nodes)), products(tuple(y.nodes)))
         if self.outline is not None:
             inside = _inside(x, y, factor, self.outline)
             return (*((_times(1.0 - ghost, along_x), along_y) for along_x, along_y in inside),
                     (_times(ghost, uniform[0]), uniform[1]))  # fmt: skip
         return (uniform,) if factor is None else _over_rectangle(x, y, factor)
+
+    def _strip(self, strip: EdgeStrip, share: float, x: Line, y: Line) -> Measure:
+        if self.outline is None:
+            raise ValueError("fields: wanted an outline that a strip lies along, got none")
+        both = ((share, self.outline), (-share, strip.inner))
+        inside = ((sign, _inside(x, y, strip.field, outline)) for sign, outline in both)
+        return tuple((_times(sign, along_x), along_y) for sign, measure in inside for along_x, along_y in measure)
 
 
 UNIFORM = Fabric()

@@ -15,6 +15,7 @@ from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
 from bayesplate.cards.writing import write_card
 from bayesplate.errors import Fault, InputError
 from bayesplate.plate.parameter import BOARD, Parameter
+from bayesplate.plate.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
@@ -242,7 +243,8 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
     ----------
     name : str
     inputs : dict of Quantity
-        length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), and poisson_xy.
+        length_x, length_y, thickness (m), mass (kg) or density (kg m^-3), and poisson_xy. A thickness or a width that
+        was read at places becomes the mean over the board of the field that the readings tell of.
     setups : sequence of Setup
         What their clamps cover becomes parameters too.
     **more
@@ -252,9 +254,21 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
     -------
     Board
     """
+    inputs = {**inputs, **_means_of_fields(inputs)}
     stated = [Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1]) for key, prior in inputs.items()]
     covered = [parameter for setup in setups for parameter in setup.clamped_parameters]
     return Board(name, (*stated, *covered), tuple(setups), **more)
+
+
+def _means_of_fields(inputs: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """Sizes that were read at places with the mean over the board that their field has; an exact mean stays."""
+    read: dict[str, PlacedReadings | None] = {}
+    if "length_y" in inputs and inputs["length_y"].has_profile:
+        read["length_y"] = width_readings(inputs["length_y"], inputs["length_x"])
+    if "thickness" in inputs and inputs["thickness"].has_profile:
+        read["thickness"] = thickness_readings(inputs["thickness"], inputs["length_x"], inputs["length_y"])
+    found = {name: conditioned(one) for name, one in read.items() if one is not None and not inputs[name].is_exact}
+    return {name: replace(inputs[name], mean=field.mean, sd=field.sd) for name, field in found.items()}
 
 
 def density(values: Values) -> NDArray[np.float64]:

@@ -69,6 +69,8 @@ class Parameter:
         Where the prior comes from; empty if the card states it.
     words : str
         What people call it; empty where that is its key.
+    is_component : bool
+        Whether it means nothing alone, so that a budget counts it together with its effect's other ones.
     """
 
     key: str
@@ -80,6 +82,7 @@ class Parameter:
     replaces: str = ""
     source: str = ""
     words: str = ""
+    is_component: bool = False
 
     @property
     def name(self) -> str:

@@ -170,7 +170,8 @@ def exact_models(
 
     The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies of a bare plate are homogeneous in
     the rigidities, so a common factor needs no training, and side lengths only rescale the same terms. Parameters of
-    effects add the two ends of their own range, each beside an opposite corner of the box.
+    effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
+    the box.
 
     Parameters
     ----------
@@ -187,13 +188,14 @@ def exact_models(
     half_widths = np.zeros(parameters.n_dim)
     half_widths[:2] = np.clip(_BOX_SDS * np.sqrt(np.diagonal(spread)), _NARROWEST, _WIDEST)
     sds = np.sqrt(np.diagonal(covariance))
+    followed = {name for model in models for effect in model.system.effects for name in effect.goes_with}
     boxed = [0, 1]
     alone = []
     for i, parameter in enumerate(parameters.uncertain, start=parameters.first_input):
         if parameter.name == "poisson_xy":
             boxed.append(i)
             half_widths[i] = _BOX_SDS
-        elif parameter.is_of_effect:
+        elif parameter.is_of_effect or parameter.name in followed:
             alone.append(i)
             half_widths[i] = _BOX_SDS * sds[i]
     corners = np.zeros((2 ** len(boxed), parameters.n_dim))

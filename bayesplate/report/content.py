@@ -12,7 +12,7 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.quantities import Quantity
 from bayesplate.report.priors import input_words
 from bayesplate.report.words import effect_sentence
-from bayesplate.results.budget import input_shares
+from bayesplate.results.budget import budget, row_words
 from bayesplate.results.contract import Spread
 from bayesplate.results.summary import Percentile, Summary
 from bayesplate.results.tables import Table, modes_table, peaks_table
@@ -127,15 +127,17 @@ def effect_sentences(summary: Summary) -> list[str]:
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
     """Where the uncertainty of each constant comes from."""
-    shares = input_shares(draws)
+    board = inference.problem.board
+    shares = budget(draws, board)
     alone = dict(zip(CONSTANTS, inference.problem.identifiability.standard_errors, strict=True))
     rows = []
     for name in CONSTANTS:
         entry = summary.elastic[name]
         largest = sorted(shares[name].items(), key=lambda item: -item[1])[:2]
-        board = inference.problem.board
         named = {one.name: input_words(one, board)[0] for one in board.uncertain}
-        told = [f"{named[key]} {percent(share)}" for key, share in largest if share >= 0.05]
+        told = [
+            f"{named.get(key) or row_words(key, board)} {percent(share)}" for key, share in largest if share >= 0.05
+        ]
         both = (f"{two_digits(entry.sd / entry.mean, 100)} %", f"{two_digits(alone[name], 100)} %")
         rows.append((name, *both, ", ".join(told) or MISSING))
     columns = ("constant", "sd", "from the expected noise alone", "share of the variance from inputs")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.plate.board import Board
@@ -26,6 +27,39 @@ def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
     return shares
 
 
+def budget(draws: Draws, board: Board) -> dict[str, dict[str, float]]:
+    """Share of the variance of the logarithm of each modulus that goes with each row of the budget, 0 to 1.
+
+    A row is an uncertain input, as in `input_shares`, or an effect whose components mean nothing alone: theirs is the
+    part of the variance that a regression on all of them explains.
+    """
+    together: dict[str, list[str]] = {}
+    for one in board.uncertain:
+        if one.is_component:
+            together.setdefault(one.effect, []).append(one.name)
+    components = {name for names in together.values() for name in names}
+    shares = input_shares(draws)
+    for modulus, values in draws.moduli.items():
+        kept = {name: share for name, share in shares[modulus].items() if name not in components}
+        shares[modulus] = kept | {
+            effect: _explained(np.log(values).ravel(), np.column_stack([draws.inputs[name].ravel() for name in names]))
+            for effect, names in together.items()
+        }
+    return shares
+
+
+def row_words(row: str, board: Board) -> str:
+    """What people call a row of the budget."""
+    return next((one.words for one in board.uncertain if one.name == row), row.replace("_", " "))
+
+
+def _explained(values: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
+    """Part of the variance of (n,) values that a regression on (n, k) columns explains."""
+    about, centred = values - values.mean(), columns - columns.mean(axis=0)
+    fitted = centred @ np.linalg.lstsq(centred, about, rcond=None)[0]
+    return float(fitted @ fitted / (about @ about))
+
+
 def prior_remarks(draws: Draws, prior: PriorCard) -> list[str]:
     """One sentence on the constants whose posterior is more than half as wide as their prior, or none."""
     drawn = {**draws.moduli, **draws.rigidities}
@@ -40,15 +74,15 @@ def prior_remarks(draws: Draws, prior: PriorCard) -> list[str]:
 
 def input_remarks(draws: Draws, board: Board) -> list[str]:
     """One sentence per input that makes more than half of the uncertainty of a modulus."""
-    shares = input_shares(draws)
+    shares = budget(draws, board)
     sentences = []
-    for name in draws.inputs:
+    for name in next(iter(shares.values())):
         ruled = {modulus: by_input[name] for modulus, by_input in shares.items() if by_input[name] > LARGE_SHARE}
         if ruled:
             least, most = 100 * min(ruled.values()), 100 * max(ruled.values())
             share = f"{most:.0f} %" if most - least < 1 else f"{least:.0f} to {most:.0f} %"
             sentences.append(
                 f"{share} of the uncertainty (variance) of {', '.join(ruled)} comes from the "
-                f"{board.parameter(name).words}: measure it better before anything else"
+                f"{row_words(name, board)}: measure it better before anything else"
             )
     return sentences

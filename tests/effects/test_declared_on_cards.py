@@ -107,20 +107,19 @@ def _half_poisson(parameters: Parameters) -> Parameters:
     return {"nu_xy": 0.5 * (0.4 + parameters["nu_xy"])}
 
 
-def _corners(parameters: Parameters, board: PlantedBoard) -> dict[str, str]:
-    """Thickness read at the four corners, mm."""
+def _grid(parameters: Parameters, board: PlantedBoard) -> dict[str, str]:
+    """Thickness read at nine places by seven, mm: so many that they leave nothing open of a smooth board."""
     L_x, L_y, h = (1e3 * length for length in (board.design.L_x, board.design.L_y, board.design.h))
-    read = [
-        h * (1.0 + sx * parameters["taper_x"] / 2.0 + sy * parameters["taper_y"] / 2.0)
-        for sx in (-1.0, 1.0)
-        for sy in (-1.0, 1.0)
-    ]
-    places = f"at_x_mm = {_numbers(0.0, 0.0, L_x, L_x)}, at_y_mm = {_numbers(0.0, L_y, 0.0, L_y)}"
+    s, t = (at.ravel() for at in np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 7)))
+    read = h * (1.0 + parameters["taper_x"] * (s - 0.5) + parameters["taper_y"] * (t - 0.5))
+    places = f"at_x_mm = {_numbers(*(s * L_x))}, at_y_mm = {_numbers(*(t * L_y))}"
     return {"thickness_mm": f"{{ readings = {_numbers(*read)}, {places} }}"}
 
 
 def _widths(parameters: Parameters, board: PlantedBoard) -> dict[str, str]:
-    read, at = ([1e3 * value for value in parameters[name]] for name in ("widths", "stations"))
+    """Width read at eleven stations, mm."""
+    at = np.linspace(0.0, 1e3 * board.design.L_x, 11)
+    read = np.interp(at, *(1e3 * np.array(parameters[name]) for name in ("stations", "widths")))
     return {"length_y_mm": f"{{ readings = {_numbers(*read)}, at_x_mm = {_numbers(*at)} }}"}
 
 
@@ -180,13 +179,18 @@ CASES: dict[str, Declared] = {
         "air_loading", ALL, _times("density"), _air("full"), fixed=lambda design, size: {"baffle": 1.0}
     ),
     "read thickness": Declared(
-        "thickness_profile", ALL, _times("taper_x"), _corners, fixed=lambda design, size: {"taper_y": 0.02}
+        "thickness_profile", ALL, _times("taper_x"), _grid, fixed=lambda design, size: {"taper_y": 0.02}
     ),
     "free taper": Declared(
         "thickness_profile", ALL, _times("taper_x"),
         values=lambda p, plate: {"taper_x": p["taper_x"], "taper_y": p["taper_y"]},
     ),
-    "outline_profile": Declared("outline_profile", FREE_SIDES, _half_cut, _widths),
+    "outline_profile": Declared(
+        "outline_profile", FREE_SIDES, _half_cut, _widths,
+        fixed=lambda design, size: {
+            "stations": (0.0, design.L_x), "widths": (design.L_y, design.L_y * (1.0 - size * design.nominal["outline"]))
+        },
+    ),
     "density_gradient": Declared(
         "density_gradient", ALL, _times("gradient"), values=lambda p, plate: {"gradient": p["gradient"]}
     ),

@@ -14,27 +14,39 @@ from generator.plate import FINE_SHEAR
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
+from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.outline_profile import OutlineProfile
-from bayesplate.effects.stations import Stations
 from bayesplate.effects.thickness_profile import ThicknessProfile
+from bayesplate.plate.board import density
 from bayesplate.plate.parameter import BOARD
+from bayesplate.plate.random_field import Surface
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
 
 BENT = ((0.0, 0.3, 0.6, 1.0), (0.97, 1.02, 1.01, 1.0))
 CUT = ((0.0, 0.25, 0.5, 0.75, 1.0), (1.0, 1.0, 1.0, 0.972, 0.899))
 """Relative widths at fractions of the length; the second as measured on a free board."""
+FINELY = np.linspace(0.0, 1.0, 41)
+DEGREES = tuple((k, 0) for k in range(1, 5))
 
 
-def outline(plate, stations, widths):
+def course(stations, widths):
+    """The polynomial through widths, over its mean."""
+    powers = np.polynomial.Legendre.fit(stations, widths, len(stations) - 1, domain=[0.0, 1.0]).coef
+    relative = powers[1:] / powers[0] / np.sqrt(2.0 * np.arange(1, powers.size) + 1.0)
+    return Surface(DEGREES, tuple(np.pad(relative, (0, len(DEGREES) - relative.size))))
+
+
+def outline(plate, stations, widths, components=(), mean=1.0):
     ends = plate.edges["y0"], plate.edges["y1"]
-    return OutlineProfile(BOARD, ends, stations=Stations(stations, (0.0,) * len(stations), widths))
+    return OutlineProfile(BOARD, ends, profile=FieldProfile(course(stations, widths), None, components, mean, 0.0))
 
 
-def independent(plate, stations, widths):
-    return generator.effects.OutlineProfile(
-        tuple(s * plate.L_x for s in stations), tuple(w * plate.L_y for w in widths)
-    )
+def independent(plate, stations, widths, steps=()):
+    """Straight between many stations; `steps` are surfaces that the width gains, over its mean."""
+    relative = 1.0 + sum(one(FINELY, np.full_like(FINELY, 0.5)) for one in (course(stations, widths), *steps))
+    return generator.effects.OutlineProfile(tuple(FINELY * plate.L_x), tuple(relative * plate.L_y))
 
 
 PROFILES = {"taper": ((0.0, 1.0), (1.01, 0.99)), "bent": BENT, "cut": CUT}
@@ -103,25 +115,75 @@ def test_the_free_edge_recedes_where_the_other_is_held():
 
 def test_thickness_and_outline_together():
     thick = generator.effects.ThicknessProfile(0.1, 0.06)
-    corners = ((0.0, 0.0, 1.0, 1.0), (0.0, 1.0, 0.0, 1.0))
-    readings = tuple(1 + 0.1 * (a - 0.5) + 0.06 * (b - 0.5) for a, b in zip(*corners, strict=True))
-    level = ((0.0, 0.5, 1.0), (0.98, 1.0, 0.97))  # the widest is the card's, so both count y alike
-    effects = [outline(FREE, *level), ThicknessProfile(stations=Stations(*corners, readings))]
-    found = hertz(FREE, effects, {}, 6)
+    surface = Surface(((1, 0), (0, 1)), (0.1 / np.sqrt(12.0), 0.06 / np.sqrt(12.0)))
+    tapered = ThicknessProfile(profile=FieldProfile(surface, None, (), FREE.h, 0.0))
+    level = ((0.0, 0.5, 1.0), (0.98, 1.0, 0.97))
+    found = hertz(FREE, [outline(FREE, *level), tapered], {}, 6)
     other = solve_generator(FREE, (thick, independent(FREE, *level)), 9).frequencies[3:]
     assert 1200 * np.log2(found / other) == pytest.approx(0.0, abs=0.5)
 
 
+STEP = Surface(DEGREES, (1e-3, -2e-3, 1.5e-3, -1e-3))
+"""As large as the largest component of a measured board, and as crooked."""
+
+
+@pytest.mark.parametrize(
+    ("plate", "is_sheared"),
+    [(FINNISH, False), (FREE, False), pytest.param(FREE, True, marks=pytest.mark.slow)],
+    ids=["cantilever", "free", "free and shear-flexible"],
+)
+@pytest.mark.parametrize("steps", [-2.0, 2.0])
+def test_what_is_open_to_first_order_against_the_generator(plate, is_sheared, steps):
+    """At two standard deviations an eighth of the shift is missed at most, a cent."""
+    effect = outline(plate, *CUT, components=(STEP,))
+    moved = [independent(plate, *CUT, steps=[scaled(STEP, steps)])]
+    found, ignored = (
+        hertz_apart(plate, [effect], {"outline_profile.field_1": at}, moved, 6, is_sheared) for at in (steps, 0.0)
+    )
+    assert np.abs(found).max() < 1.0
+    assert np.abs(found).max() < np.abs(ignored).max() / 8.0
+    assert np.abs(ignored).max() > 5.0
+
+
+def test_no_step_leaves_the_edge_weighing_less_than_nothing():
+    """A posterior may go where its prior hardly does: frequencies stay what they are there."""
+    effect = outline(FREE, *CUT, components=(STEP,))
+    far = {at: hertz(FREE, [effect], {"outline_profile.field_1": at}, 6) for at in (-20.0, -2.94, 2.94, 20.0)}
+    assert far[-20.0] == pytest.approx(far[-2.94], rel=1e-9)
+    assert far[20.0] == pytest.approx(far[2.94], rel=1e-9)
+    cents = 1200 * np.log2(far[-20.0] / hertz(FREE, [outline(FREE, *CUT)], {}, 6))
+    assert 1.0 < np.abs(cents).max() < 20.0
+
+
+def scaled(surface, factor):
+    return replace(surface, coefficients=tuple(factor * one for one in surface.coefficients))
+
+
 def test_a_given_mass_is_kept():
     setup = setup_of(FREE)
-    readings = Quantity.from_readings([0.217, 0.217, 0.195], 0.0, [0.0, 0.435, 0.58])
+    readings = Quantity.from_readings([0.217, 0.217, 0.195], 0.001, [0.0, 0.435, 0.58])
     board = board_of(ritz.FREE_SPRUCE, [setup], length_y=readings, mass=Quantity.exact(0.25))
     values = board.nominal() | {n: v for n, v in values_of(FREE, {}).items() if n.startswith("D_")}
-    adjusted = OutlineProfile.of(board, setup).adjusted(values)
+    effect = OutlineProfile.of(board, setup)
+    at = (np.arange(500) + 0.5) / 500
+    low, high = effect.outline()(at)
 
-    area = 0.435 * 0.217 + 0.145 * (0.217 + 0.195) / 2
-    assert adjusted["density"] * area * 4.7e-3 == pytest.approx(0.25, rel=1e-3)
-    assert adjusted["length_y"] == pytest.approx(0.217)
+    adjusted = effect.adjusted(values)
+    area = 0.58 * float(adjusted["length_y"]) * np.mean(high - low)
+    assert density(values) * area * 4.7e-3 == pytest.approx(0.25, rel=1e-4)
+    assert (high - low).max() == pytest.approx(1.0, abs=1e-6)
+    assert 0.205 < float(values["length_y"]) < float(adjusted["length_y"])
+
+
+def test_widths_that_were_read_alike_leave_a_rectangle():
+    board = prepare("spruce-free-2R", ["outline_profile"]).board
+    (setup,) = board.setups
+    effect = OutlineProfile.of(board, setup)
+    assert (effect.outline(), effect.parameters(), effect.variations()) == (None, (), {})
+    assert effect.keeps_symmetry() == (True, True)
+    assert not OutlineProfile.is_implied(board)
+    assert OutlineProfile.candidates(board, setup) == ()
+    assert any("support no outline_profile" in one for one in OutlineProfile.notes(board))
 
 
 def test_refuses_what_it_cannot_do():

@@ -13,14 +13,18 @@ from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
+from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.part import Part
-from bayesplate.effects.stations import Stations
 from bayesplate.effects.thickness_profile import ThicknessProfile
+from bayesplate.frequencies.full import full_log_frequencies
+from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.system import System
+from bayesplate.plate.board import density
+from bayesplate.plate.random_field import Surface
+from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
-
-CORNERS = ((0.0, 0.0, 1.0, 1.0), (0.0, 1.0, 0.0, 1.0))
+from bayesplate.workflow.prepare import prepare
 
 
 def taper(x, y=0.0):
@@ -70,62 +74,142 @@ def test_taper_of_a_beam_to_first_order_by_hand():
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
 def test_a_uniform_profile_is_the_constant_plate(is_sheared):
-    uniform = ThicknessProfile(stations=Stations(*CORNERS, (1.0,) * 4))
+    uniform = ThicknessProfile(profile=fixed((0.0, 0.0)))
     assert hertz_apart(FREE, [uniform], {}, [], 6, is_sheared) == pytest.approx(
         hertz_apart(FREE, [], {}, [], 6, is_sheared), abs=0.01
     )
+    assert uniform.profile.is_uniform
+    assert uniform.variations() == {}
+    assert uniform.keeps_symmetry() == (True, True)
 
 
 @pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-def test_stations_at_the_corners_are_the_taper(is_sheared):
-    x, y = CORNERS
-    stations = Stations(x, y, tuple(1 + 0.1 * (a - 0.5) + 0.06 * (b - 0.5) for a, b in zip(x, y, strict=True)))
+def test_an_expected_taper_is_the_taper(is_sheared):
+    effect = ThicknessProfile(profile=fixed((0.1, 0.06)))
     independent = generator.effects.ThicknessProfile(0.1, 0.06)
-    apart = hertz_apart(FREE, [ThicknessProfile(stations=stations)], {}, [independent], 6, is_sheared)
-    assert apart == pytest.approx(0.0, abs=0.5)
+    assert hertz_apart(FREE, [effect], {}, [independent], 6, is_sheared) == pytest.approx(0.0, abs=0.5)
 
 
-def test_a_measured_profile_against_the_generator():
-    """Readings at ten places, as on the measured free boards; the generator takes the same h(x, y) as a function."""
+def test_an_expected_profile_counts_the_part_under_the_clamp():
+    whole = replace(FINNISH, covered=0.03, whole=0.253)
+    effect = ThicknessProfile(part_x=Part(0.03 / 0.253, 0.223 / 0.253), profile=fixed((0.2, 0.0)))
+    independent = generator.effects.ThicknessProfile(0.2)
+    assert hertz_apart(whole, [effect], {}, [independent], 6) == pytest.approx(0.0, abs=0.5)
+
+
+def read_as_on_the_measured_boards():
     x, y = np.tile(np.linspace(0, 1, 5), 2), np.repeat([0.0, 1.0], 5)
-    readings = 1.0 + np.array([4, -2, 3, 1, -5, -3, -4, 6, 5, -2]) / 100
-    stations = Stations(tuple(x), tuple(y), tuple(readings))
-    bent = replace(FREE, thickness=(lambda s, t: stations(s / FREE.L_x, t / FREE.L_y),))
-    independent = solve_generator(bent, (), 9, (22, 16)).frequencies[3:]
-
-    cents = 1200 * np.log2(hertz(FREE, [ThicknessProfile(stations=stations)], {}, 6) / independent)
-
-    assert cents == pytest.approx(0.0, abs=0.5)
-    assert np.abs(shifts(FREE, [ThicknessProfile(stations=stations)], {}, [(1, 1), (2, 0), (0, 2)])).max() > 3.0
+    readings = FREE.h + np.array([4, -2, 3, 1, -5, -3, -4, 6, 5, -2]) * 4e-5
+    thickness = Quantity.from_readings(readings, 1e-4, x * FREE.L_x, y * FREE.L_y)
+    return board_of(ritz.FREE_SPRUCE, [setup_of(FREE)], thickness=thickness)
 
 
-def test_stations_go_through_their_readings_and_on_for_half_a_step():
-    row = Stations((0.2, 0.4, 0.8), (0.5, 0.5, 0.5), (1.0, 1.2, 1.0))
-    at = np.array([0.0, 0.1, 0.2, 0.3, 0.8, 0.9, 1.0])
-    assert row(at, np.full(7, 0.9)) == pytest.approx([0.9, 0.9, 1.0, 1.1, 1.0, 0.95, 0.9])
-    plane = Stations((0.1, 0.9, 0.3, 0.6), (0.2, 0.1, 0.9, 0.7), tuple(1 + a - 2 * b for a, b in
-                     ((0.1, 0.2), (0.9, 0.1), (0.3, 0.9), (0.6, 0.7))))  # fmt: skip
-    assert plane(np.array([0.5]), np.array([0.5])) == pytest.approx(0.5)
+def test_a_read_field_against_the_generator():
+    """What readings expect and leave open, at two standard deviations of everything at once: the expansion ends there.
+
+    The generator takes the whole field as a function.
+    """
+    board = read_as_on_the_measured_boards()
+    effect = ThicknessProfile.of(board, board.setups[0])
+    mean, sd = effect.profile.mean, effect.profile.mean_sd
+    assert len(effect.profile.components) == 2
+    assert effect.goes_with == ("thickness",)
+    apart = []
+    for z_mean, *z in ((0.0, 0.0, 0.0), (2.0, 2.0, 2.0), (-2.0, 2.0, -2.0), (2.0, -2.0, -2.0)):
+        thick = replace(FREE, h=mean + z_mean * sd)
+        field = added(effect.profile, [z_mean, *z])
+        bent = replace(thick, thickness=(lambda s, t, field=field: 1.0 + field(s / FREE.L_x, t / FREE.L_y),))
+        independent = solve_generator(bent, (), 9, (22, 16)).frequencies[3:]
+        parameters = {f"thickness_profile.field_{k}": one for k, one in enumerate(z, start=1)}
+        apart.append(1200 * np.log2(hertz(thick, [effect], parameters, 6) / independent))
+    assert np.array(apart[0]) == pytest.approx(0.0, abs=0.5)
+    assert np.abs(np.array(apart[1:]) - apart[0]).max() < 0.3
+
+
+class FirstOrder(ThicknessProfile):
+    """The same without products of components."""
+
+    def _expanded(self, n):
+        return tuple(one for one in super()._expanded(n) if one.order < 2)
+
+
+@pytest.mark.parametrize(("kind", "least", "most"), [(ThicknessProfile, 0.0, 0.03), (FirstOrder, 0.5, 3.0)])
+def test_the_expansion_against_the_field_itself(kind, least, most):
+    """At two standard deviations of all that the readings leave open, cents; its first order alone would not do."""
+    board = read_as_on_the_measured_boards()
+    profile = ThicknessProfile.of(board, board.setups[0]).profile
+    worst = 0.0
+    for steps in ((2.0, 2.0, 2.0), (-2.0, 2.0, 2.0), (2.0, -2.0, 2.0)):
+        thick = replace(FREE, h=profile.mean + steps[0] * profile.mean_sd)
+        parameters = {f"thickness_profile.field_{k}": one for k, one in enumerate(steps[1:], start=1)}
+        whole = ThicknessProfile(profile=FieldProfile(added(profile, steps), None, (), thick.h, 0.0))
+        apart = hertz(thick, [kind(profile=profile)], parameters, 6) / hertz(thick, [whole], {}, 6)
+        worst = max(worst, 1200 * np.abs(np.log2(apart)).max())
+    assert least <= worst < most
+
+
+def fixed(tapers):
+    """A known profile: tapers along x and y, without anything open."""
+    per_degree = 1.0 / (2.0 * np.sqrt(3.0))
+    return FieldProfile(Surface(((1, 0), (0, 1)), tuple(taper * per_degree for taper in tapers)), None, (), FREE.h, 0.0)
+
+
+def times(surface, factor):
+    return replace(surface, coefficients=tuple(factor * one for one in surface.coefficients))
+
+
+def added(profile, steps):
+    """The profile moved by steps of what is open."""
+    rows = [profile.expected, *(times(one, step) for one, step in zip(profile.open, steps, strict=True))]
+    return Surface(profile.expected.degrees, tuple(np.sum([one.coefficients for one in rows], axis=0)))
 
 
 def test_a_given_mass_is_kept():
     """Stations that crowd where the board is thick: their mean is not the board's, the mass on the scale is."""
     setup = setup_of(FINNISH)
-    readings = Quantity.from_readings([0.0031, 0.0031, 0.0031, 0.0027], 0.0, [0.0, 0.01, 0.02, 0.223], [0.05] * 4)
+    readings = Quantity.from_readings([3.1e-3, 3.1e-3, 3.1e-3, 2.7e-3], 1e-4, [0.0, 0.01, 0.02, 0.223], [0.05] * 4)
     board = board_of(ritz.FINNISH, [setup], thickness=readings, mass=Quantity.exact(0.036))
     values = board.nominal() | {n: v for n, v in values_of(FINNISH, {}).items() if n.startswith("D_")}
     system = System(setup, (ThicknessProfile.of(board, setup),))
 
     adjusted = system.effects[0].adjusted(values)
-    x = np.linspace(0, 0.223, 4001)
-    h = np.interp(x, readings.at_x, readings.readings)
+    middle = (np.arange(200) + 0.5) / 200
+    h = values["thickness"] * (1.0 + system.effects[0].profile.expected(middle[:, None], middle))
 
-    assert adjusted["density"] * h.mean() * 0.223 * 0.114 == pytest.approx(0.036, rel=1e-3)
+    assert density(adjusted) * h.mean() * 0.223 * 0.114 == pytest.approx(0.036, rel=1e-4)
+    assert float(values["thickness"]) < 0.00299
     assert ThicknessProfile.is_implied(board)
-    assert system.effects[0].parameters() == ()
+
+
+def test_a_thickness_read_alike_everywhere_is_uniform():
+    places = ([0.0, 0.2, 0.4, 0.58], [0.0, 0.2, 0.0, 0.2])
+    board = board_of(ritz.FREE_SPRUCE, [setup_of(FREE)], thickness=Quantity.from_readings([4.7e-3] * 4, 1e-6, *places))
+    effect = ThicknessProfile.of(board, board.setups[0])
+    assert effect.parameters() == ()
+    assert not ThicknessProfile.is_implied(board)
+    assert ThicknessProfile.candidates(board, board.setups[0]) == ()
+    assert "support no thickness_profile" in ThicknessProfile.notes(replace(board, effects=("thickness_profile",)))[0]
 
 
 @pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
 def test_reduced_order_model_is_exact(card):
     """The second card has readings at places, the first tapers."""
     assert worst_cents(posed(card, ["thickness_profile"]).posterior.models) < 0.5
+
+
+@pytest.mark.parametrize("z", [-2.9, 2.9])
+def test_the_exact_law_knows_the_mean_thickness_that_the_field_goes_with(z):
+    """A field that goes with its mean alone, and three times as much as the readings say."""
+    prepared = prepare("spruce-free-2R", ["thickness_profile"])
+    effect = ThicknessProfile.of(prepared.board, prepared.board.setups[0])
+    profile = replace(effect.profile, components=(), with_mean=times(effect.profile.with_mean, 3.0))
+    parameters = tuple(one for one in prepared.board.parameters if not one.is_of_effect)
+    problem = pose(
+        replace(prepared.board, parameters=parameters, chosen=(replace(effect, profile=profile),)), prepared.prior
+    )
+    parameters, (model,) = problem.parameters, problem.posterior.models
+    theta = problem.centre.copy()
+    theta[parameters.first_input + parameters.inputs.index("thickness")] = z
+    values = {name: np.ravel(value)[0] for name, value in parameters.values(theta[None, :]).items()}
+    apart = model.log_frequencies(values, "exact")[0] - full_log_frequencies(model, values)
+    assert cents(apart) == pytest.approx(0.0, abs=0.5)

@@ -56,7 +56,7 @@ def test_every_shipped_board_comes_back(name):
 
 def everything():
     """A board that uses every key of a card."""
-    places = Quantity.from_readings([3.0e-3, 2.9e-3], 1e-4, [0.01, 0.2], [0.05, 0.05])
+    places = Quantity.from_readings([3.0e-3, 2.9e-3], 1e-4, [0.01, 0.2], [0.05, 0.05], place_sd=0.02)
     held = Setup(
         name="held",
         ends_x=("clamped", "free"),

@@ -90,6 +90,16 @@ def test_two_setups_masses_are_two(board):
     assert names["attached_mass"] <= every
 
 
+def test_readings_at_places_are_tried_as_the_components_that_they_leave_open():
+    """Widths that were read alike are no outline to try."""
+    found = forms(prepare("spruce-free-2R", []).board)
+    (form,) = found["thickness_profile"]
+    assert [free.name for free in form.free] == ["thickness_profile.field_1", "thickness_profile.field_2"]
+    assert "outline_profile" not in found
+    (cut,) = forms(prepare("spruce-free-1R", []).board)["outline_profile"]
+    assert [free.name for free in cut.free] == ["outline_profile.field_1"]
+
+
 @pytest.mark.parametrize("n", range(1, 21))
 def test_a_table_stays_small_whatever_the_number_of_parameters(n):
     for cells, most in ((FINE, 256), (COARSE, 27)):

@@ -1,0 +1,183 @@
+"""What is left open of a field over the board, as few independent parameters: those that move frequencies most.
+
+The components are directions of the covariance of the conditioned field (Karhunen and Loeve's expansion), taken in the
+order of what they do to the energies of the lowest products of beam functions. So no parameter is spent on what no
+frequency sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.effects.base import Effect
+from bayesplate.effects.part import Part, vibrating_part
+from bayesplate.modes.element import assembled, element_products, gauss_points
+from bayesplate.modes.line import line
+from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import Parameter
+from bayesplate.plate.random_field import ConditionedField, Degrees, Surface, legendre
+from bayesplate.plate.setup import Ends
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+
+CARRIED = 0.95
+"""Share of the variance of the energies that the components carry, where `MOST` of them can."""
+MOST = 3
+SMALLEST = 5e-4
+"""Root mean square over the board below which a surface is nothing."""
+_N_BEAMS = 4
+_N_ELEMENTS = 12
+_POINTS = 6
+_HELD = 1e-6
+
+
+@dataclass(frozen=True)
+class FieldProfile:
+    """A profile 1 + d(x, y), with no mean of d over the board: what is expected, and what is open.
+
+    Attributes
+    ----------
+    expected : Surface
+    with_mean : Surface or None
+        What d gains where the board's mean is one of its standard deviations higher; None: nothing.
+    components : tuple of Surface
+        What it gains where a parameter of standard normal prior is one.
+    mean, mean_sd : float
+        Of the mean over the board, SI.
+    """
+
+    expected: Surface
+    with_mean: Surface | None
+    components: tuple[Surface, ...]
+    mean: float
+    mean_sd: float
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether there is nothing to be done: no course of the profile, and nothing open."""
+        return self.expected.size < SMALLEST and not self.open
+
+    @property
+    def open(self) -> tuple[Surface, ...]:
+        """Everything that d gains besides what is expected: with the mean first, where it does, then the components."""
+        return self.components if self.with_mean is None else (self.with_mean, *self.components)
+
+
+@dataclass(frozen=True)
+class Held:
+    """How a setup holds the board: its ends, and which part of it vibrates."""
+
+    ends_x: Ends
+    ends_y: Ends
+    part_x: Part
+    part_y: Part
+
+
+def held_in(board: Board) -> tuple[Held, ...]:
+    """How each setup holds the board."""
+    return tuple(
+        Held(one.ends_x, one.ends_y, vibrating_part(board, one, "x"), vibrating_part(board, one, "y"))
+        for one in board.setups
+    )
+
+
+@lru_cache(maxsize=64)
+def field_profile(found: ConditionedField, held: tuple[Held, ...], power: int, mean_is_known: bool) -> FieldProfile:
+    """The profile of a field, with the components that the setups' frequencies see.
+
+    Parameters
+    ----------
+    found : ConditionedField
+    held : tuple of Held
+        One per setup.
+    power : int
+        With which the stiffness goes with the field, the mass going with its first: 3 for a thickness, 1 for a width.
+    mean_is_known : bool
+        Whether the mean is no parameter, so that nothing can go with it.
+    """
+
+    def surface(coefficients: Floats) -> Surface:
+        return Surface(found.degrees, tuple(float(one) for one in coefficients))
+
+    with_mean = np.zeros_like(found.shape) if mean_is_known else found.with_mean
+    if np.linalg.norm(with_mean) < SMALLEST:
+        with_mean = np.zeros_like(found.shape)
+    left = found.covariance - np.outer(with_mean, with_mean)
+    seen = np.concatenate([_energy_shifts(found.degrees, one, power) for one in held])
+    variances, directions = np.linalg.eigh(left)
+    root = directions * np.sqrt(np.maximum(variances, 0.0))
+    _, shifts, turns = np.linalg.svd(seen @ root, full_matrices=False)
+    carried = np.cumsum(shifts**2) / max(float(np.sum(shifts**2)), 1e-300)
+    n_open = min(int(np.searchsorted(carried, CARRIED)) + 1, MOST - bool(with_mean.any()))
+    components = (surface(root @ turn) for turn in turns[:n_open])
+    return FieldProfile(
+        surface(found.shape),
+        surface(with_mean) if with_mean.any() else None,
+        tuple(one for one in components if one.size >= SMALLEST),
+        found.mean,
+        found.sd,
+    )
+
+
+def _energy_shifts(degrees: Degrees, held: Held, power: int) -> Floats:
+    """Relative gain of stiffness less that of mass, to first order, per coefficient: (n_energies, n) array.
+
+    Of each of the three stiffness energies of each product of two beam functions; a frequency's shift is a mean of
+    half of them, whatever the constants.
+    """
+    most = [max(both) for both in zip(*degrees, strict=True)]
+    along = _weighted_energies(held.ends_x, held.part_x, most[0])
+    across = _weighted_energies(held.ends_y, held.part_y, most[1])
+    i, j = np.array(degrees).T
+    rows = []
+    for orders in ((2, 0), (0, 2), (1, 1)):
+        for m in range(_N_BEAMS):
+            for n in range(_N_BEAMS):
+                if np.isfinite(along[orders[0]][0, m] * across[orders[1]][0, n]):
+                    stiffness = along[orders[0]][i, m] * across[orders[1]][j, n]
+                    rows.append(power * stiffness - along[0][i, m] * across[0][j, n])
+    return np.array(rows)
+
+
+@lru_cache(maxsize=32)
+def _weighted_energies(ends: Ends, part: Part, highest: int) -> tuple[Floats, Floats, Floats]:
+    """Means of the polynomials over one side, weighted with X^2, X'^2 and X''^2: (highest + 1, n_beams) arrays.
+
+    Not a number where a rigid motion has no such energy.
+    """
+    side = line(ends, _N_ELEMENTS)
+    at, weights = gauss_points(side.nodes[:-1], np.diff(side.nodes), _POINTS)
+    beams = side.beams[:, :_N_BEAMS]
+    found = np.empty((3, highest + 1, beams.shape[1]))
+    for degree in range(highest + 1):
+        factor = legendre(degree, part.on_whole(at))
+        integrals = assembled(element_products(side.nodes, at, weights * factor))
+        for order in range(3):
+            matrix = integrals[order, order][side.kept][:, side.kept]
+            found[order, degree] = np.einsum("ib,ib->b", beams, matrix @ beams)
+    whole = found[:, 0].copy()
+    whole[whole < _HELD] = np.nan
+    zero, one, two = found / whole[:, None]
+    return zero, one, two
+
+
+def field_parameters(effect: Effect, profile: FieldProfile, source: str) -> tuple[Parameter, ...]:
+    """The components' parameters: standard normal, zero where the profile is the expected one."""
+    standard = Quantity.from_mean(0.0, 1.0, "normal")
+    return tuple(
+        replace(effect.parameter(f"field_{k}", standard, "1", 0.0, source, f"component {k}"), is_component=True)
+        for k in range(1, len(profile.components) + 1)
+    )
+
+
+def coordinates(profile: FieldProfile, mean: Floats, components: Sequence[Floats]) -> list[Floats]:
+    """Standard coordinates of everything that is open: the mean's, where d goes with it, then the components'."""
+    if profile.with_mean is None:
+        return list(components)
+    return [(np.asarray(mean) - profile.mean) / profile.mean_sd, *components]
