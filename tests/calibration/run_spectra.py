@@ -52,7 +52,7 @@ def told(records: Sequence[Record]) -> list[str]:
     for name, (hits, n) in summed.items():
         sure, m = control[name]
         lines.append(f"{name:8s} {hits:4d} of {n:4d} {sure:10d} of {m:4d}")
-    return lines + [f"first error: {failed[0]['error'][:200]}"] if failed else lines
+    return [*lines, "first error: " + failed[0]["error"][:200]] if failed else lines
 
 
 def main() -> int:
