@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _PEAKS_AT, _MODES_AT = 1.0, 0.0
 _LEAST_SEEN = 0.5
-_APART = 0.021
+_APART = 0.026
 """Share of the width that two labels of modes need."""
 
 

@@ -1,0 +1,81 @@
+"""The figure of a spectrum by what is drawn in it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_summaries import SUMMARY
+
+from bayesplate.report.spectrum import spectrum_pictures
+from bayesplate.report.style import BLUE, ORANGE
+from bayesplate.results.modes import Prediction
+from bayesplate.results.peaks import AssignedPeak, Assignment, PredictedMode, Spectrum
+
+
+def peak(hertz, *assignments, spurious=0.0):
+    found = tuple(Assignment(label, share) for label, share in assignments)
+    return AssignedPeak("bench", hertz, None, found, spurious, Prediction(hertz, 0.99 * hertz, 1.01 * hertz), 0.0)
+
+
+def mode(label, hertz, seen):
+    return PredictedMode("bench", label, Prediction(hertz, 0.99 * hertz, 1.01 * hertz), seen)
+
+
+PEAKS = (peak(100.0, ("(1,1)", 0.9), ("(2,0)", 0.1)), peak(180.0, spurious=0.8), peak(260.0, ("(0,2)", 1.0)))
+MODES = (
+    mode("(1,1)", 101.0, 0.9),
+    mode("(2,0)", 102.0, 0.1),
+    mode("(0,2)", 258.0, 1.0),
+    mode("cannot tell", 900.0, 0.0),
+)
+
+
+@pytest.fixture(scope="module")
+def picture():
+    made = replace(SUMMARY, peaks=PEAKS, spectra=(Spectrum("bench", 0.2, 0.02, MODES),))
+    return spectrum_pictures(made)[0]
+
+
+def test_lines_join_peaks_to_the_modes_that_they_may_be(picture):
+    (panel,) = picture.figure.axes
+    joined = {(line.get_xdata()[0], line.get_xdata()[1]): line for line in panel.lines if len(line.get_xdata()) == 2}
+    ends = [pair for pair, line in joined.items() if list(line.get_ydata()) == [1.0, 0.0]]
+
+    assert ends == [(100.0, 101.0), (100.0, 102.0), (260.0, 258.0)]
+    assert joined[100.0, 101.0].get_linewidth() > joined[100.0, 102.0].get_linewidth()
+
+
+def test_a_peak_that_is_no_mode_and_a_mode_without_a_peak_look_otherwise(picture):
+    (panel,) = picture.figure.axes
+    dots = {float(line.get_xdata()[0]): line for line in panel.lines if line.get_marker() in ("v", "o")}
+
+    assert dots[180.0].get_color() == ORANGE
+    assert dots[100.0].get_color() == dots[260.0].get_color() == "black"
+    assert dots[101.0].get_markerfacecolor() == dots[258.0].get_markerfacecolor() == BLUE
+    assert dots[102.0].get_markerfacecolor() == "white"
+    assert 900.0 not in dots
+    assert picture.alt == "3 peaks, 2 of them likely a mode of the plate. Modes without a likely peak: (2,0)."
+
+
+def test_no_two_names_overlap(picture):
+    (panel,) = picture.figure.axes
+    picture.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in panel.texts]
+
+    assert len(boxes) == 6
+    for i, one in enumerate(boxes):
+        for other in boxes[:i]:
+            assert not one.overlaps(other)
+
+
+def test_one_picture_per_setup_with_peaks():
+    assert [one.name for one in spectrum_pictures(SUMMARY)] == ["spectrum"]
+    assert spectrum_pictures(replace(SUMMARY, peaks=(), spectra=())) == []
+    two = tuple(Spectrum(name, 0.2, 0.02, MODES) for name in ("bench", "other"))
+    peaks = (*PEAKS, *(replace(one, setup="other") for one in PEAKS))
+    found = spectrum_pictures(replace(SUMMARY, peaks=peaks, spectra=two))
+    assert [one.name for one in found] == ["spectrum_bench", "spectrum_other"]
+    assert "other" in found[1].title
+    assert np.isfinite(found[1].figure.get_size_inches()).all()
