@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,7 @@ def percent(quantity: Quantity) -> float:
 def exact_inputs(card: str, seed: int, means: Mapping[str, float]) -> dict[str, float]:
     """Standard deviation of each constant, per cent, with every input exact: what the frequencies leave open."""
     prepared = prepare(card)
-    sure = {name: Quantity.exact(mean) for name, mean in means.items()}
+    sure = {name: replace(prepared.board.inputs[name], mean=mean, sd=0.0) for name, mean in means.items()}
     problem = pose(prepared.board.with_priors(sure), prepared.prior)
     draws = named_draws(infer(problem, SamplerSettings(seed=seed)), seed)
     return {name: 100 * float(np.std(np.log(values))) for name, values in draws.moduli.items()}

@@ -41,7 +41,7 @@ class DiagnosisSection:
     model : str
         Which model the rest of the page is of.
     notes : tuple of str
-    candidates : Table or None
+    known_effects, candidates : Table or None
     recommendation : str
     """
 
@@ -53,6 +53,7 @@ class DiagnosisSection:
     explained: tuple[str, ...]
     model: str
     notes: tuple[str, ...]
+    known_effects: Table | None
     candidates: Table | None
     recommendation: str
 
@@ -67,7 +68,6 @@ _SHIFT = "Shift, sd: how far a constant moves, counted in the standard deviation
 def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
     """The section of a diagnosis."""
     tables = (
-        known_table(diagnosis.known),
         answers_table(diagnosis),
         errors_table(diagnosis),
         claim_table(diagnosis),
@@ -83,6 +83,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
         explained=(_LOG_SCORE, *((_SHIFT,) if diagnosis.is_refitted else ())),
         model=shown_model(diagnosis),
         notes=tuple(remarks(diagnosis)),
+        known_effects=known_table(diagnosis.known),
         candidates=candidates_table(diagnosis),
         recommendation=diagnosis.recommendation,
     )

@@ -43,7 +43,9 @@ def test_fewer_modes_than_constants_are_refused(hertz, n_modes):
 def test_a_setup_without_labels_is_refused(hertz):
     board = cantilever(hertz, *CANTILEVER_LABELS)
     bare = replace(board.setups[0], name="bare", readings=(), peaks=peaks_of(50.0, 100.0))
-    with pytest.raises(NotIdentifiableError, match="'bare' has no labelled mode, its 2 peaks have none"):
+    with pytest.raises(
+        NotIdentifiableError, match="'bare' has no labelled mode, and its 2 peaks are none with certainty"
+    ):
         require_labels(replace(board, setups=(*board.setups, bare)))
 
 

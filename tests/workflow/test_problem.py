@@ -272,7 +272,7 @@ def test_a_board_whose_effects_a_card_cannot_state_is_refused(problem):
     name = next(one.name for one in declared.uncertain if one.effect == "support_stiffness")
     changed = declared.with_priors({name: declared.inputs[name].scaled(2.0)})
 
-    assert bayesplate.Problem.from_card(declared).names == problem.names
+    assert bayesplate.Problem.from_card(declared, effects=declared.effects).names == problem.names
     with pytest.raises(bayesplate.InputError, match="wanted the prior of a declared effect, got another one"):
         bayesplate.Problem.from_card(changed)
 
