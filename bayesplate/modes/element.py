@@ -106,13 +106,25 @@ def uniform_products(lengths: Floats) -> Floats:
 
 def assembled(local: Floats) -> Products:
     """Element matrices (n_elements, 9, 4, 4) summed into sparse matrices on the functions of the free line."""
-    from scipy.sparse import coo_array
+    from scipy.sparse import csr_array
 
-    n = len(local)
-    unknowns = 2 * np.arange(n)[:, None] + np.arange(4)
-    entries = np.repeat(unknowns, 4, axis=1).ravel(), np.tile(unknowns, 4).ravel()
-    shape = (2 * (n + 1), 2 * (n + 1))
-    return {orders: coo_array((local[:, k].ravel(), entries), shape=shape).tocsr() for k, orders in enumerate(ORDERS)}
+    columns, starts, stored_at = _line_pattern(len(local))
+    shape = (starts.size - 1, starts.size - 1)
+    return {
+        orders: csr_array((np.bincount(stored_at, local[:, k].ravel()), columns, starts), shape=shape)
+        for k, orders in enumerate(ORDERS)
+    }
+
+
+@lru_cache(maxsize=32)
+def _line_pattern(n_elements: int) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.intp]]:
+    """Columns and starts of rows of the matrices of a line, and where each entry of its element matrices is stored."""
+    unknowns = 2 * np.arange(n_elements)[:, None] + np.arange(4)
+    n = 2 * (n_elements + 1)
+    places = (np.repeat(unknowns, 4, axis=1) * n + np.tile(unknowns, 4)).ravel()
+    kept, stored_at = np.unique(places, return_inverse=True)
+    starts = np.searchsorted(kept // n, np.arange(n + 1))
+    return (kept % n).astype(np.int32), starts.astype(np.int32), stored_at
 
 
 def function_values(nodes: Floats, points: Floats) -> Any:

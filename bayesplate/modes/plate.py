@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.line import Line, rigid_degrees
+from bayesplate.modes.sparse import sum_of_krons
 from bayesplate.plate.setup import Ends
 
 KronSum = tuple[tuple[Any, Any], ...]
@@ -196,6 +197,4 @@ def count_rigid(parity: Parity, x: Line, y: Line) -> int:
 
 def kron_sum(term: KronSum, part_x: Any, part_y: Any) -> Any:
     """A term on the functions of one class, as a sparse matrix."""
-    from scipy.sparse import kron
-
-    return sum(kron(part_x.T @ along_x @ part_x, part_y.T @ along_y @ part_y) for along_x, along_y in term)
+    return sum_of_krons(term, (part_x, part_x), (part_y, part_y))

@@ -20,7 +20,6 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from bayesplate.modes.element import Products
 from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.hermite import end_products, even_and_odd, kept_unknowns, products, slopes_as_values
 from bayesplate.modes.line import Line, line
@@ -34,7 +33,7 @@ from bayesplate.modes.plate import (
     count_rigid,
     kron_sum,
 )
-from bayesplate.modes.sparse import on_one_pattern
+from bayesplate.modes.sparse import on_one_pattern, sum_of_krons
 from bayesplate.modes.thin import THIN_TERMS, thin_groups
 from bayesplate.plate.setup import Ends
 
@@ -189,7 +188,7 @@ def _block(
     }
 
     def energy(first: Strain, second: Strain, measure: Measure) -> Any:
-        product = sum(_energy(fields, first, second, *pair) for pair in measure)
+        product = _energy(fields, first, second, measure)
         return product if first is second else product + product.T
 
     counts = {group: len(made) for group, made in measures.items()}
@@ -208,8 +207,8 @@ def _block(
 
     def along_edges(turn: EdgeTurn) -> Any:
         if turn.axis == 0:
-            return _energy(fields, _TURN_X, _TURN_X, end_products(x.n_elements, turn.at), products_y)
-        return _energy(fields, _TURN_Y, _TURN_Y, products_x, end_products(y.n_elements, turn.at))
+            return _energy(fields, _TURN_X, _TURN_X, ((end_products(x.n_elements, turn.at), products_y),))
+        return _energy(fields, _TURN_Y, _TURN_Y, ((products_x, end_products(y.n_elements, turn.at)),))
 
     further = [along_edges(t) if isinstance(t, EdgeTurn) else on_deflection(t) for t in further_stiffness]
     terms = [*stiffnesses, *further]
@@ -244,15 +243,9 @@ def _functions(side: Line, parity: int) -> tuple[Any, Any, Any]:
     return deflected, strained, value_from_slope @ deflected
 
 
-def _energy(
-    fields: Fields,
-    first: Strain,
-    second: Strain,
-    products_x: Products,
-    products_y: Products,
-) -> Any:
+def _energy(fields: Fields, first: Strain, second: Strain, measure: Measure) -> Any:
     """Integral of the product of two strains or motions, on all unknowns of a class."""
-    from scipy.sparse import block_array, coo_array, kron
+    from scipy.sparse import block_array, coo_array
 
     sizes = {field: fields[field][0].along_x.shape[1] * fields[field][0].along_y.shape[1] for field in _UNKNOWNS}
     parts = {(r, c): coo_array((sizes[r], sizes[c])) for r in _UNKNOWNS for c in _UNKNOWNS}
@@ -260,7 +253,9 @@ def _energy(
         for t in second:
             for a in fields[s.field]:
                 for b in fields[t.field]:
-                    along_x = a.along_x.T @ products_x[s.along_x, t.along_x] @ b.along_x
-                    along_y = a.along_y.T @ products_y[s.along_y, t.along_y] @ b.along_y
-                    parts[a.unknowns, b.unknowns] += s.factor * t.factor * kron(along_x, along_y)
+                    pairs = [
+                        (along_x[s.along_x, t.along_x], along_y[s.along_y, t.along_y]) for along_x, along_y in measure
+                    ]
+                    whole = sum_of_krons(pairs, (a.along_x, b.along_x), (a.along_y, b.along_y))
+                    parts[a.unknowns, b.unknowns] += s.factor * t.factor * whole
     return block_array([[parts[r, c] for c in _UNKNOWNS] for r in _UNKNOWNS])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,46 @@ def on_one_pattern(
     for row, entry in zip(stored, entries, strict=True):
         row[np.searchsorted(pattern, _keys(entry))] = entry.data
     return stored, shape.indices, shape.indptr
+
+
+def sum_of_krons(pairs: Sequence[tuple[Any, Any]], onto_x: tuple[Any, Any], onto_y: tuple[Any, Any]) -> Any:
+    """The sum of the Kronecker products of pairs of matrices along x and along y, each on other functions.
+
+    Parameters
+    ----------
+    pairs : sequence of (sparse array, sparse array)
+        All first ones and all second ones of one shape.
+    onto_x, onto_y : (sparse array, sparse array)
+        Functions of the rows and of the columns, as columns: of a pair (A, B) it takes left' A right and the same of B.
+
+    Returns
+    -------
+    sparse array
+    """
+    from scipy.sparse import coo_array, kron
+
+    if len(pairs) == 1:
+        along_x, along_y = (
+            left.T @ matrix @ right for matrix, (left, right) in zip(pairs[0], (onto_x, onto_y), strict=True)
+        )
+        return kron(along_x, along_y)
+    # Many small matrices: with all of one side on one pattern the sum is one product of their stored values.
+    first, rows_x, columns_x = _stored_together([pair[0] for pair in pairs], *onto_x)
+    second, rows_y, columns_y = _stored_together([pair[1] for pair in pairs], *onto_y)
+    n_rows, n_columns = (matrix.shape[1] for matrix in onto_y)
+    rows = (rows_x[:, None] * n_rows + rows_y).ravel()
+    columns = (columns_x[:, None] * n_columns + columns_y).ravel()
+    shape = tuple(a.shape[1] * b.shape[1] for a, b in zip(onto_x, onto_y, strict=True))
+    return coo_array(((first.T @ second).ravel(), (rows, columns)), shape=shape)
+
+
+def _stored_together(
+    matrices: Sequence[Any], left: Any, right: Any
+) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
+    """Values that are not zero in all of left' M right, (n_matrices, n_stored), with the row and column of each."""
+    dense = left.T.toarray() @ np.stack([matrix.toarray() for matrix in matrices]) @ right.toarray()
+    rows, columns = np.nonzero(dense.any(axis=0))
+    return dense[:, rows, columns], rows, columns
 
 
 def _keys(matrix: Any) -> NDArray[np.int64]:

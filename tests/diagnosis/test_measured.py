@@ -88,18 +88,7 @@ def test_fiemme_names_nothing_alone(diagnosed):
 
 
 @slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        "spruce-free-2R",
-        pytest.param(
-            "spruce-free-2L",
-            marks=pytest.mark.xfail(
-                strict=True, reason="a support that springs back is named while its rounded thickness counts as exact"
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("name", ["spruce-free-2R", "spruce-free-2L"])
 def test_a_blind_board_that_is_named_or_grouped_is_so_with_shear_or_mass(diagnosed, name):
     """Of both nothing may be claimed, and a verdict without effects is one that names none."""
     told = diagnosed(name).diagnosis

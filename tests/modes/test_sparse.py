@@ -1,0 +1,29 @@
+"""Sums of Kronecker products on one pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+from bayesplate.modes.sparse import sum_of_krons
+
+
+@pytest.mark.parametrize("n_pairs", [1, 2, 5])
+def test_a_sum_of_kronecker_products_of_rectangular_matrices(n_pairs):
+    """Each matrix has a pattern of its own, and each side other functions of the rows than of the columns."""
+    rng = np.random.default_rng(n_pairs)
+
+    def thin(*shape):
+        return rng.standard_normal(shape) * (rng.uniform(size=shape) < 0.3)
+
+    pairs = [(thin(6, 6), thin(5, 5)) for _ in range(n_pairs)]
+    onto = (thin(6, 4), thin(6, 3)), (thin(5, 2), thin(5, 5))
+    expected = sum(
+        np.kron(onto[0][0].T @ along_x @ onto[0][1], onto[1][0].T @ along_y @ onto[1][1]) for along_x, along_y in pairs
+    )
+    stored = [tuple(csr_array(one) for one in pair) for pair in (*pairs, *onto)]
+    found = sum_of_krons(stored[:n_pairs], *stored[n_pairs:])
+    assert found.shape == (8, 15)
+    assert found.toarray() == pytest.approx(expected, abs=1e-13)
+    assert np.abs(expected).max() > 0.1
