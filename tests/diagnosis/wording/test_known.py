@@ -87,9 +87,9 @@ def test_each_effect_is_told_by_its_own_error(models, words, rises):
 def test_the_page_shows_the_table_and_the_sentence_where_there_are_any():
     named, bare = (diagnosis_section(DIAGNOSES[word]) for word in ("named", "none needed"))
     assert named.known == known_sentence(KNOWN)
-    assert named.tables[0] == known_table(KNOWN)
+    assert named.known_effects == known_table(KNOWN)
     assert bare.known == ""
-    assert not any("physics" in table.title for table in bare.tables)
+    assert bare.known_effects is None
 
 
 def test_the_same_as_csv_at_full_precision():
