@@ -34,6 +34,8 @@ from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 CARD = "spruce-free-2R"
+UNIFORM: tuple[str, ...] = ()
+"""Effects: no field of the thickness, so that each size is one number."""
 POWERS = {
     "E_x": {"thickness": 3, "mass": 1, "length_x": 3, "length_y": 1},
     "E_y": {"thickness": 3, "mass": 1, "length_x": 1, "length_y": 3},
@@ -69,13 +71,14 @@ def run(folder: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
     dict
         budget: by constant, sd_percent, parts (by input and for the frequencies, per cent of the constant; where the
         inputs are independent their squares sum to that of sd_percent), by_hand (the same for inputs whose power is
-        known) and exact_inputs_percent (the sd of a fit with exact inputs). widths: by quantity, before and after, the
+        known) and exact_inputs_percent (the sd of a fit with exact sizes). widths: by quantity, before and after, the
         standard deviation of its logarithm in per cent. effective_draws: of the parameter that has the fewest.
     """
-    result = bayesplate.fit(card, out=folder, force=True, seed=seed)
+    labelled = with_sure_labels(bayesplate.Problem.from_card(card).board)
+    result = bayesplate.fit(labelled, out=folder, force=True, seed=seed, effects=UNIFORM)
     board, draws = result.inference.problem.board, result.draws
     means = {name: float(np.mean(values)) for name, values in draws.inputs.items()}
-    alone = exact_inputs(card, seed, means)
+    alone = exact_inputs(labelled, seed, means)
     budget = {}
     for name, values in draws.moduli.items():
         powers = {one: power for one, power in POWERS[name].items() if one in draws.inputs}
@@ -111,10 +114,23 @@ def percent(quantity: Quantity) -> float:
     return 100 * quantity.sd / abs(quantity.mean)
 
 
-def exact_inputs(card: str, seed: int, means: Mapping[str, float]) -> dict[str, float]:
-    """Standard deviation of each constant, per cent, with every input exact: what the frequencies leave open."""
-    prepared = prepare(card)
-    sure = {name: replace(prepared.board.inputs[name], mean=mean, sd=0.0) for name, mean in means.items()}
+def with_sure_labels(board: Board) -> Board:
+    """The board without its bare peaks: a posterior that mixes several ways to take them has no parts that add up."""
+    setups = (
+        replace(setup, peaks=(), readings=tuple(replace(reading, confidence=1.0) for reading in setup.readings))
+        for setup in board.setups
+    )
+    return replace(board, setups=tuple(setups))
+
+
+def exact_inputs(board: Board, seed: int, means: Mapping[str, float]) -> dict[str, float]:
+    """Standard deviation of each constant, per cent, with every size exact: what the frequencies leave open."""
+    prepared = prepare(board, UNIFORM)
+    sure = {
+        name: replace(prepared.board.inputs[name], mean=mean, sd=0.0)
+        for name, mean in means.items()
+        if name != "poisson_xy"
+    }
     problem = pose(prepared.board.with_priors(sure), prepared.prior)
     draws = named_draws(infer(problem, SamplerSettings(seed=seed)), seed)
     return {name: 100 * float(np.std(np.log(values))) for name, values in draws.moduli.items()}
@@ -178,7 +194,7 @@ def figure_of(board: Board, numbers: dict[str, Any]) -> Any:
 def _print(numbers: dict[str, Any]) -> None:
     for name, row in numbers["budget"].items():
         parts = ", ".join(f"{WORDS[one]} {part:.2f}" for one, part in row["parts"].items())
-        print(f"{name:5s} ± {row['sd_percent']:.2f} %: {parts}; with exact inputs {row['exact_inputs_percent']:.2f}")
+        print(f"{name:5s} ± {row['sd_percent']:.2f} %: {parts}; with exact sizes {row['exact_inputs_percent']:.2f}")
     for name, row in numbers["widths"].items():
         print(f"{WORDS.get(name, name):15s} {row['before']:7.2f} % before, {row['after']:6.2f} % after")
 

@@ -47,10 +47,11 @@ def test_parts_of_the_thickness_and_the_mass_are_those_worked_out_by_hand(number
 
 @pytest.mark.parametrize("name", ["E_x", "E_y", "G_xy"])
 def test_what_is_left_is_the_spread_of_a_fit_with_exact_inputs(numbers, error, name):
-    """Two fits, each with its error; with exact inputs the Poisson ratio is fixed too, which hardly matters here."""
+    """Two fits, each with its error; the Poisson ratio stays open in both."""
     row = numbers["budget"][name]
 
-    assert row["parts"]["frequencies"] == pytest.approx(row["exact_inputs_percent"], rel=2 * error)
+    left = np.hypot(row["parts"]["frequencies"], row["parts"]["poisson_xy"])
+    assert left == pytest.approx(row["exact_inputs_percent"], rel=2 * error)
     assert row["sd_percent"] ** 2 == pytest.approx(sum(part**2 for part in row["parts"].values()), rel=2 * error)
 
 
@@ -61,7 +62,6 @@ def test_the_frequencies_teach_the_constants_and_not_the_sizes(numbers, error):
         assert widths[name]["after"] < widths[name]["before"] / 50
     for name in ("thickness", "mass", "length_x", "length_y"):
         assert widths[name]["after"] == pytest.approx(widths[name]["before"], rel=error)
-    assert widths["poisson_xy"]["after"] < (1 - error) * widths["poisson_xy"]["before"]
 
 
 def test_parts_of_a_made_up_constant(example):
