@@ -161,20 +161,16 @@ def test_peaks_are_assigned_to_modes(free):
 
 
 def test_peaks_narrow_the_constants(tmp_path):
-    """Thirteen more modes than three that are labelled: the constants are known better, and agree."""
+    """Sixteen peaks in place of nine labels: at the expected noise the constants are known better."""
     (shipped,) = (load_board(name).path for name in card_names("boards") if name == "spruce-free-2R")
     assert shipped is not None
     text = shipped.read_text(encoding="utf-8")
     without = tmp_path / "spruce-free-2R.toml"
     without.write_text(re.sub(r"\[\[setup\.peaks\]\]\n(.+\n)+", "", text), encoding="utf-8")
-    both = [bayesplate.check(card).expected_sd_percent for card in (shipped, without)]
-
     noise_alone = [bayesplate.Problem.from_card(card).posed.identifiability for card in (shipped, without)]
     shrunk = noise_alone[0].standard_errors / noise_alone[1].standard_errors
     assert (shrunk < 0.95).all()
     assert shrunk[0] < 0.7  # bending along the grain, which the bare peaks are mostly
-    for name in ("E_x", "E_y", "G_xy"):
-        assert both[0][name] <= both[1][name] * 1.02
 
 
 @pytest.fixture(scope="module")
