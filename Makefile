@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs calibration coverage trial benchmarks
+.PHONY: fit test slow docs calibration spectra coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -27,6 +27,9 @@ docs: $(VENV)/tested-with
 
 calibration: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl --publish docs/validation
+
+spectra: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_spectra.py --boards 200 --workers 2 --out results/spectra.jsonl --publish docs/validation
 
 trial: $(VENV)/tested-with
 	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl

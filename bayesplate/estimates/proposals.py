@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from bayesplate.cards import PriorCard
+from bayesplate.cards import MISSED, SPURIOUS, PriorCard
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
@@ -34,9 +34,6 @@ Assignment = tuple[Label | None, ...]
 
 FEWEST_PEAKS = 4
 """Three fix the constants whatever they are called."""
-
-MISSED, SPURIOUS = 0.2, 0.02
-"""Probability that a mode below the highest peak was not seen, and that a peak is of something else."""
 
 UNUSUAL = 0.02
 """Probability that a plate is stiffer along y than along x, which cards take along the grain, or that no wood is as

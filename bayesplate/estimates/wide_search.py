@@ -182,7 +182,7 @@ class _Spectrum:
         ratios = population[:, :2] - population[:, 2:]
         low, high = np.quantile(ratios, [_RANGE, 1.0 - _RANGE], axis=0)
         axes = np.linspace(low[0], high[0], _N_NODES), np.linspace(low[1], high[1], _N_NODES)
-        bare = replace(setup, readings=(), peaks=_as_peaks(setup), hammer=None, first_label=setup.first_label)
+        bare = replace(setup, readings=(), peaks=_as_peaks(setup), hammer=None)
         scale = float(np.median(population[:, 2]))
         nominal = board.nominal()
 
