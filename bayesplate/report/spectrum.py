@@ -96,15 +96,16 @@ def _write(panel: Axes, at: Sequence[float], names: Sequence[str], height: float
 
 
 def _apart(wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places in the order of the wanted ones, at least a label apart, near where they are wanted."""
+    """Places in the order of the wanted ones, at least a label apart, within the panel, near where they are wanted."""
     placed = wanted.copy()
-    for _ in range(200):
+    for _ in range(2000):
         gaps = np.diff(placed)
         short = np.maximum(_APART - gaps, 0.0)
-        if not short.any():
+        if short.max(initial=0.0) < 1e-4:
             break
         placed[:-1] -= 0.5 * short
         placed[1:] += 0.5 * short
+        placed = np.clip(placed, 0.0, 1.0)
     return placed
 
 

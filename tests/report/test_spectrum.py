@@ -70,6 +70,20 @@ def test_no_two_names_overlap(picture):
             assert not one.overlaps(other)
 
 
+def test_names_that_crowd_at_the_upper_end_stay_within_the_figure():
+    crowd = tuple(mode(f"({k},4)", 258.0 + k, 1.0 / (k + 1)) for k in range(14))
+    made = replace(SUMMARY, peaks=PEAKS, spectra=(Spectrum("bench", 0.2, 0.02, (MODES[0], *crowd)),))
+    figure = spectrum_pictures(made)[0].figure
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
+
+    assert len(boxes) == 3 + 15
+    for i, box in enumerate(boxes):
+        assert figure.bbox.x0 <= box.x0
+        assert box.x1 <= figure.bbox.x1
+        assert not any(box.overlaps(other) for other in boxes[:i])
+
+
 def test_one_picture_per_setup_with_peaks():
     assert [one.name for one in spectrum_pictures(SUMMARY)] == ["spectrum"]
     assert spectrum_pictures(replace(SUMMARY, peaks=(), spectra=())) == []
