@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.ensembles import advance
 from bayesplate.posterior.moves import Steps
 from bayesplate.posterior.proposals import Proposal
+from bayesplate.posterior.starting import LogPosterior
 from bayesplate.posterior.tails import TailCoordinates
-from bayesplate.posterior.target import Posterior, linear_suffices
+from bayesplate.posterior.target import Posterior
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +39,9 @@ of a normal one less than a millionth lies there."""
 _N_STEPS, _N_TAKEN = 40, 4
 _N_ARCHIVED = 128
 _BATCH = 2048
+LEAST_ACCEPTANCE = 0.5
+"""Of walks on a surrogate that serves. Below, the exact law is evaluated more often for steps that are refused than it
+would be without."""
 
 
 class Solved(NamedTuple):
@@ -74,8 +77,6 @@ class Surrogate:
         2 or 3.
     coefficients : (n_terms, n_modes) array
         Of 1, u_i, u_i u_j and, in third order, u_i u_j u_k.
-    errors : (n_held_out, n_modes) array, cents
-        Surrogate less exact law at draws of the surrogate's posterior that it was not fitted to.
     """
 
     columns: NDArray[np.intp]
@@ -83,16 +84,15 @@ class Surrogate:
     whitening: Floats
     degree: int
     coefficients: Floats
-    errors: Floats
 
     @classmethod
     def fitted(cls, points: Solved, columns: NDArray[np.intp], degree: int) -> Surrogate:
-        """By weighted least squares; its errors are not known yet."""
+        """By weighted least squares."""
         x, weights = points.theta[:, columns], points.weights
         factor = np.linalg.cholesky(np.cov(x.T, aweights=weights))
         none = np.empty((0, points.log_frequency.shape[1]))
         centre = np.average(x, axis=0, weights=weights)
-        bare = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), degree, none, none)
+        bare = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), degree, none)
         roots = np.sqrt(weights)[:, None]
         found = np.linalg.lstsq(roots * bare._terms(points.theta), roots * points.log_frequency, rcond=None)[0]
         return replace(bare, coefficients=np.asarray(found, dtype=np.float64))
@@ -135,12 +135,21 @@ def with_surrogate(posterior: Posterior, surrogate: Surrogate) -> SurrogatePoste
     )
 
 
-def serves(posterior: Posterior, errors: Floats) -> bool:
-    """Whether a surrogate of (n_draws, n_modes) errors, cents, may stand for the law of a posterior.
+def acceptance(log_ratios: Floats) -> float:
+    """How often the end of a walk on a surrogate will be accepted under the law, where walks forget their start.
 
-    The rule is the linear law's. A surrogate that is off by one noise level in a single mode does not serve.
+    Modes that no peak is may be wrong at no cost, and where two modes that cross by a hair are sorted by frequency no
+    polynomial follows either; so a surrogate is judged by what its errors do to the density.
+
+    Parameters
+    ----------
+    log_ratios : (n_draws,) array
+        ln of the posterior's density less that of the surrogate's, at draws of the latter. Weighted with their ratio
+        these are draws of the former, where walks begin.
     """
-    return linear_suffices(posterior.n_every, errors, [setup.noise.median for setup in posterior.board.setups])
+    starts = np.exp(log_ratios - log_ratios.max())
+    gains = log_ratios[None, :] - log_ratios[:, None]
+    return float(starts @ np.exp(np.minimum(gains, 0.0)).mean(axis=1) / starts.sum())
 
 
 def find_surrogate(
@@ -163,7 +172,7 @@ def find_surrogate(
     Returns
     -------
     Surrogate or None
-        None if none meets the linear law's rule within a few rounds.
+        None if no walk on one would be accepted half of the time, within a few rounds.
     """
     columns, bounds = posterior.parameters.fitted_columns, posterior.parameters.fitted_bounds
     n_of = {degree: _POINTS_PER_TERM * n_terms(columns.size, degree) for degree in (2, 3)}
@@ -177,12 +186,12 @@ def find_surrogate(
         degree = highest_degree if n_of[highest_degree] <= len(points.theta) else 2
         surrogate = Surrogate.fitted(points, columns, degree)
         last = points.theta[-n_points:]
-        walkers = _walked(with_surrogate(posterior, surrogate), coordinates, last, rng)
-        walked = _solved(posterior, coordinates, walkers)
+        density = coordinates.density(with_surrogate(posterior, surrogate))
+        walked = _solved(posterior, coordinates, _walked(density, coordinates, last, rng))
         held_out = walked.where(walked.log_density > points.log_density.max() - _FAR - theta.shape[1])
-        errors = cents(surrogate.log_frequencies(held_out.theta) - held_out.log_frequency)
-        if 2 * len(errors) > len(walked.theta) and serves(posterior, errors):
-            found = replace(surrogate, errors=errors)
+        log_ratios = held_out.log_density - density(coordinates.y(held_out.theta))
+        if 2 * len(log_ratios) > len(walked.theta) and acceptance(log_ratios) >= LEAST_ACCEPTANCE:
+            found = surrogate
             if degree == highest_degree and n_rounds >= _FEWEST_ROUNDS:
                 return found
         points = Solved(*(np.concatenate(parts) for parts in zip(points, walked, strict=True)))
@@ -197,11 +206,8 @@ def _solved(posterior: Posterior, coordinates: TailCoordinates, theta: Floats) -
     return Solved(theta, np.concatenate(by_setup, axis=1), log_density)
 
 
-def _walked(
-    posterior: SurrogatePosterior, coordinates: TailCoordinates, theta: Floats, rng: np.random.Generator
-) -> Floats:
-    """As many points, walked to where a surrogate's posterior is."""
-    density = coordinates.density(posterior)
+def _walked(density: LogPosterior, coordinates: TailCoordinates, theta: Floats, rng: np.random.Generator) -> Floats:
+    """As many points, walked to where a surrogate's posterior is, which has that density in the walk's coordinates."""
     n_walkers = -(-len(theta) // _N_TAKEN)
     coords = coordinates.y(theta)
     start = coords[:n_walkers]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import ndtr, ndtri
 
 from bayesplate.frequencies.laws import cents
+from bayesplate.posterior.assessment import assess
+from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer, pose
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.posterior.surrogate import Surrogate, find_surrogate, serves, with_surrogate
+from bayesplate.posterior.surrogate import LEAST_ACCEPTANCE, Surrogate, acceptance, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import LINEAR_SHARE
 from bayesplate.workflow.prepare import prepare
@@ -40,14 +43,15 @@ def noise_cents(problem):
     return float(cents(setup.noise.median))
 
 
-def test_the_stated_error_is_that_at_draws_of_the_posterior(problem, inference):
-    """The largest rms of a mode, over the chain, to a factor of two: both hang on a few draws in the tails."""
+def test_its_error_over_the_posterior_is_stated_and_small_beside_the_noise(problem, inference):
+    """Root mean square over the chain and over the modes, in the summary from fewer draws: to a factor of two."""
     draws = inference.chains.pooled[::20]
     exact = np.concatenate(problem.posterior.log_frequencies(draws), axis=1)
     errors = cents(inference.surrogate.log_frequencies(draws) - exact)
-    rms, stated = (np.sqrt(np.mean(e**2, axis=0)).max() for e in (errors, inference.surrogate.errors))
-    assert 0.5 * stated < rms < 2 * stated
-    assert rms < LINEAR_SHARE * noise_cents(problem)
+    stated = assess(inference, named_draws(inference, 5)).surrogate_errors
+    rms, as_stated = (float(np.sqrt(np.mean(e**2))) for e in (errors, stated))
+    assert 0.5 * as_stated < rms < 2 * as_stated
+    assert np.sqrt(np.mean(errors**2, axis=0)).max() < LINEAR_SHARE * noise_cents(problem)
 
 
 def test_only_the_frequencies_are_the_surrogates(problem, inference):
@@ -63,21 +67,34 @@ def test_only_the_frequencies_are_the_surrogates(problem, inference):
     np.testing.assert_allclose(with_surrogate(problem.posterior, known)(draws), problem.posterior(draws), rtol=1e-10)
 
 
-@pytest.mark.parametrize(("share", "does"), [(0.9 * LINEAR_SHARE, True), (1.1 * LINEAR_SHARE, False), (1.0, False)])
-def test_one_mode_off_by_a_share_of_the_noise_decides(problem, share, does):
-    errors = np.zeros((100, len(problem.board.setups[0].readings)))
-    errors[:, 2] = share * noise_cents(problem)
-    assert serves(problem.posterior, errors) == does
+@pytest.mark.parametrize("variance", [0.0, 0.1, 1.0, 2.0])
+def test_the_acceptance_is_the_one_of_normal_log_ratios(variance):
+    """2 Phi(-sqrt(v / 2)), and no level of the density matters; 4000 even quantiles tell it to 0.02."""
+    log_ratios = 30.0 + np.sqrt(variance) * ndtri((np.arange(4000) + 0.5) / 4000)
+    assert acceptance(log_ratios) == pytest.approx(2.0 * ndtr(-np.sqrt(0.5 * variance)), abs=0.02)
 
 
-def test_a_surrogate_wrong_by_one_noise_level_is_caught_and_the_exact_law_serves_alone(problem, monkeypatch):
+def test_ends_of_walks_are_accepted_as_often_as_the_surrogate_was_judged_by(inference):
+    """The accepted share of the kept steps, most of which end a walk that has moved."""
+    densities = inference.chains.log_prob[:, inference.chains.burn_in :]
+    moved = float(np.mean(np.diff(densities, axis=1) != 0.0))
+    assert moved > LEAST_ACCEPTANCE
+
+
+@pytest.mark.parametrize(("levels", "serves"), [(0.2, True), (4.0, False)])
+def test_a_surrogate_serves_while_walks_on_it_are_accepted(problem, monkeypatch, levels, serves):
+    """Wrong by so many levels of the noise, up and down by turns from one draw to the next that it is tried at."""
     right = Surrogate.log_frequencies
-    off = np.zeros(len(problem.board.setups[0].readings))
-    off[2] = problem.board.setups[0].noise.median
+    off = levels * problem.board.setups[0].noise.median
 
-    monkeypatch.setattr(Surrogate, "log_frequencies", lambda self, theta: right(self, theta) + off)
-    assert found(problem) is None
-    assert infer(problem, SamplerSettings(seed=5, max_steps=50)).surrogate is None
+    def wrong(self, theta):
+        sign = np.where(np.floor(1e7 * theta[:, :1]) % 2, 1.0, -1.0)
+        return right(self, theta) + off * sign * (np.arange(self.coefficients.shape[1]) == 2)
+
+    monkeypatch.setattr(Surrogate, "log_frequencies", wrong)
+    assert (found(problem) is not None) == serves
+    if not serves:
+        assert infer(problem, SamplerSettings(seed=5, max_steps=50)).surrogate is None
 
 
 def test_a_law_that_was_asked_for_serves_alone(problem):
