@@ -112,7 +112,7 @@ class OutlineProfile(Effect):
 
     def outline(self) -> Outline | None:
         """Where the plate begins and ends along y, as expected."""
-        return None if self.profile is None else self._limits
+        return None if self.profile is None else _Limits(self)
 
     def adjusted(self, values: Values) -> Values:
         """The widest width for the sides of the rectangle; the mass goes with the mean width, which stays."""
@@ -124,7 +124,7 @@ class OutlineProfile(Effect):
             return {}
         moved = tuple(
             Variation(
-                EdgeStrip(partial(self._limits, inside=k), partial(self._direction, k=k)),
+                EdgeStrip(_Limits(self, k), _Direction(self, k)),
                 partial(self._share, k=k),
                 _FIRST_ORDER_ALONE,
             )
@@ -138,7 +138,7 @@ class OutlineProfile(Effect):
         steps = self.value(values, self.parameters()[k].key)
         return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / _STRIP_SDS)
 
-    def _direction(self, x: Floats, y: Floats, k: int) -> Floats:
+    def direction(self, x: Floats, y: Floats, k: int) -> Floats:
         """Where a component widens the board, 1, and where it narrows it, -1."""
         return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
@@ -147,7 +147,7 @@ class OutlineProfile(Effect):
         """Widest place over the mean width."""
         return float(self._widths(np.linspace(0.0, 1.0, _N_POINTS + 1)).max())
 
-    def _limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
+    def limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
         """The outline, or the one within by the strip of a component."""
         at = self.part_x.on_whole(x)
         strip = 0.0 if inside is None else _STRIP_SDS * np.abs(self._step(at, inside))
@@ -167,6 +167,28 @@ class OutlineProfile(Effect):
         """Widths over their mean that one step of a component gains."""
         assert self.profile is not None
         return self.profile.components[k](at, np.full_like(at, 0.5))
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """The outline of an effect, or the one within by the strip of a component; equal where the effects are."""
+
+    effect: OutlineProfile
+    inside: int | None = None
+
+    def __call__(self, x: Floats) -> tuple[Floats, Floats]:
+        return self.effect.limits(x, self.inside)
+
+
+@dataclass(frozen=True)
+class _Direction:
+    """Where a component widens the board."""
+
+    effect: OutlineProfile
+    k: int
+
+    def __call__(self, x: Floats, y: Floats) -> Floats:
+        return self.effect.direction(x, y, self.k)
 
 
 def _profile(board: Board) -> FieldProfile | None:

@@ -36,7 +36,8 @@ class ThicknessProfile(Effect):
 
     With readings at places p = p0 + sum z_k phi_k is a random field that they condition (`FieldProfile`): p0 is what is
     expected, each component phi_k has a standard normal parameter, and one more goes with the mean thickness h itself.
-    Powers of p are expanded to second order in the components, so each product of them is a term of its own.
+    Powers of p are expanded to second order in the components, so each product of them is a term of its own; rotary
+    inertia is small already, a thousandth of the kinetic energy, and follows them to first order.
 
     Without, p = 1 + alpha_x (s - 1/2) + alpha_y (t - 1/2), s and t from 0 to 1 along the whole sides: a taper around
     the mean thickness. Powers of p are polynomials in both tapers, so each power of s and t is a term of its own and
@@ -117,7 +118,8 @@ class ThicknessProfile(Effect):
             if self.profile.is_uniform:
                 return {}
             expanded = {n: self._expanded(n) for n in set(_POWERS.values())}
-            return {group: expanded[n] for group, n in _POWERS.items()}
+            small = tuple(replace(one, order=one.order + 1) for one in expanded[_POWERS["rotary"]])
+            return {group: expanded[n] for group, n in _POWERS.items()} | {"rotary": small}
         fields: dict[tuple[int, int], Field | None] = {
             (i, j): partial(_monomial, i=i, j=j) if i + j else None for i, j in _exponents(max(_POWERS.values()))
         }
@@ -134,24 +136,21 @@ class ThicknessProfile(Effect):
             for k in range(min(n, _MOST_FACTORS) + 1)
             for chosen in combinations_with_replacement(range(len(self.profile.open)), k)
         ]
+        keys = tuple(one.key for one in self.parameters())
+
+        def share(values: Values, chosen: tuple[int, ...], factor: int) -> Floats:
+            assert self.profile is not None
+            at = coordinates(self.profile, values["thickness"], [self.value(values, key) for key in keys])
+            return np.asarray(factor * prod((at[k] for k in chosen), start=np.ones(1)))
+
         return tuple(
-            Variation(partial(self._product, n=n, chosen=chosen), partial(self._share, n=n, chosen=chosen), len(chosen))
+            Variation(
+                _Expanded(self.part_x, self.part_y, self.profile, n - len(chosen), chosen),
+                partial(share, chosen=chosen, factor=comb(n, len(chosen)) * len(set(permutations(chosen)))),
+                len(chosen),
+            )
             for chosen in products
         )
-
-    def _product(self, x: Floats, y: Floats, n: int, chosen: tuple[int, ...]) -> Floats:
-        assert self.profile is not None
-        at = self.part_x.on_whole(x), self.part_y.on_whole(y)
-        factors = [self.profile.open[k](*at) for k in chosen]
-        return prod(factors, start=(1.0 + self.profile.expected(*at)) ** (n - len(chosen)))
-
-    def _share(self, values: Values, n: int, chosen: tuple[int, ...]) -> Floats:
-        """Multinomial coefficient of a product of components times their coordinates."""
-        assert self.profile is not None
-        of_components = [self.value(values, one.key) for one in self.parameters()]
-        at = coordinates(self.profile, values["thickness"], of_components)
-        orderings = len(set(permutations(chosen)))
-        return np.asarray(comb(n, len(chosen)) * orderings * prod((at[k] for k in chosen), start=np.ones(1)))
 
     def _coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
         """Of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
@@ -159,6 +158,22 @@ class ThicknessProfile(Effect):
         middle = 1.0 + taper_x * self.part_x.middle + taper_y * self.part_y.middle
         along_x, along_y = taper_x * self.part_x.share, taper_y * self.part_y.share
         return comb(n, i) * comb(n - i, j) * middle ** (n - i - j) * along_x**i * along_y**j
+
+
+@dataclass(frozen=True)
+class _Expanded:
+    """A power of what is expected of a profile, times some of its components: one field of an expanded power."""
+
+    part_x: Part
+    part_y: Part
+    profile: FieldProfile
+    power: int
+    chosen: tuple[int, ...]
+
+    def __call__(self, x: Floats, y: Floats) -> Floats:
+        at = self.part_x.on_whole(x), self.part_y.on_whole(y)
+        factors = [self.profile.open[k](*at) for k in self.chosen]
+        return prod(factors, start=(1.0 + self.profile.expected(*at)) ** self.power)
 
 
 def _profile(board: Board) -> FieldProfile | None:

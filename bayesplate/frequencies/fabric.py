@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from itertools import product
 
@@ -141,6 +141,15 @@ def _times(first: Field | EdgeStrip | None, second: Field | EdgeStrip | None) ->
 
 
 def _product(first: Field, second: Field | None) -> Field:
-    if second is None:
-        return first
-    return lambda x, y: first(x, y) * second(x, y)
+    return first if second is None else _Product(first, second)
+
+
+@dataclass(frozen=True)
+class _Product:
+    """Two fields multiplied."""
+
+    first: Field
+    second: Field
+
+    def __call__(self, x: Floats, y: Floats) -> Floats:
+        return self.first(x, y) * self.second(x, y)

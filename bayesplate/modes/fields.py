@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -21,13 +22,15 @@ from bayesplate.modes.line import Line
 Floats = NDArray[np.float64]
 
 Field = Callable[[Floats, Floats], Floats]
-"""A factor over the unit square: of points x and y, arrays that broadcast, to an array of their common shape."""
+"""A factor over the unit square: of points x and y, arrays that broadcast, to an array of their common shape.
+
+Fields that are equal are integrated once: a dataclass compares by what it holds, a function only with itself."""
 
 Outline = Callable[[Floats], tuple[Floats, Floats]]
 """Where the plate begins and ends along y, as fractions of its widest width, at points x of [0, 1]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class EdgeStrip:
     """A field on the strip between the plate's outline and a narrower one, and nowhere else.
 
@@ -49,6 +52,10 @@ Group = Literal["along", "bending", "shear", "mass", "rotary"]
 Measure = tuple[tuple[Products, Products], ...]
 """Integrals along x and along y by orders of derivatives, on the functions of the free lines; summed over the pairs."""
 
+Nodes = tuple[float, ...]
+
+_N_KEPT = 32
+"""Measures that are kept: candidates of a search share those of the fields that the board has anyway."""
 _POINTS = 6
 """Gauss points per element: a product of two cubics with a field of degree five is exact."""
 _NEGLIGIBLE = 1e-12
@@ -75,26 +82,33 @@ class Fabric:
     is_turned: bool = False
 
     def measures(self, groups: Iterable[Group], x: Line, y: Line) -> dict[Group, list[Measure]]:
-        """The measures of each group's terms, in the order of its fields; a field of two groups is integrated once."""
-        taken = {group: [(field, _GHOST[group]) for field in self.fields.get(group, (None,))] for group in groups}
+        """The measures of each group's terms, in the order of its fields; a field of two groups is integrated once.
+
+        The plate outside its outline belongs to the first field, whose weight is above zero; that of others may not be.
+        """
+        fields = {group: self.fields.get(group, (None,)) for group in groups}
+        taken = {group: [(one, 0.0 if k else _GHOST[group]) for k, one in enumerate(fields[group])] for group in groups}
         made = {each: self._measure(*each, x, y) for each in {each for pairs in taken.values() for each in pairs}}
         return {group: [made[each] for each in pairs] for group, pairs in taken.items()}
 
     def _measure(self, factor: Field | EdgeStrip | None, ghost: float, x: Line, y: Line) -> Measure:
+        nodes = tuple(x.nodes), tuple(y.nodes)
         if isinstance(factor, EdgeStrip):
-            return self._strip(factor, 1.0 - ghost, x, y)
-        uniform = (products(tuple(x.nodes)), products(tuple(y.nodes)))
+            return self._strip(factor, *nodes)
+        uniform = (products(nodes[0]), products(nodes[1]))
         if self.outline is not None:
-            inside = _inside(x, y, factor, self.outline)
+            inside = _inside(*nodes, factor, self.outline)
+            if not ghost:
+                return inside
             return (*((_times(1.0 - ghost, along_x), along_y) for along_x, along_y in inside),
                     (_times(ghost, uniform[0]), uniform[1]))  # fmt: skip
-        return (uniform,) if factor is None else _over_rectangle(x, y, factor)
+        return (uniform,) if factor is None else _over_rectangle(*nodes, factor)
 
-    def _strip(self, strip: EdgeStrip, share: float, x: Line, y: Line) -> Measure:
+    def _strip(self, strip: EdgeStrip, nodes_x: Nodes, nodes_y: Nodes) -> Measure:
         if self.outline is None:
             raise ValueError("fields: wanted an outline that a strip lies along, got none")
-        both = ((share, self.outline), (-share, strip.inner))
-        inside = ((sign, _inside(x, y, strip.field, outline)) for sign, outline in both)
+        both = ((1.0, self.outline), (-1.0, strip.inner))
+        inside = ((sign, _inside(nodes_x, nodes_y, strip.field, outline)) for sign, outline in both)
         return tuple((_times(sign, along_x), along_y) for sign, measure in inside for along_x, along_y in measure)
 
 
@@ -125,36 +139,40 @@ def _times(share: float, integrals: Products) -> Products:
     return {orders: share * matrix for orders, matrix in integrals.items()}
 
 
-def _over_rectangle(x: Line, y: Line, factor: Field) -> Measure:
+@lru_cache(maxsize=_N_KEPT)
+def _over_rectangle(nodes_x: Nodes, nodes_y: Nodes, factor: Field) -> Measure:
     """Integrals of a field: a sum of products, one for each singular value of the field that counts."""
-    (at_x, ahead), (at_y, across) = (gauss_points(side.nodes[:-1], np.diff(side.nodes), _POINTS) for side in (x, y))
+    x, y = np.array(nodes_x), np.array(nodes_y)
+    (at_x, ahead), (at_y, across) = (gauss_points(nodes[:-1], np.diff(nodes), _POINTS) for nodes in (x, y))
     left, values, right = np.linalg.svd(factor(at_x.reshape(-1, 1), at_y.ravel()), full_matrices=False)
     return tuple(
         (
-            assembled(element_products(x.nodes, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
-            assembled(element_products(y.nodes, at_y, across * right[r].reshape(at_y.shape))),
+            assembled(element_products(x, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
+            assembled(element_products(y, at_y, across * right[r].reshape(at_y.shape))),
         )
         for r in np.flatnonzero(values > _NEGLIGIBLE * values[0])
     )
 
 
-def _inside(x: Line, y: Line, factor: Field | None, outline: Outline) -> Measure:
+@lru_cache(maxsize=_N_KEPT)
+def _inside(nodes_x: Nodes, nodes_y: Nodes, factor: Field | None, outline: Outline) -> Measure:
     """Integrals of a field within an outline, from the integrals across the plate at every point along it."""
-    at_x, ahead = gauss_points(x.nodes[:-1], np.diff(x.nodes), _POINTS)
+    x, y = np.array(nodes_x), np.array(nodes_y)
+    at_x, ahead = gauss_points(x[:-1], np.diff(x), _POINTS)
     low, high = (limit[..., None] for limit in outline(at_x))
     # Elements across the plate, cut at its outline: (elements along x, points, elements across).
-    starts = np.clip(y.nodes[:-1], low, high)
-    at_y, across = gauss_points(starts, np.clip(y.nodes[1:], low, high) - starts, _POINTS)
+    starts = np.clip(y[:-1], low, high)
+    at_y, across = gauss_points(starts, np.clip(y[1:], low, high) - starts, _POINTS)
     if factor is not None:
         across = across * factor(at_x[..., None, None], at_y)
-    local = element_products(y.nodes, at_y, across)
+    local = element_products(y, at_y, across)
     # Every entry counts alike: what an outline leaves of a small element is small, and must not drown in rounding.
     scales = np.abs(local).max(axis=(0, 1))
     scales[scales == 0.0] = 1.0
     left, values, right = np.linalg.svd((local / scales).reshape(at_x.size, -1), full_matrices=False)
     return tuple(
         (
-            assembled(element_products(x.nodes, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
+            assembled(element_products(x, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
             assembled(scales * right[r].reshape(scales.shape)),
         )
         for r in np.flatnonzero(values > _NEGLIGIBLE * values[0])

@@ -204,7 +204,8 @@ def exact_models(
     for row, i in enumerate(alone):
         ends[2 * row, [*boxed, i]] = [*corners[row % len(corners), boxed], 1.0]
         ends[2 * row + 1, [*boxed, i]] = [*-corners[row % len(corners), boxed], -1.0]
-    corners = np.concatenate([corners[[0, -1]], ends[::2]] if is_rough else [corners, ends])
+    half = [corners[[0, -1]], ends[::2]]
+    corners = np.concatenate(half if is_rough else [*half, corners[1:-1], ends[1::2]])
     n_held_out = 1 if is_rough else _N_HELD_OUT
     held_out = np.random.default_rng(0).uniform(-1.0, 1.0, (n_held_out, parameters.n_dim))
 

@@ -199,3 +199,15 @@ def test_refuses_what_it_cannot_do():
 @pytest.mark.parametrize("effects", [["outline_profile"], ["outline_profile", "thickness_profile", "grain_angle"]])
 def test_reduced_order_model_is_exact(effects):
     assert worst_cents(posed("spruce-free-1R", effects).posterior.models) < 0.5
+
+
+@pytest.mark.parametrize("steps", [-2.0, 2.0])
+def test_components_of_the_thickness_leave_nothing_negative_outside_the_outline(steps):
+    """What is left of the plate there has the weight of what is expected: a negative mass has modes of its own."""
+    surfaces = [Surface(((i, j),), (0.01,)) for i, j in ((1, 0), (0, 1), (1, 1))]
+    open_field = ThicknessProfile(profile=FieldProfile(Surface(((1, 0),), (0.0,)), None, tuple(surfaces), FREE.h, 0.0))
+    effects = [outline(FREE, (0.0, 0.5, 1.0), (0.6, 1.0, 0.6)), open_field]  # whole elements lie outside
+    components = {one.name: steps for one in open_field.parameters()}
+    assert len(components) == 3
+    away, there = (hertz(FREE, effects, values, 6) for values in (components, dict.fromkeys(components, 0.0)))
+    assert 1200 * np.log2(away / there) == pytest.approx(0.0, abs=200.0)
