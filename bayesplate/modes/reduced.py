@@ -28,7 +28,7 @@ _FEW = 9
 _STEADY = 0.05
 _WHOLE = 40
 """Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
-_BEYOND = 6
+_BEYOND = 10
 """Modes above the wanted ones that are kept from it."""
 _BATCH, _SMALL_BATCH = 64, 512
 """Draws whose large or small matrices are held at once: those of a whole posterior would not fit any cache."""

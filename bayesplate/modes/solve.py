@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,8 @@ from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 
 _SPARE_FOR_PROJECTED = 8
 _FIRST_OF_CLASS = 8
+_MORE, _FEWEST_MORE = 1.15, 4
+"""What is added to an estimate of how many modes there are."""
 _TOLERANCE = 1e-8
 """Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
 
@@ -179,10 +182,16 @@ def solve(plate: PlateMatrices, weights: Weights, n_modes: int) -> Modes:
 def solve_up_to(plate: PlateMatrices, weights: Weights, highest: float) -> Modes:
     """All elastic modes of a plate up to an eigenvalue (s^-2), at least one; see `solve`."""
     solved = {block.parity: solve_class(block, weights, _FIRST_OF_CLASS) for block in plate.blocks}
-    while short := {p: 2 * c.eigenvalues.size for p, c in solved.items() if c.eigenvalues[-1] < highest}:
+    while short := {p: _enough(c.eigenvalues, highest) for p, c in solved.items() if c.eigenvalues[-1] < highest}:
         solved |= solve_classes(plate, weights, short)
     n_modes = sum(int(np.sum(c.eigenvalues <= highest)) for c in solved.values())
     return collect(plate, solved, max(n_modes, 1))
+
+
+def _enough(eigenvalues: NDArray[np.float64], highest: float) -> int:
+    """How many modes will reach up to an eigenvalue: those of a plate are about as dense at every frequency."""
+    ratio = float(np.sqrt(highest / eigenvalues[-1]))
+    return max(eigenvalues.size + _FEWEST_MORE, math.ceil(_MORE * ratio * eigenvalues.size))
 
 
 def collect(plate: PlateMatrices, solved: Mapping[Parity, ClassModes], n_modes: int | None = None) -> Modes:

@@ -112,7 +112,7 @@ def test_a_board_whose_residual_is_far_too_large_supports_no_claim(diagnosed):
     assert told.claim is False
 
 
-@pytest.mark.parametrize("name", ["finnish-spruce-cantilever", "spruce-free-2R"])
+@pytest.mark.parametrize("name", ["finnish-spruce-cantilever", pytest.param("spruce-free-2R", marks=slow)])
 def test_the_constants_of_the_search_are_those_of_the_sampler_without_effect(name):
     """Weighted draws of the normal terms against those of the sampler under the exact law: a fifth of a deviation.
 

@@ -51,7 +51,7 @@ def independent(plate, stations, widths, steps=()):
 
 PROFILES = {"taper": ((0.0, 1.0), (1.01, 0.99)), "bent": BENT, "cut": CUT}
 PLATES = {"cantilever": FINNISH, "free": FREE}
-QUICK = {("cantilever", "cut"), ("free", "bent")}
+QUICK = {("free", "bent")}
 CASES = [
     pytest.param(
         PLATES[plate],
@@ -196,7 +196,10 @@ def test_refuses_what_it_cannot_do():
     assert (OutlineProfile.is_implied(plain), OutlineProfile.is_implied(read)) == (False, True)
 
 
-@pytest.mark.parametrize("effects", [["outline_profile"], ["outline_profile", "thickness_profile", "grain_angle"]])
+THREE = pytest.param(["outline_profile", "thickness_profile", "grain_angle"], marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("effects", [["outline_profile"], THREE])
 def test_reduced_order_model_is_exact(effects):
     assert worst_cents(posed("spruce-free-1R", effects).posterior.models) < 0.5
 

@@ -73,8 +73,15 @@ PARAMETERS = {GRADIENT: 0.6, "grain_angle.angle": 0.1}
 TAPERS = {"thickness_profile.taper_x": 0.1, "thickness_profile.taper_y": 0.05}
 
 
-@pytest.mark.parametrize("is_sheared", [False, True], ids=["thin", "shear-flexible"])
-@pytest.mark.parametrize("is_tapered", [False, True], ids=["flat", "tapered"])
+@pytest.mark.parametrize(
+    ("is_tapered", "is_sheared"),
+    [
+        pytest.param(False, False, id="flat-thin"),
+        pytest.param(True, False, id="tapered-thin"),
+        pytest.param(False, True, id="flat-shear-flexible"),
+        pytest.param(True, True, id="tapered-shear-flexible", marks=pytest.mark.slow),
+    ],
+)
 def test_turns_with_the_grain_and_joins_a_taper(is_tapered, is_sheared):
     """What grows is the modulus along the grain, wherever that runs, on a board that is thicker at one end.
 

@@ -159,7 +159,7 @@ def test_three_masses_in_any_order_give_the_same_frequencies():
     assert np.abs(found / found[0] - 1.0).max() < 1e-9
 
 
-@pytest.mark.parametrize("edges", ["CFFF", "CCCC"])
+@pytest.mark.parametrize("edges", [pytest.param("CFFF", marks=pytest.mark.slow), "CCCC"])
 @pytest.mark.usefixtures("coarse")
 def test_what_changes_no_matrix_shares_those_of_the_plate_without_it(edges):
     """The air, a frame that moves and another Poisson ratio: projected masses and weights, nothing to assemble."""

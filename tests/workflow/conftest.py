@@ -47,8 +47,10 @@ def finnish(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
 
 @pytest.fixture(scope="session")
 def free(tmp_path_factory: pytest.TempPathFactory) -> runs.Run:
-    """A free board with nine labelled and seven unlabelled peaks and uncertain sizes, printed as JSON."""
-    return runs.fit(tmp_path_factory.mktemp("free") / "out", "spruce-free-2R", "--json", "--no-report")
+    """A free board with nine labelled and seven unlabelled peaks, taken to be uniform, printed as JSON."""
+    return runs.fit(
+        tmp_path_factory.mktemp("free") / "out", "spruce-free-2R", "--effects", "none", "--json", "--no-report"
+    )
 
 
 @pytest.fixture

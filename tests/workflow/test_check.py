@@ -66,7 +66,15 @@ def test_the_report_printed_is_the_one_returned(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-DEAR = ("spruce-free-1L", "spruce-free-1R", "spruce-free-2L", "spruce-free-3L", "spruce-free-3R", "nemus-D")
+DEAR = (
+    "spruce-free-2R",
+    "spruce-free-1L",
+    "spruce-free-1R",
+    "spruce-free-2L",
+    "spruce-free-3L",
+    "spruce-free-3R",
+    "nemus-D",
+)
 """Fields of thickness and outline, and labels that have to be found, make them dear."""
 
 BOARDS = [pytest.param(name, marks=pytest.mark.slow) if name in DEAR else name for name in card_names("boards")]

@@ -170,17 +170,23 @@ def test_a_visible_part_is_never_larger_than_the_whole_shift(weights):
     assert weighted_rms(np.array([3.0, 1.0]), np.array([1.0, 2.0])) == pytest.approx(np.sqrt((9 + 0.25) / 1.25))
 
 
+@pytest.fixture(scope="module")
+def uneven():
+    """A measured board of uneven thickness."""
+    return Problem.from_card("spruce-free-3L").posed
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["grain_angle", "support_stiffness"])
-def test_on_a_measured_board_of_uneven_thickness_an_effect_shows_less_than_it_shifts(name):
+def test_on_a_measured_board_of_uneven_thickness_an_effect_shows_less_than_it_shifts(uneven, name):
     """Near a veering, where a few steps of a linear refit leave more than the shift; and on a bed that lifts the board.
 
     The bed resists the rigid motions, which an uneven board mixes into its modes: no rigid motion is taken for a mode.
     """
-    posed = Problem.from_card("spruce-free-3L").posed
-    base = baseline_of(posed)
+    base = baseline_of(uneven)
     law = form_law(base, forms(base.board)[name][0]).placed(base)
     raw, visible, _ = nominal_shift(base, law)
-    (told,) = signatures(posed, [name])
+    (told,) = signatures(uneven, [name])
 
     assert 0.5 < base.weighted_rms(visible) / base.weighted_rms(raw) < 1.0
     assert told.visible_rms < told.raw_rms
