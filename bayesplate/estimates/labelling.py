@@ -79,10 +79,10 @@ def propose_labels(board: Board, prior: PriorCard, least: float = LIKELY) -> Pro
     every = (_settled(board, guess, least, tried) for guess in _guesses(board, prior))
     found = [one for one in every if one is not None]
     if len(found) < 2:
-        return Proposed((found or [board])[0], none)
-    judged = [one for one in (_judged(each) for each in found) if one is not None]
+        return Proposed(found[0][0] if found else board, none)
+    judged = [one for one in (_judged(*each) for each in found) if one is not None]
     if not judged:
-        return Proposed(found[0], none)
+        return Proposed(found[0][0], none)
     likelihoods, constants = np.array([one[0] for one in judged]), np.array([one[1] for one in judged])
     best = int(np.argmax(likelihoods))
     weights = np.exp(likelihoods - likelihoods[best])
@@ -90,22 +90,26 @@ def propose_labels(board: Board, prior: PriorCard, least: float = LIKELY) -> Pro
     return Proposed(judged[best][2], (off.T * weights / weights.sum()) @ off)
 
 
-def _settled(board: Board, guess: Guess, least: float, tried: list[tuple[Setup, ...]]) -> Board | None:
-    """The labels that come out of a first guess of the constants; None where they came up from another guess."""
+def _settled(
+    board: Board, guess: Guess, least: float, tried: list[tuple[Setup, ...]]
+) -> tuple[Board, NDArray[np.float64]] | None:
+    """The labels that come out of a first guess of the constants, and the rigidities that go with them.
+
+    None where they came up from another guess.
+    """
     before: list[tuple[Setup, ...]] = []
     while True:
         labelled = _labelled(board, guess, LIKELY)
         n_readings = sum(len(setup.readings) for setup in labelled.setups)
         if labelled.setups in before or len(before) == _MOST_ROUNDS or n_readings < len(RIGIDITIES):
-            return labelled if least == LIKELY else _labelled(board, guess, least)
+            return labelled if least == LIKELY else _labelled(board, guess, least), guess.rigidities
         if labelled.setups in tried:
             return None
         before.append(labelled.setups)
         tried.append(labelled.setups)
-        start = np.array([guess.values[name] for name in RIGIDITIES])
-        estimate = weighted_least_squares(_of_labelled(labelled), _STEPS, start)
+        estimate = weighted_least_squares(_of_labelled(labelled), _STEPS, guess.rigidities)
         if identifiability(estimate.sensitivities, estimate.scales).blind():
-            return labelled if least == LIKELY else _labelled(board, guess, least)
+            return labelled if least == LIKELY else _labelled(board, guess, least), guess.rigidities
         guess = _guess_of(board, estimate)
 
 
@@ -133,11 +137,11 @@ def _of_labelled(board: Board) -> Board:
     return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
 
 
-def _judged(board: Board) -> tuple[float, NDArray[np.float64], Board] | None:
+def _judged(board: Board, start: NDArray[np.float64]) -> tuple[float, NDArray[np.float64], Board] | None:
     """ln of the likelihood of a labelled board at its own estimate, at the noise that suits it best, and ln D there."""
     if sum(len(setup.readings) for setup in board.setups) < len(RIGIDITIES):
         return None
-    estimate = weighted_least_squares(_of_labelled(board))
+    estimate = weighted_least_squares(_of_labelled(board), _STEPS, start)
     levels = np.exp(np.linspace(-1.0, 3.0, _N_LEVELS))
     total = np.zeros(_N_LEVELS)
     for setup in board.setups:

@@ -69,6 +69,11 @@ class Guess:
     log_rigidities: Floats
     noise: float
 
+    @property
+    def rigidities(self) -> Floats:
+        """Those at its middle, N m: (3,) array."""
+        return np.array([self.values[name] for name in RIGIDITIES])
+
 
 def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[Guess]:
     """Regions of the prior in which the peaks of a board are likely, the likeliest first.
