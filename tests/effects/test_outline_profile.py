@@ -51,14 +51,13 @@ def independent(plate, stations, widths, steps=()):
 
 PROFILES = {"taper": ((0.0, 1.0), (1.01, 0.99)), "bent": BENT, "cut": CUT}
 PLATES = {"cantilever": FINNISH, "free": FREE}
-QUICK = {("free", "bent")}
 CASES = [
     pytest.param(
         PLATES[plate],
         PROFILES[profile],
         is_sheared,
         id=f"{plate}-{profile}-{'shear-flexible' if is_sheared else 'thin'}",
-        marks=pytest.mark.slow if is_sheared and (plate, profile) not in QUICK else (),
+        marks=pytest.mark.slow if is_sheared else (),
     )
     for plate in PLATES
     for profile in PROFILES

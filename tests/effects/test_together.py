@@ -131,7 +131,7 @@ def test_every_effect_meets_every_other_that_an_edge_condition_allows():
     assert {edges: len(pairs) for edges, pairs in PAIRS.items()} == {"CFFF": 55, "CCCC": 10 + 11, "FFFF": 9, "SSSS": 0}
 
 
-@pytest.mark.parametrize("edges", ["CFFF", "CCCC", "FFFF"])
+@pytest.mark.parametrize("edges", [pytest.param("CFFF", marks=pytest.mark.slow), "CCCC", "FFFF"])
 @pytest.mark.usefixtures("coarse")
 def test_two_effects_in_either_order_give_the_same_frequencies(edges):
     """To 1e-9: the eigen-solver's own digits."""

@@ -49,7 +49,9 @@ def test_a_fit_keeps_what_it_sampled(name, full_at, tmp_path):
     assert [path for path in left if path.endswith((".partial", name))] == []
 
 
-@pytest.mark.parametrize(("command", "name"), [("compare", "compare.json"), ("modes", "modes.svg")])
+@pytest.mark.parametrize(
+    ("command", "name"), [pytest.param("compare", "compare.json", marks=pytest.mark.slow), ("modes", "modes.svg")]
+)
 def test_what_keeps_no_checkpoint_names_the_file(command, name, full_at, tmp_path):
     full_at(name)
     result = CliRunner().invoke(main, [command, BOARD, "--out", str(tmp_path / "out")])

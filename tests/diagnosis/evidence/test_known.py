@@ -242,6 +242,7 @@ MOVED = np.array([0.06, -0.02, 0.05])
 """Change of ln D that the air makes on the board below."""
 
 
+@pytest.mark.slow
 def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
     """On this board air brings two modes so close that their shapes would exchange names."""
     problem = Problem.from_card("spruce-free-3L").posed
