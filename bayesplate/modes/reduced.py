@@ -142,9 +142,9 @@ def reduced_order_model(
     """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
 
     Of many points around the first half will do if the error at the held-out ones stays below a tenth of a cent. While
-    it does not, the second half joins the basis, then half of the held-out points. The
-    check is made at those that did not join: they lie as far out as the others, and none was chosen for its error, so
-    that it is an honest sample of the error over the region.
+    it does not, the second half joins the basis, then half of the held-out points. The check is
+    made at those that did not join: they lie as far out as the others, and none was chosen for its error, so that it is
+    an honest sample of the error over the region.
 
     Parameters
     ----------
@@ -186,7 +186,8 @@ def _reduce(
     exact = np.stack([solution.eigenvalues[:n_modes] for solution in checks])
     is_steady = _is_steady([*training, *held_out])
     together = Weights(*(np.stack(w) for w in zip(*held_out, strict=True)))
-    for n_trained, n_joined in ((n_first, 0), (len(training), 0), (len(training), len(held_out) // 2)):
+    rounds = (n_first, 0), (len(training), 0), (len(training), len(held_out) // 2)
+    for n_trained, n_joined in dict.fromkeys(rounds):
         trained += solved(training[len(trained) : n_trained])
         elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
         whole = _project(block, rigid, elastic, trained[0], training[0], is_steady)

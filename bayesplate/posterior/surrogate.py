@@ -40,8 +40,7 @@ _N_STEPS, _N_TAKEN = 40, 4
 _N_ARCHIVED = 128
 _BATCH = 2048
 LEAST_ACCEPTANCE = 0.5
-"""Of walks on a surrogate that serves. Below, the exact law is evaluated more often for steps that are refused than it
-would be without."""
+"""Of walks on a surrogate that serves. Below, most evaluations of the exact law would be for steps that are refused."""
 
 
 class Solved(NamedTuple):
@@ -138,8 +137,8 @@ def with_surrogate(posterior: Posterior, surrogate: Surrogate) -> SurrogatePoste
 def acceptance(log_ratios: Floats) -> float:
     """How often the end of a walk on a surrogate will be accepted under the law, where walks forget their start.
 
-    Modes that no peak is may be wrong at no cost, and where two modes that cross by a hair are sorted by frequency no
-    polynomial follows either; so a surrogate is judged by what its errors do to the density.
+    Modes that belong to no peak may be wrong at no cost, and where two modes that cross by a hair are sorted by
+    frequency no polynomial follows either; so a surrogate is judged by what its errors do to the density.
 
     Parameters
     ----------
