@@ -92,7 +92,7 @@ def main() -> None:
         arguments.out.mkdir(parents=True, exist_ok=True)
         (arguments.out / "closing-the-loop.md").write_text(markdown(diagnoses), encoding="utf-8")
         with (arguments.out / "closing-the-loop.csv").open("w", newline="", encoding="utf-8") as stream:
-            csv.writer(stream).writerows([COLUMNS, *rows(diagnoses)])
+            csv.writer(stream, lineterminator="\n").writerows([COLUMNS, *rows(diagnoses)])
 
 
 if __name__ == "__main__":

@@ -21,8 +21,6 @@ _SPARE = 2
 _RESISTS = 1e-6
 _LOWEST_SHARE = 1e-7
 _ACCEPTED_CENTS = 0.1
-_NEARLY = 1.1
-"""Where no basis meets that, the cheapest one whose error is at most so many times that of the best is taken."""
 _FEW = 9
 """Training points that are always solved, all of them."""
 _STEADY = 0.05
@@ -191,14 +189,12 @@ def _reduce(
         trained += solved(training[len(trained) : n_trained])
         elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
         whole = _project(block, rigid, elastic, trained[0], training[0], is_steady)
-        tried = []
         for reduced in _cheapest_first(whole, training[0], n_modes):
             ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
-            tried.append((reduced, 600.0 * float(np.abs(np.log2(ratios)).max())))
-            if tried[-1][1] <= _ACCEPTED_CENTS:
-                return tried[-1]
-    best = tried[-1][1]
-    return next(one for one in tried if one[1] <= _NEARLY * best)
+            worst = 600.0 * float(np.abs(np.log2(ratios)).max())
+            if worst <= _ACCEPTED_CENTS:
+                return reduced, worst
+    return reduced, worst
 
 
 def _is_supported(block: Block, solution: ClassModes) -> bool:
