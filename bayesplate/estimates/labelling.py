@@ -29,7 +29,7 @@ from bayesplate.plate.setup import Setup
 LIKELY = 0.5
 """Probability from which on a label is proposed: no two peaks can have the same one."""
 _N_DRAWS = 64
-_STEPS = 4
+_STEPS = 2
 """Of least squares that begin where others ended."""
 _N_LEVELS = 17
 _MOST_ROUNDS = 8

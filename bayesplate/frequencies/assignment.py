@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_LEAST = 1e-3
+LEAST = 1e-3
 """Probability that a mode left no peak, at least: the product over a hundred modes is a number still."""
 
 
@@ -75,7 +75,7 @@ class Assignments:
     @cached_property
     def _products(self) -> Floats:
         """M_j, from no mode to all: (n_draws, n_modes + 1) array."""
-        missed = np.maximum(self.missed, _LEAST)
+        missed = np.maximum(self.missed, LEAST)
         return np.concatenate([np.ones((len(missed), 1)), np.cumprod(missed, axis=1)], axis=1)
 
     @cached_property

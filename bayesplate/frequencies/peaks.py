@@ -9,17 +9,17 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.assignment import Assignments
+from bayesplate.frequencies.assignment import LEAST, Assignments
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.frequencies.residues import NODAL_LINE
+from bayesplate.frequencies.residues import share_seen, sign_probabilities
 from bayesplate.labels import Label
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
-Group = tuple[Rows, Rows]
-"""Peaks and modes."""
+Group = tuple[Rows, Rows, Floats]
+"""Peaks and modes that keep their order, and ln of the probability that a mode has the sign of a peak."""
 
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""
@@ -34,7 +34,8 @@ class PeakLikelihood:
     modes that no certain label has taken, about which it scatters as a reading does. A mode leaves no peak with a prior
     probability, which is higher the nearer hammer or sensor stand to its nodal lines, or if it lies above the highest
     peak. Where the signs of residues are known, on the card and from the shapes, a peak of the other sign is not that
-    mode, and peaks and modes keep their order within a sign only. A label that may be wrong is right with the
+    mode, and peaks and modes keep their order within a sign only; a mode with so small a residue that it may have
+    either sign is in both orders. A label that may be wrong is right with the
     probability that the card gives, and otherwise any other mode's.
 
     Attributes
@@ -48,14 +49,16 @@ class PeakLikelihood:
     labels : tuple of Label or None
         Of these modes.
     log_prior : (n_peaks, n_modes) array
-        ln of what is known of each pair beforehand: seen, no spurious peak, its sign, its label.
+        ln of what is known of each pair beforehand: seen, no spurious peak, its label.
     log_alone : (n_peaks,) array
         ln of the probability of each peak if it is no mode.
     missed : (n_modes,) array
         Probability that a mode below the highest peak left none.
-    orders : tuple of tuple of (array of int, array of int)
+    orders : tuple of tuple of Group
         Peaks and modes that keep their order: all, or those of one sign and those of the other; in the latter case once
         for every sign that the peaks of unknown sign may have.
+    shared : (n_shared,) array of int
+        Modes that are in the orders of both signs.
     log_highest : float
         ln of the highest frequency that was read, Hz.
     """
@@ -69,6 +72,7 @@ class PeakLikelihood:
     log_alone: Floats
     missed: Floats
     orders: tuple[tuple[Group, ...], ...]
+    shared: Rows
     log_highest: float
 
     @classmethod
@@ -96,19 +100,17 @@ class PeakLikelihood:
         columns = np.concatenate([doubtful, others]).astype(np.intp)
         residues = None if model.residues is None else model.residues[columns]
         seen = np.full(columns.size, 1.0 - setup.missed)
-        known = np.zeros(columns.size)
         if residues is not None:
-            size = np.nan_to_num(residues, nan=1.0) ** 2
-            seen = seen * size / (size + NODAL_LINE**2)
-            known = np.nan_to_num(np.sign(residues))
-        opposed = signs[:, None] * known < 0
-        log_pair = np.where(opposed, -np.inf, np.log(seen) + np.log1p(-setup.spurious))
+            seen = seen * np.where(np.isnan(residues), 1.0, share_seen(np.nan_to_num(residues)))
+        log_pair = np.log(seen) + np.log1p(-setup.spurious)
         labels = tuple(_labels(model)[column] for column in columns)
         log_label = _log_labels(setup, readings, labels)
         highest = max([*setup.measured, *setup.unlabelled])
         wide = np.where(errors.rounded, errors.resolution, errors.frequency) / highest
-        orders = tuple(_orders(signs, known))
-        log_sign = np.where(((signs != 0) & known.any()) | (len(orders[0]) > 1), -np.log(2.0), 0.0)
+        orders = tuple(_orders(signs, columns.size, residues))
+        is_split = len(orders[0]) > 1
+        log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
+        in_both = np.isin(np.arange(columns.size), orders[0][0][1]) & np.isin(np.arange(columns.size), orders[0][-1][1])
         log_alone = np.log(setup.spurious * wide) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
@@ -120,6 +122,7 @@ class PeakLikelihood:
             log_alone=log_alone,
             missed=1.0 - seen,
             orders=orders,
+            shared=np.flatnonzero(in_both & is_split),
             log_highest=float(np.log(highest)),
         )
 
@@ -145,7 +148,10 @@ class PeakLikelihood:
         result = np.full(len(there), -np.inf)
         if has_all.any():
             by_order = self._assignments(there[has_all], noise[has_all])
-            result[has_all] = logsumexp([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
+            total = logsumexp([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
+            # A mode in two orders was counted as missed in one of them at least.
+            twice = self._missed(there[has_all], noise[has_all])[:, self.shared]
+            result[has_all] = total - np.log(np.maximum(twice, LEAST)).sum(axis=1)
         return result
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
@@ -169,25 +175,38 @@ class PeakLikelihood:
                 result[peaks] += np.tensordot(weight, by_mode, axes=1) / len(noise)
         return result
 
+    def log_density_alone(self, reading: int) -> float:
+        """ln of the density, in ln f, of one of the setup's readings if it is no mode."""
+        at = int(np.flatnonzero(self.readings == reading)[0])
+        errors = self.errors.at(np.array([at]))
+        width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
+        return float(self.log_alone[at] - np.log(width))
+
     def _assignments(self, there: Floats, noise: Floats) -> list[list[tuple[Rows, Rows, Assignments]]]:
         """Of each group of each of `orders`: its peaks, its modes in the order of each draw, what they say together.
 
         The modes are (n_draws, n) arrays.
         """
-        from scipy.special import ndtr
+        missed = self._missed(there, noise)
 
-        sd = self.errors.sd(noise).mean(axis=1, keepdims=True)
-        missed = self.missed + (1.0 - self.missed) * ndtr((there - self.log_highest) / sd)
-
-        def assigned(peaks: Rows, modes: Rows) -> tuple[Rows, Rows, Assignments]:
-            order = modes[np.argsort(there[:, modes], axis=1)]
+        def assigned(peaks: Rows, modes: Rows, log_sign: Floats) -> tuple[Rows, Rows, Assignments]:
+            by_rank = np.argsort(there[:, modes], axis=1)
+            order = modes[by_rank]
             ordered = np.take_along_axis(there, order, axis=1)
             log_errors = self.errors.at(peaks).log_likelihood_of_each(ordered, noise)
-            log_prior = np.swapaxes(self.log_prior.T[order][:, :, peaks], 1, 2)
+            known = self.log_prior[np.ix_(peaks, modes)] + log_sign
+            log_prior = np.swapaxes(known.T[by_rank], 1, 2)
             alone, lonely = self.log_alone[peaks], np.take_along_axis(missed, order, axis=1)
             return peaks, order, Assignments(log_errors + log_prior, alone, lonely)
 
         return [[assigned(*group) for group in groups] for groups in self.orders]
+
+    def _missed(self, there: Floats, noise: Floats) -> Floats:
+        """Probability that each mode left no peak: (n_draws, n_modes) array."""
+        from scipy.special import ndtr
+
+        sd = self.errors.sd(noise).mean(axis=1, keepdims=True)
+        return np.asarray(self.missed + (1.0 - self.missed) * ndtr((there - self.log_highest) / sd))
 
 
 def takes_part(setup: Setup) -> bool:
@@ -199,16 +218,23 @@ def _signs(setup: Setup, doubtful: Rows) -> list[str]:
     return [*(peak.sign for peak in setup.peaks), *(setup.readings[i].sign for i in doubtful)]
 
 
-def _orders(signs: Rows, known: Floats) -> Iterator[tuple[Group, ...]]:
+def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[tuple[Group, ...]]:
     """Those of one sign apart, for every sign of the peaks of which it is not known; or all together."""
     unsigned = np.flatnonzero(signs == 0)
-    if unsigned.size > _MOST_UNSIGNED or unsigned.size == signs.size or not known.all():
-        yield ((np.arange(signs.size), np.arange(known.size)),)
+    peaks, modes = np.arange(signs.size), np.arange(n_modes)
+    log_sign = np.zeros((3, n_modes))
+    is_known = residues is not None and not np.isnan(residues).any()
+    if residues is not None:
+        with np.errstate(divide="ignore"):
+            log_sign[[1, -1]] = np.log(sign_probabilities(residues))
+    if unsigned.size > _MOST_UNSIGNED or unsigned.size == signs.size or not is_known:
+        yield ((peaks, modes, log_sign[signs]),)
         return
     for tried in product((1, -1), repeat=unsigned.size):
         every = signs.copy()
         every[unsigned] = tried
-        yield tuple((np.flatnonzero(every == sign), np.flatnonzero(known == sign)) for sign in (1, -1))
+        members = [(np.flatnonzero(every == sign), np.flatnonzero(log_sign[sign] > -np.inf)) for sign in (1, -1)]
+        yield tuple((own, of, log_sign[every[own]][:, of]) for own, of in members)
 
 
 def _labels(model: SetupModel) -> list[Label | None]:

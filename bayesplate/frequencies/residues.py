@@ -14,7 +14,13 @@ from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.plate.setup import Setup
 
 NODAL_LINE = 0.05
-"""Residue over the largest that a shape could give, below which a place counts as lying on a nodal line."""
+"""Residue over the largest that a shape could give, below which a place counts as lying on a nodal line.
+
+As far as that a computed residue may be off, too: neighbouring modes of one class mix otherwise on the real board, and
+places were read with a ruler.
+"""
+_SURE = 1e-3
+"""Probability below which a mode does not have a sign."""
 
 _GRID = np.linspace(0.0, 1.0, 21)
 
@@ -40,6 +46,33 @@ def residues_of(setup: Setup, modes: Modes, values: Values) -> NDArray[np.float6
     hammer, sensor = (_fraction(setup, place, values) for place in (setup.hammer, sensors[0].places[0]))
     at = [modes.displacement(np.array([x]), np.array([y]))[:, 0, 0] for x, y in (hammer, sensor)]
     return np.asarray(at[0] * at[1] / np.max(np.abs(modes.displacement(_GRID, _GRID)), axis=(1, 2)) ** 2)
+
+
+def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of its chance to leave a peak that a mode keeps between hammer and sensor: (n_modes,) array, 0 to 1.
+
+    It is r^2 / (r^2 + s^2) with s = `NODAL_LINE`, averaged over residues r that scatter about the computed one by s,
+
+        1 - sqrt(pi / 2) Re w((r + i s) / (s sqrt 2)),
+
+    w being the Faddeeva function: a third of it is left where the computed residue is zero.
+    """
+    from scipy.special import wofz
+
+    argument = (residues / NODAL_LINE + 1j) / np.sqrt(2.0)
+    return np.asarray(1.0 - np.sqrt(np.pi / 2.0) * wofz(argument).real)
+
+
+def sign_probabilities(residues: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Probability that the residue of each mode is positive, and that it is negative: (2, n_modes) array.
+
+    For a computed residue that is off by `NODAL_LINE`; one half each where none is known.
+    """
+    from scipy.special import ndtr
+
+    positive = ndtr(np.nan_to_num(residues) / NODAL_LINE)
+    positive = np.where(positive < _SURE, 0.0, np.where(positive > 1.0 - _SURE, 1.0, positive))
+    return np.stack([positive, 1.0 - positive])
 
 
 def _fraction(setup: Setup, place: tuple[float, float], values: Values) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -111,6 +111,15 @@ class Board:
             raise ValueError(f"priors: wanted names of {', '.join(self.inputs)}, got {', '.join(sorted(unknown))}")
         return replace(
             self, parameters=tuple(replace(one, prior=priors.get(one.name, one.prior)) for one in self.parameters)
+        )
+
+    def without(self, effects: Collection[str]) -> Board:
+        """The board without some of its declared effects, by their names."""
+        return replace(
+            self,
+            effects=tuple(name for name in self.effects if name not in effects),
+            chosen=tuple(one for one in self.chosen if one.name not in effects),
+            parameters=tuple(one for one in self.parameters if one.effect not in effects),
         )
 
     @classmethod

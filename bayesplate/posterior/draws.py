@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.board import density
 from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
-from bayesplate.posterior.inference import Inference, PosedProblem, labelled_by
+from bayesplate.posterior.inference import Inference, PosedProblem, columns_of_each, labelled_by
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class Draws:
         return self.theta.reshape(-1, self.theta.shape[-1])
 
 
-def named_draws(inference: Inference, seed: int) -> Draws:
+def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[Floats] | None = None) -> Draws:
     """Thin the chains of an inference and name what they mean.
 
     Parameters
@@ -68,6 +68,8 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     inference : Inference
     seed : int
         Of the predictive draws.
+    every_log_frequency : sequence of (n_draws, n_every) array, optional
+        ln f (Hz) of all modes at the thinned draws, where it is known already.
 
     Returns
     -------
@@ -83,8 +85,10 @@ def named_draws(inference: Inference, seed: int) -> Draws:
     values = problem.parameters.values(flat)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     noise = np.exp(problem.parameters.log_noise(flat))
-    distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
-    by_setup = [part[which.ravel()] for part in posterior.every_log_frequency(distinct)]
+    if every_log_frequency is None:
+        distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
+        every_log_frequency = [part[which.ravel()] for part in posterior.every_log_frequency(distinct)]
+    by_setup = list(every_log_frequency)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
     labelled = posterior.labelled(by_setup)
     predictive = [
@@ -125,7 +129,10 @@ def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draw
     step = max(1, len(draws.flat) // MOST_DRAWS_OF_LABELS)
     noise = draws.noise.reshape(len(draws.flat), -1)
     labelled = labelled_by(inference, [every[::step] for every in flat], noise[::step])
-    return labelled, draws if labelled is inference else named_draws(labelled, seed)
+    if labelled is inference:
+        return inference, draws
+    columns = columns_of_each(inference.problem.posterior.models, labelled.problem.posterior.models)
+    return labelled, named_draws(labelled, seed, [every[:, own] for every, own in zip(flat, columns, strict=True)])
 
 
 def posterior_mean_values(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:

@@ -195,19 +195,21 @@ def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noi
     posterior = Posterior(board, before.prior, models, before.law, before.robust)
     surrogate = inference.surrogate
     if surrogate is not None:
-        surrogate = replace(surrogate, coefficients=surrogate.coefficients[:, _columns(before.models, models)])
+        columns = columns_of_each(before.models, models)
+        starts = np.cumsum([0, *(len(model.every_place) for model in before.models)])[:-1]
+        every = np.concatenate([start + own for start, own in zip(starts, columns, strict=True)])
+        surrogate = replace(surrogate, coefficients=surrogate.coefficients[:, every])
     found = identifiability(estimate.sensitivities, estimate.scales)
     again = replace(problem, board=board, estimate=estimate, identifiability=found, posterior=posterior)
     return replace(inference, problem=again, surrogate=surrogate)
 
 
-def _columns(before: Sequence[SetupModel], after: Sequence[SetupModel]) -> list[int]:
-    """Where the columns of some models stood before they were labelled anew."""
-    columns, first = [], 0
-    for old, new in zip(before, after, strict=True):
-        columns += [first + old.every_place.index(place) for place in new.every_place]
-        first += len(old.every_place)
-    return columns
+def columns_of_each(before: Sequence[SetupModel], after: Sequence[SetupModel]) -> list[NDArray[np.intp]]:
+    """Where the columns of each setup's model stood before it was labelled anew."""
+    return [
+        np.array([old.every_place.index(place) for place in new.every_place], dtype=np.intp)
+        for old, new in zip(before, after, strict=True)
+    ]
 
 
 def _widening(board: Board) -> float:

@@ -135,14 +135,22 @@ def noise_widenings(board: Board, estimate: Estimate) -> Floats:
 
 
 def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predict:
-    """Logarithms of all frequencies as a function of the fitted columns, the noise columns kept as in `centre`."""
+    """ln f (Hz) of the labelled modes as a function of the fitted columns, the noise columns kept as in `centre`."""
+    every = every_predictor(board, models, law, centre)
+    n_every = np.cumsum([0, *(len(model.every_place) for model in models)])[:-1]
+    labelled = np.concatenate([start + np.arange(len(m.places)) for start, m in zip(n_every, models, strict=True)])
+    return lambda x: every(x)[:, labelled]
+
+
+def every_predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predict:
+    """The same of all modes that peaks may be, setup after setup."""
     parameters = Parameters(board)
 
     def predict(x: Floats) -> Floats:
         theta = np.tile(centre, (len(x), 1))
         theta[:, parameters.fitted_columns] = x
         values = parameters.values(theta)
-        return np.concatenate([model.log_frequencies(values, law) for model in models], axis=1)
+        return np.concatenate([model.every_log_frequency(values, law) for model in models], axis=1)
 
     return predict
 

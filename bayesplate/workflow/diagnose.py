@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.diagnosis.decision.advice import recommendation
 from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
@@ -18,9 +19,9 @@ from bayesplate.diagnosis.decision.refits import refit_board
 from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answer_words, answers, decide
 from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
+from bayesplate.diagnosis.evidence.peaks import with_own_labels
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.diagnosis.shifts.settled import with_settled_labels
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
@@ -142,8 +143,6 @@ def diagnose(
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))
-    settled, left_out = with_settled_labels(problem.prepared.board, problem.prior)
-    problem = with_board(problem, settled)
     begun = opened(problem, seed, out, force=force, resume=resume, first=BEFORE)
     folder = begun.folder
 
@@ -159,17 +158,17 @@ def diagnose(
     before = run(problem, BEFORE, "fit without further effects")
     stages.begin("search for effects", _SEARCH)
     ground = prepare_search(baseline_of(before.inference.problem), tell=stages.reached)
-    found = search(ground)
+    found = search(with_own_labels(ground))
     stages.begin("effects that are known", _KNOWN)
     solved = {name: one.laws[0] for name, one in ground.candidates.items()}
     known = known_fits(before.inference.problem, solved, stages.reached)
     stages.begin("the same search on simulated boards", _CONTROL)
-    control = null_control(found.ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
+    control = null_control(ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
     finals = verdict.stands_for[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals)
     refits: dict[int, Fitted] = {}
-    notes = [*left_out, *problem.posed.doubts]
+    notes = list(problem.posed.doubts)
     for answer in finals:
         try:
             name = "-".join((*answer.members, str(answer.index)))
@@ -208,8 +207,8 @@ def _case(
         verdict=verdict,
         control=control,
         folded=folded,
-        before=Side(0, before.summary, before.draws),
-        after=Side(verdict.index if is_refitted else 0, after.summary, after.draws),
+        before=Side(0, before.summary, before.draws, _measured(before)),
+        after=Side(verdict.index if is_refitted else 0, after.summary, after.draws, _measured(after)),
         claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
         recommendation=advice(found, verdict),
         known=known,
@@ -217,6 +216,11 @@ def _case(
         drawn={index: one.draws for index, one in refits.items()},
         notes=notes,
     )
+
+
+def _measured(one: Fitted) -> NDArray[np.float64]:
+    """Frequencies of the readings that have a label in a fit: (n_modes,) array, Hz."""
+    return np.concatenate([setup.measured for setup in one.inference.problem.board.setups])
 
 
 def advice(found: Found, verdict: Verdict) -> str:

@@ -10,7 +10,6 @@ import ritz
 from made_boards import board_of, setup_of
 
 from bayesplate.cards import load_prior
-from bayesplate.diagnosis.shifts.settled import with_settled_labels
 from bayesplate.estimates.labelling import propose_labels, with_labels
 from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood
@@ -109,22 +108,3 @@ def test_a_model_labelled_anew_has_the_same_frequencies(likelihood):
 
     assert after == before
     assert [reading.beams for reading in setup.readings] == list(again.every_beams[:6])
-
-
-def test_a_diagnosis_rests_on_labels_that_are_certain():
-    """A peak halfway between two modes is neither; the others become sure, and what is left out is said."""
-    between = float(np.sqrt(HERTZ[3, 1] * HERTZ[2, 2]))
-    peaks = [HERTZ[label] for label in LABELS[4:6]]
-    settled, (note,) = with_settled_labels(board_with(LABELS[:4], [*peaks, between], noise=0.02), PRIOR)
-    (setup,) = settled.setups
-
-    assert labels_of(settled) == {round(HERTZ[label], 3): label for label in LABELS[:6]}
-    assert all(reading.is_sure for reading in setup.readings)
-    assert setup.peaks == ()
-    assert f"left out: {between:.5g} Hz" in note
-    assert "6 of 7 peaks" in note
-
-
-def test_a_diagnosis_of_sure_labels_takes_them_all():
-    board = board_with(LABELS, ())
-    assert with_settled_labels(board, PRIOR) == (board, ())

@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
-from bayesplate.frequencies.residues import NODAL_LINE
+from bayesplate.frequencies.residues import NODAL_LINE, share_seen, sign_probabilities
 from bayesplate.modes.naming import Place
 from bayesplate.modes.plate import Parity
 from bayesplate.plate.measured import Peak, Reading
@@ -127,18 +127,40 @@ def test_a_proposed_label_says_nothing() -> None:
 RESIDUES = np.array([0.6, -0.4, 0.5, -0.02, 0.3])
 
 
-def test_signs_keep_peaks_and_modes_apart_and_nodal_lines_hide_modes() -> None:
+def test_signs_keep_peaks_and_modes_apart() -> None:
+    """The fourth mode may have either sign: the sum over both, each with its probability."""
     signed = {99.5: "+", 130.2: "-", 131.5: "+", 181.0: "-"}
     setup = setup_of(peaks=[Peak(exact(hertz), sign) for hertz, sign in signed.items()])
     found = PeakLikelihood.of(model_of(setup, RESIDUES)).log_likelihood(MODES, NOISE)
-    seen = (1.0 - MISSED) * RESIDUES**2 / (RESIDUES**2 + NODAL_LINE**2)
+    seen = (1.0 - MISSED) * share_seen(RESIDUES)
+    positive = norm.cdf(RESIDUES[3] / NODAL_LINE)
     for draw in range(3):
         expected = 0.0
-        for sign, wanted in (("+", RESIDUES > 0), ("-", RESIDUES < 0)):
-            hertz = [one for one, own in signed.items() if own == sign]
-            total, _ = enumerated(hertz, MODES[draw, wanted], seen[wanted], NOISE[draw], 181.0, 0.5 * SPURIOUS)
-            expected += np.log(total)
-        assert found[draw] == pytest.approx(expected, abs=1e-9)
+        for is_positive, weight in ((True, positive), (False, 1.0 - positive)):
+            has_plus = np.array([True, False, True, is_positive, True])
+            for sign, wanted in (("+", has_plus), ("-", ~has_plus)):
+                hertz = [one for one, own in signed.items() if own == sign]
+                weight *= enumerated(hertz, MODES[draw, wanted], seen[wanted], NOISE[draw], 181.0, 0.5 * SPURIOUS)[0]
+            expected += weight
+        assert found[draw] == pytest.approx(np.log(expected), abs=1e-9)
+
+
+def test_nodal_lines_hide_modes() -> None:
+    """By the mean over residues that scatter about the computed one; where it is large, nearly all is seen."""
+    rng = np.random.default_rng(1)
+    drawn = RESIDUES + NODAL_LINE * rng.standard_normal((200_000, RESIDUES.size))
+    shares = drawn**2 / (drawn**2 + NODAL_LINE**2)
+    error = 4.0 * shares.std(axis=0) / np.sqrt(len(drawn))
+    assert (np.abs(share_seen(RESIDUES) - shares.mean(axis=0)) < error).all()
+    assert share_seen(np.zeros(1))[0] == pytest.approx(0.344, abs=5e-4)
+    assert (np.abs(RESIDUES**2 / (RESIDUES**2 + NODAL_LINE**2) - shares.mean(axis=0)) > error).all()  # control
+
+
+def test_a_sign_is_certain_away_from_nodal_lines_only() -> None:
+    positive, negative = sign_probabilities(np.array([0.6, -0.4, 0.0, 0.05, np.nan]))
+    assert positive == pytest.approx([1.0, 0.0, 0.5, norm.cdf(1.0), 0.5])
+    assert positive[:2].tolist() == [1.0, 0.0]
+    assert positive + negative == pytest.approx(1.0)
 
 
 def test_a_peak_of_unknown_sign_is_tried_with_both() -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import Candidate, Found
-from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.evidence.terms import Fold, normalised
 from bayesplate.diagnosis.shifts.laws import FormLaw
+from bayesplate.posterior.parameters import N_RIGIDITIES
 
 Floats = NDArray[np.float64]
 
@@ -31,10 +33,12 @@ class TermDraws:
         For each effect of the hypothesis its cell; for one effect that of its fine table, for two of the coarse ones.
     within : (n_draws, n_tangents) array
         Place within the cell, standard deviations; those of the first effect come first.
-    predicted : (n_draws, n_modes) array
-        ln f (Hz) as the terms have it.
+    predicted : (n_draws, n_every) array
+        ln f (Hz) of all modes as the terms have it, with the inputs at the middle of their priors where they are zero.
     variance : (n_draws, n_modes) array
-        Of each reading, relative.
+        Of each reading, relative; infinite where it is no mode.
+    noise : (n_draws, n_setups) array
+        Relative.
     """
 
     index: int
@@ -44,6 +48,7 @@ class TermDraws:
     within: Floats
     predicted: Floats
     variance: Floats
+    noise: Floats
 
     @property
     def n_draws(self) -> int:
@@ -60,6 +65,7 @@ class TermDraws:
             within=self.within[picked],
             predicted=self.predicted[picked],
             variance=self.variance[picked],
+            noise=self.noise[picked],
         )
 
 
@@ -78,36 +84,50 @@ def draw_terms(found: Found, index: int, rng: np.random.Generator, n_draws: int)
     TermDraws
         Sorted by cell.
     """
-    ground, hypothesis = found.ground, found.ground.hypotheses[index]
-    baseline, table = ground.baseline, hypothesis.table
-    residual = hypothesis.seen(baseline, found.residual[None, :])[0]
-    log_density = hypothesis.terms(ground.whole).log_densities(residual[None, :])[:, 0]
+    drawn = draw_hypothesis(found.ground.whole, found.ground.hypotheses[index], found.residual, rng, n_draws)
+    return replace(drawn, index=index, cells=_of_members(found, index, drawn.cells[:, 0]))
+
+
+def draw_hypothesis(
+    whole: Fold, hypothesis: Hypothesis, residual: Floats, rng: np.random.Generator, n_draws: int
+) -> TermDraws:
+    """Draw from the posterior under a hypothesis that belongs to no search yet; cells are those of its table."""
+    terms = hypothesis.terms(whole)
+    baseline, table = terms.fold.baseline, hypothesis.table
+    seen = hypothesis.seen(whole.baseline, residual[None, :])[0]
+    log_density = terms.log_densities(seen[None, :])[:, 0]
     picked = np.sort(rng.choice(log_density.size, size=n_draws, p=normalised(log_density)))
     levels, cells = np.divmod(picked, table.n_cells)
-    first_input = 3 + table.slopes.shape[2]
-    variance = hypothesis.noise.sd[levels][:, baseline.setup_index] ** 2 + baseline.own_variance
-    columns = np.concatenate(
-        [
-            np.broadcast_to(baseline.slopes, (n_draws, *baseline.slopes.shape)),
-            table.slopes[cells],
-            np.broadcast_to(baseline.input_slopes, (n_draws, *baseline.input_slopes.shape)),
-        ],
-        axis=2,
-    )
-    joint = _regressed(columns, variance, residual - table.shift[cells], rng)
-    inside = joint[:, 3:first_input]
+    first_input = N_RIGIDITIES + table.slopes.shape[2]
+    noise = hypothesis.noise.sd[levels]
+    variance = noise[:, baseline.setup_index] ** 2 + baseline.own_variance
+    variance[:, ~baseline.is_mode] = np.inf
+    columns = _columns(baseline.slopes, table.slopes[cells], baseline.input_slopes)
+    joint = _regressed(columns, variance, seen - table.shift[cells], rng)
+    inside = joint[:, N_RIGIDITIES:first_input]
+    every, wide = baseline.every, table if hypothesis.wide is None else hypothesis.wide
+    middle = every.log_frequency - every.input_slopes @ every.inputs
+    moving = _columns(every.slopes, wide.slopes[cells], every.input_slopes)
     return TermDraws(
-        index=index,
+        index=0,
         log_rigidities=baseline.log_rigidities
-        + joint[:, :3]
+        + joint[:, :N_RIGIDITIES]
         + table.moved[cells]
         + np.einsum("nkp,np->nk", table.moved_slopes[cells], inside),
         inputs=joint[:, first_input:],
-        cells=_of_members(found, index, cells),
+        cells=cells[:, None],
         within=inside,
-        predicted=baseline.log_frequency + table.shift[cells] + np.einsum("nmp,np->nm", columns, joint),
+        predicted=middle + wide.shift[cells] + np.einsum("nmp,np->nm", moving, joint),
         variance=variance,
+        noise=noise,
     )
+
+
+def _columns(slopes: Floats, of_sizes: Floats, of_inputs: Floats) -> Floats:
+    """What constants, sizes and inputs do to ln f at each draw: (n, n_modes, n_coefficients) array."""
+    n = len(of_sizes)
+    fixed = [np.broadcast_to(part, (n, *part.shape)) for part in (slopes, of_inputs)]
+    return np.concatenate([fixed[0], of_sizes, fixed[1]], axis=2)
 
 
 def members_of(found: Found, index: int) -> tuple[Candidate, ...]:

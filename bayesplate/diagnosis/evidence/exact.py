@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.draws import TermDraws, draw_terms, members_of, sizes_of
 from bayesplate.diagnosis.evidence.hypotheses import probabilities
+from bayesplate.diagnosis.evidence.peaks import log_mean, log_of_terms, log_summed
 from bayesplate.diagnosis.evidence.search import Found
 
 Floats = NDArray[np.float64]
@@ -66,43 +67,61 @@ def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int)
 
 
 def log_weights_of(found: Found, drawn: TermDraws) -> Floats:
-    """ln of the likelihood under the exact law over that of the linear terms: (n_draws,) array."""
-    baseline = found.ground.baseline
+    """ln of the likelihood under the exact law over that of the linear terms: (n_draws,) array.
+
+    Where readings may be other modes than their labels say, the former is summed over all ways to take them.
+    """
+    return _log_weights(found, drawn, exact_log_frequencies(found, drawn))
+
+
+def _log_weights(found: Found, drawn: TermDraws, exact: Floats) -> Floats:
     hypothesis = found.ground.hypotheses[drawn.index]
-    readings = baseline.log_frequency + hypothesis.seen(baseline, found.residual[None, :])[0]
-    exact = exact_log_frequencies(found, drawn)
-    squares = ((readings - exact) ** 2 - (readings - drawn.predicted) ** 2) / drawn.variance
-    return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf)
+    own = found.ground.baseline if hypothesis.own is None else hypothesis.own
+    seen = own.middle + hypothesis.seen(found.ground.baseline, found.residual[None, :])[0]
+    if not own.every.is_open:
+        squares = ((seen - exact) ** 2 - (seen - drawn.predicted) ** 2) / drawn.variance
+        return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf)
+    return log_summed(own, exact, drawn.noise) - log_of_terms(own, seen, drawn)
 
 
 def exact_log_frequencies(found: Found, drawn: TermDraws) -> Floats:
-    """ln f (Hz) of all readings at each draw: (n_draws, n_modes) array."""
-    baseline = found.ground.baseline
+    """ln f (Hz) of all modes that readings may be, at each draw: (n_draws, n_every) array."""
+    every = found.ground.baseline.every
     parts = [_with_effect(found, drawn, member) for member in range(len(members_of(found, drawn.index)))]
     n_bare = 1 - len(parts)
     total = sum(parts) + (n_bare * _bare(found, drawn.log_rigidities) if n_bare else 0.0)
-    return np.asarray(total + drawn.inputs @ baseline.input_slopes.T)
+    return np.asarray(total + (drawn.inputs - every.inputs) @ every.input_slopes.T)
 
 
 def _with_effect(found: Found, drawn: TermDraws, member: int) -> Floats:
-    """ln f (Hz) with one effect alone at each draw: (n_draws, n_modes) array."""
+    """ln f (Hz) with one effect alone at each draw: (n_draws, n_every) array."""
     baseline = found.ground.baseline
-    result = np.empty((drawn.n_draws, baseline.n_modes))
+    result = np.empty((drawn.n_draws, baseline.every.log_frequency.size))
     for law, rows, values in sizes_of(found, drawn, member):
-        result[rows] = law.log_frequencies(baseline, drawn.log_rigidities[rows], values)
+        result[rows] = law.every_log_frequency(baseline, drawn.log_rigidities[rows], values)
     return result
 
 
 def _bare(found: Found, log_rigidities: Floats) -> Floats:
-    predict = found.ground.baseline.predict
+    predict = found.ground.baseline.every.predict
     assert predict is not None
     return predict(log_rigidities)
 
 
 def _correction(found: Found, index: int, rng: np.random.Generator) -> float:
-    log_weights = log_weights_of(found, draw_terms(found, index, rng, _N_DRAWS))
-    top = float(log_weights.max())
-    return top + float(np.log(np.mean(np.exp(log_weights - top)))) if np.isfinite(top) else -np.inf
+    drawn = draw_terms(found, index, rng, _N_DRAWS)
+    log_weights = log_weights_of(found, drawn)
+    if not np.isfinite(log_weights.max()):
+        return -np.inf
+    every = found.ground.baseline.every
+    if not every.is_open:
+        return log_mean(log_weights)
+    own = found.ground.hypotheses[index].own or found.ground.baseline
+    seen = own.middle + found.ground.hypotheses[index].seen(found.ground.baseline, found.residual[None, :])[0]
+    # The sum over labels is in the evidence already: what the law adds is the ratio of both sums at the same draws.
+    return log_mean(log_weights) - log_mean(
+        log_summed(own, drawn.predicted, drawn.noise) - log_of_terms(own, seen, drawn)
+    )
 
 
 def _has_law(found: Found, index: int) -> bool:

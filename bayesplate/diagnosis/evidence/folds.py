@@ -32,7 +32,7 @@ class Nested:
     before : (n_sets, n_modes) array
         ln measured less predicted, without any effect.
     after : (n_sets, n_modes) array
-        With the effect that the remaining readings choose, or none.
+        With the effect that the remaining readings choose, or none; not a number where the reading is no mode then.
     chosen : (n_sets, n_modes) array of int
         Index of the hypothesis that each fold chose.
     """
@@ -43,8 +43,10 @@ class Nested:
 
     @property
     def ratio(self) -> Floats:
-        """Rms after over rms before: (n_sets,) array."""
-        return np.asarray(np.sqrt(np.mean(self.after**2, axis=1) / np.mean(self.before**2, axis=1)))
+        """Rms after over rms before, over the readings that are a mode under both: (n_sets,) array."""
+        both = np.isfinite(self.before) & np.isfinite(self.after)
+        after, before = (np.where(both, part, 0.0) for part in (self.after, self.before))
+        return np.asarray(np.sqrt(np.sum(after**2, axis=1) / np.sum(before**2, axis=1)))
 
 
 def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> Nested | None:
@@ -131,6 +133,9 @@ def _log_score_of(ground: Ground, index: int, residual: Floats, mode: int) -> fl
     """Log density of one reading given the others, under one hypothesis."""
     hypothesis = ground.hypotheses[index]
     seen = hypothesis.seen(ground.baseline, residual[None, :])
+    own = ground.baseline if hypothesis.own is None else hypothesis.own
+    if not own.is_mode[mode]:
+        return own.log_alone(mode)
     fold = Fold(ground.baseline, mode)
     whole, without = (hypothesis.terms(one).log_evidence(seen)[0] for one in (ground.whole, fold))
     return float(whole - without)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -15,6 +15,7 @@ from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.tables import Table, nothing, together
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 NONE, ONE, TWO = 0.5, 0.4, 0.1
 """Prior probability that nothing, one effect, or two are behind a residual; each shared equally by those tried."""
@@ -62,6 +63,12 @@ class Hypothesis:
     table : Table
     noise : NoiseGrid
     swap : Swap or None
+    wide : Table, optional
+        The table of all modes that readings may be; by default no other than that of the readings.
+    own : Baseline, optional
+        The baseline with the labels that readings have under this hypothesis, where these are not those on the board.
+    log_labels : float
+        ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand.
     """
 
     members: tuple[str, ...]
@@ -69,14 +76,27 @@ class Hypothesis:
     table: Table
     noise: NoiseGrid
     swap: Swap | None = None
+    wide: Table | None = None
+    own: Baseline | None = None
+    log_labels: float = 0.0
 
     def terms(self, fold: Fold) -> Terms:
         """Normal terms in a fold, which names the reading that is left out by its place on the card."""
+        if self.own is not None:
+            fold = Fold(self.own, fold.left_out)
         return Terms(self.table, fold if self.swap is None else self.swap.in_fold(fold), self.noise)
 
     def seen(self, baseline: Baseline, residuals: Floats) -> Floats:
         """Residuals as this hypothesis reads them."""
+        if self.own is not None:
+            return residuals + (baseline.middle - self.own.middle)
         return residuals if self.swap is None else self.swap.applied(baseline, residuals.copy())
+
+    def labelled(self, baseline: Baseline, rows: Rows) -> Hypothesis:
+        """The same hypothesis, the readings of a baseline taken for other modes of its spectrum."""
+        wide = self.table if self.wide is None else self.wide
+        own = None if np.array_equal(rows, baseline.rows) else baseline.labelled(rows)
+        return replace(self, table=replace(wide.of(rows), weights=self.table.weights), wide=wide, own=own)
 
 
 def hypotheses(
@@ -94,7 +114,7 @@ def hypotheses(
         member that cannot be seen, so that every effect would seem to come with an invisible one.
     """
     levels, few = noise_grid(baseline.board), noise_grid(baseline.board, few=True)
-    empty = nothing(baseline.n_modes)
+    empty = nothing(baseline.every.log_frequency.size)
     swaps = confusable(baseline)
     pairs = list(combinations([name for name in fine if name in paired], 2))
     each = ONE / max(len(fine) + bool(swaps), 1)
@@ -104,19 +124,21 @@ def hypotheses(
     found += [
         Hypothesis((one, other), TWO / len(pairs), together(coarse[one], coarse[other]), few) for one, other in pairs
     ]
-    return tuple(found)
+    return tuple(replace(one, table=one.table.of(baseline.rows), wide=one.table) for one in found)
 
 
 def confusable(baseline: Baseline) -> tuple[Swap, ...]:
     """Neighbouring readings of one setup that lie close together and whose labels may be each other's.
 
+    Where a card doubts a label, the assignments of peaks to modes say what it may be instead.
     Either they belong to different symmetry classes; or to one, and stand in the other order than the modes of the
     fitted plate, which an effect that mixes the two may cause as well as a slip.
     """
     readings = baseline.residual + baseline.log_frequency
+    is_sure = np.array([reading.is_sure for setup in baseline.board.setups for reading in setup.readings])
     swaps = []
     for setup in range(len(baseline.board.setups)):
-        members = np.flatnonzero(baseline.setup_index == setup)
+        members = np.flatnonzero((baseline.setup_index == setup) & is_sure)
         ordered = members[np.argsort(readings[members])]
         for first, second in pairwise(ordered):
             differ = baseline.places[first].parity != baseline.places[second].parity
@@ -127,8 +149,13 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
 
 
 def log_evidences(found: Sequence[Hypothesis], fold: Fold, residuals: Floats) -> Floats:
-    """Logarithm of the evidence of every hypothesis for every data set: (n_hypotheses, n_sets) array."""
-    return np.stack([one.terms(fold).log_evidence(one.seen(fold.baseline, residuals)) for one in found])
+    """Logarithm of the evidence of every hypothesis for every data set: (n_hypotheses, n_sets) array.
+
+    Summed over the ways to take peaks for modes, as far as the hypotheses know of any (`with_own_labels`).
+    """
+    return np.stack(
+        [one.terms(fold).log_evidence(one.seen(fold.baseline, residuals)) + one.log_labels for one in found]
+    )
 
 
 def probabilities(found: Sequence[Hypothesis], evidences: Floats) -> Floats:

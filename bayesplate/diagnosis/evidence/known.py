@@ -144,7 +144,7 @@ def known_fit(
     -------
     KnownFit
     """
-    board = with_known_sizes(without_effects(problem.board, without), effects)
+    board = with_known_sizes(problem.board.without(without), effects)
     inputs, target, scales = board.nominal(), log_measured(board), reading_scales(board)
     start = np.log(problem.estimate.rigidities) if start is None else start
     law = _law(solved or _solved(problem, board, start), inputs)
@@ -164,16 +164,6 @@ def with_known_sizes(board: Board, effects: Sequence[str]) -> Board:
     acting = (one for setup in board.setups for one in effects_of(added, setup) if one.name in effects)
     sizes = (size for one in acting for size in one.parameters())
     return added.with_parameters(replace(size, prior=Quantity.exact(size.prior.median)) for size in sizes)
-
-
-def without_effects(board: Board, effects: Sequence[str]) -> Board:
-    """A board without some of its declared effects."""
-    return replace(
-        board,
-        effects=tuple(name for name in board.effects if name not in effects),
-        chosen=tuple(one for one in board.chosen if one.name not in effects),
-        parameters=tuple(one for one in board.parameters if one.effect not in effects),
-    )
 
 
 def _law(models: Models, inputs: Values) -> Predict:

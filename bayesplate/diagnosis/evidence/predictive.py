@@ -34,8 +34,9 @@ def predictive_p_value(hypothesis: Hypothesis, fold: Fold, residuals: Floats) ->
     from scipy.special import chdtrc
 
     terms = hypothesis.terms(fold)
-    seen = hypothesis.seen(fold.baseline, residuals) @ fold.blind.T
-    spread = np.einsum("di,kip->kdp", fold.blind, hypothesis.table.slopes)
+    blind = terms.fold.blind
+    seen = hypothesis.seen(fold.baseline, residuals) @ blind.T
+    spread = np.einsum("di,kip->kdp", blind, hypothesis.table.slopes)
     cells = hypothesis.table.weights > 0
     penalty = -2.0 * np.log(hypothesis.table.weights[cells] / hypothesis.table.weights.max())
     result = np.zeros(len(residuals))

@@ -40,9 +40,11 @@ class Fold:
 
     @cached_property
     def used(self) -> NDArray[np.intp]:
-        """Indices of the readings that are used."""
-        every = np.arange(self.baseline.n_modes)
-        return every if self.left_out is None else np.delete(every, self.left_out)
+        """Indices of the readings that are used: those that are modes."""
+        kept = self.baseline.is_mode.copy()
+        if self.left_out is not None:
+            kept[self.left_out] = False
+        return np.flatnonzero(kept)
 
     @cached_property
     def blind(self) -> Floats:
@@ -70,8 +72,13 @@ class Fold:
 
     @cached_property
     def misses(self) -> Floats:
-        """Takes readings to the error of predicting the one that was left out: (n_modes,) array."""
+        """Takes readings to the error of predicting the one that was left out: (n_modes,) array.
+
+        Not numbers where that reading is no mode.
+        """
         assert self.left_out is not None
+        if not self.baseline.is_mode[self.left_out]:
+            return np.full(self.baseline.n_modes, np.nan)
         row = -self.baseline.slopes[self.left_out] @ self.absorbing
         row[self.left_out] += 1.0
         return np.asarray(row)

@@ -12,24 +12,76 @@ the inputs have their priors and count as one more covariance.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.least_squares import Estimate, log_measured, reading_scales
-from bayesplate.estimates.refit import Predict, design, refit
+from bayesplate.estimates.refit import Predict, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.inference import PosedProblem
-from bayesplate.posterior.laplace import predictor
+from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """All modes that readings may be, setup after setup: the labelled ones first, then those of peaks.
+
+    Attributes
+    ----------
+    log_frequency : (n_every,) array
+        ln f (Hz) at the estimate.
+    slopes : (n_every, 3) array
+        d ln f / d ln D.
+    input_slopes : (n_every, n_inputs) array
+        d ln f / d z.
+    places : tuple of tuple of Place
+        One tuple per setup.
+    inputs : (n_inputs,) array
+        z at the estimate.
+    peaks : tuple of PeakLikelihood or None
+        For each setup what its peaks say of its modes; None where all labels are certain.
+    predict : callable, optional
+        ln f (Hz) of all of them as a function of x, without an effect; by default linear.
+    """
+
+    log_frequency: Floats
+    slopes: Floats
+    input_slopes: Floats
+    places: tuple[tuple[Place, ...], ...]
+    inputs: Floats
+    peaks: tuple[PeakLikelihood | None, ...]
+    predict: Predict | None = None
+
+    @cached_property
+    def flat_places(self) -> tuple[Place, ...]:
+        """Places of all modes."""
+        return tuple(place for part in self.places for place in part)
+
+    @cached_property
+    def starts(self) -> Rows:
+        """Where each setup begins: (n_setups,) array."""
+        return np.cumsum([0, *(len(part) for part in self.places)])[:-1]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a reading may be another mode than its label says."""
+        return any(peaks is not None for peaks in self.peaks)
+
+    def first_of_each(self, counts: Sequence[int]) -> Rows:
+        """The first so many modes of each setup: (sum of counts,) array."""
+        return np.concatenate([start + np.arange(n) for start, n in zip(self.starts, counts, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +109,10 @@ class Baseline:
         Whether each setup's two halves are alike along x and along y.
     predict : callable, optional
         ln f (Hz) of the readings as a function of x, without the effect; by default linear.
+    spectrum : Spectrum, optional
+        All modes that the readings may be, where labels are not certain; by default those of the readings.
+    modes : (n_modes,) array of int, optional
+        Which mode of the spectrum each reading is; -1: none. By default the first one is the first.
     """
 
     board: Board
@@ -69,11 +125,73 @@ class Baseline:
     places: tuple[Place, ...]
     symmetry: tuple[tuple[bool, bool], ...]
     predict: Predict | None = None
+    spectrum: Spectrum | None = None
+    modes: Rows | None = None
 
     @property
     def n_modes(self) -> int:
         """Number of readings."""
         return int(self.residual.size)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """Which mode of `every` each reading is: (n_modes,) array, -1 for none."""
+        return np.arange(self.n_modes) if self.modes is None else self.modes
+
+    @cached_property
+    def is_mode(self) -> NDArray[np.bool_]:
+        """Which readings are a mode of the plate: (n_modes,) array."""
+        return np.asarray(self.rows >= 0)
+
+    @cached_property
+    def every(self) -> Spectrum:
+        """All modes that the readings may be."""
+        if self.spectrum is not None:
+            return self.spectrum
+        ends = np.cumsum([len(setup.readings) for setup in self.board.setups])[:-1]
+        parts = np.split(np.arange(self.n_modes), ends)
+        places = tuple(tuple(self.places[i] for i in part) for part in parts)
+        none = np.zeros(self.input_slopes.shape[1])
+        return Spectrum(
+            self.log_frequency, self.slopes, self.input_slopes, places, none, (None,) * len(places), self.predict
+        )
+
+    def labelled(self, rows: Rows) -> Baseline:
+        """The same readings taken for other modes.
+
+        Parameters
+        ----------
+        rows : (n_modes,) array of int
+            Of `every`; -1: none, and then what the arrays say of the reading means nothing.
+
+        Returns
+        -------
+        Baseline
+        """
+        every = self.every
+        predict = every.predict
+        changed = replace(
+            self,
+            log_frequency=every.log_frequency[rows],
+            slopes=every.slopes[rows],
+            input_slopes=every.input_slopes[rows],
+            places=tuple(every.flat_places[row] for row in rows),
+            predict=None if predict is None else lambda x: predict(x)[:, rows],
+            modes=rows,
+        )
+        return replace(changed, residual=self.residual + self.middle - changed.middle)
+
+    def log_alone(self, reading: int) -> float:
+        """ln of the probability density, in ln f, of a reading that is no mode; 0 of one whose label is certain."""
+        setup = int(self.setup_index[reading])
+        peaks = self.every.peaks[setup]
+        at = reading - int(np.flatnonzero(self.setup_index == setup)[0])
+        return 0.0 if peaks is None or at not in peaks.readings else peaks.log_density_alone(at)
+
+    @property
+    def middle(self) -> Floats:
+        """ln f (Hz) at the middle of the priors of the inputs, from which residuals count: (n_modes,) array."""
+        return np.asarray(self.log_frequency - self.input_slopes @ self.every.inputs)
 
     @cached_property
     def setup_index(self) -> NDArray[np.intp]:
@@ -126,26 +244,35 @@ class Baseline:
 
 def baseline_of(problem: PosedProblem) -> Baseline:
     """The baseline of a problem that is ready to be sampled, at the centre of its posterior under the exact law."""
-    board, parameters = problem.board, problem.parameters
+    board, parameters, models = problem.board, problem.parameters, problem.posterior.models
     columns = parameters.fitted_columns
-    predict = predictor(board, problem.posterior.models, "exact", problem.centre)
+    predict = every_predictor(board, models, "exact", problem.centre)
     at = problem.centre[columns]
-    slopes = design(predict, np.ones(_n_modes(board)), at)[: _n_modes(board)]
-    inputs = slopes[:, N_RIGIDITIES:]
-    predicted = predict(at[None, :])[0]
-    there = parameters.values(problem.centre[None, :])
-    return Baseline(
-        board=board,
-        values={name: np.asarray(np.ravel(value)[0]) for name, value in there.items()},
-        log_rigidities=at[:N_RIGIDITIES],
-        log_frequency=predicted,
-        residual=log_measured(board) - predicted + inputs @ at[N_RIGIDITIES:],
+    slopes = sensitivities(predict, at)
+    inputs = at[N_RIGIDITIES:]
+    spectrum = Spectrum(
+        log_frequency=predict(at[None, :])[0],
         slopes=slopes[:, :N_RIGIDITIES],
-        input_slopes=inputs,
-        places=places_of(problem.posterior.models),
-        symmetry=symmetry_of(problem.posterior.models),
-        predict=lambda x: predict(np.concatenate([x, np.tile(at[N_RIGIDITIES:], (len(x), 1))], axis=1)),
+        input_slopes=slopes[:, N_RIGIDITIES:],
+        places=tuple(model.every_place for model in models),
+        inputs=inputs,
+        peaks=problem.posterior.peaks,
+        predict=lambda x: predict(np.concatenate([x, np.tile(inputs, (len(x), 1))], axis=1)),
     )
+    rows = spectrum.first_of_each([len(setup.readings) for setup in board.setups])
+    bare = Baseline(
+        board=board,
+        values={name: np.asarray(np.ravel(v)[0]) for name, v in parameters.values(problem.centre[None, :]).items()},
+        log_rigidities=at[:N_RIGIDITIES],
+        log_frequency=np.zeros(rows.size),
+        residual=log_measured(board),
+        slopes=np.zeros((rows.size, N_RIGIDITIES)),
+        input_slopes=np.zeros((rows.size, inputs.size)),
+        places=(),
+        symmetry=symmetry_of(models),
+        spectrum=spectrum,
+    )
+    return bare.labelled(rows)
 
 
 def weighted_rms(shift: Floats, scales: Floats) -> float:
@@ -187,7 +314,3 @@ def places_of(models: Sequence[SetupModel]) -> tuple[Place, ...]:
 def symmetry_of(models: Sequence[SetupModel]) -> tuple[tuple[bool, bool], ...]:
     """Whether the two halves are alike along x and along y, setup after setup."""
     return tuple((model.plate.line_x.is_symmetric, model.plate.line_y.is_symmetric) for model in models)
-
-
-def _n_modes(board: Board) -> int:
-    return sum(len(setup.readings) for setup in board.setups)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,9 +13,10 @@ from bayesplate.diagnosis.shifts.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.shifts.following import Following
 from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.frequencies.laws import ExactLaw, log_frequency
-from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import Place
+from bayesplate.modes.plate import Parity
 from bayesplate.plate.board import Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
@@ -51,6 +53,10 @@ class FormLaw:
         values : dict of (n,) array
             The form's free parameters by name, SI.
         """
+        return self.every_log_frequency(baseline, log_rigidities, values)[:, baseline.rows]
+
+    def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
+        """The same of all modes that the baseline's readings may be: (n, n_every) array."""
         inputs = _inputs(baseline, self.form)
         constants = dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))
         there: Values = inputs | dict(values) | constants
@@ -65,17 +71,16 @@ class FormLaw:
         frequency without the effect, and followed from there by its shape.
         """
         models, following = [], []
-        first = 0
         for i, model in enumerate(self.models):
-            n = len(model.places)
-            of_base = baseline.places[first : first + n]
+            of_base = baseline.every.places[i]
             keeps = symmetry_of([model])[0] == baseline.symmetry[i]
-            places = of_base if keeps else self._by_frequency(baseline, model, of_base, slice(first, first + n))
+            places = of_base if keeps else self._by_frequency(baseline, i)
             assert model.exact is not None
-            reduced = replace(model.exact.reduced, places=places)
-            models.append(replace(model, places=places, exact=ExactLaw(reduced)))
+            labelled = len(model.setup.readings)
+            others = tuple(OtherMode(place, None) for place in places[labelled:])
+            exact = ExactLaw(replace(model.exact.reduced, places=places))
+            models.append(replace(model, places=places[:labelled], others=others, exact=exact))
             following.append(() if keeps else self._followed(baseline, models[-1], of_base))
-            first += n
         return replace(self, models=tuple(models), following=tuple(following))
 
     def _followed(self, baseline: Baseline, model: SetupModel, of_base: Sequence[Place]) -> tuple[Following, ...]:
@@ -84,7 +89,7 @@ class FormLaw:
         weights = model.system.weights(self._without(baseline))
         result = []
         for block in model.exact.reduced.blocks:
-            rows = np.flatnonzero([place.parity == block.parity for place in model.places])
+            rows = np.flatnonzero([place.parity == block.parity for place in model.every_place])
             classes: dict[object, list[int]] = {}
             for position, row in enumerate(rows):
                 classes.setdefault(of_base[int(row)].parity, []).append(position)
@@ -92,7 +97,7 @@ class FormLaw:
                 np.array(sorted(members, key=lambda position: of_base[int(rows[position])].rank))
                 for members in classes.values()
             )
-            wanted = np.array([model.places[row].rank for row in rows])
+            wanted = np.array([model.every_place[row].rank for row in rows])
             result.append(Following.of(block, weights, wanted, groups))
         return tuple(result)
 
@@ -102,28 +107,26 @@ class FormLaw:
         constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities)[:, None], strict=True))
         return _inputs(baseline, self.form) | nothing | constants
 
-    def _by_frequency(
-        self, baseline: Baseline, model: SetupModel, of_base: Sequence[Place], rows: slice
-    ) -> tuple[Place, ...]:
+    def _by_frequency(self, baseline: Baseline, setup: int) -> tuple[Place, ...]:
+        """Where the modes of a setup stand on the plate with the effect absent, each at a place of its own."""
+        from scipy.optimize import linear_sum_assignment
+
+        model, of_base = self.models[setup], baseline.every.places[setup]
         assert model.exact is not None
         weights = model.system.weights(self._without(baseline))
-        wanted = baseline.log_frequency[rows]
-        symmetry = symmetry_of([model])[0]
-        found = []
-        for place, target in zip(of_base, wanted, strict=True):
-            best: tuple[float, Place] | None = None
-            for block in model.exact.reduced.blocks:
-                kept = zip(symmetry, block.parity, place.parity, strict=True)
-                if any(is_kept and one != other for is_kept, one, other in kept):
-                    continue
-                there_too = 0.5 * np.log(block.eigenvalues(weights)[0]) - np.log(2.0 * np.pi)
-                rank = int(np.argmin(np.abs(there_too - target)))
-                miss = abs(float(there_too[rank] - target))
-                if best is None or miss < best[0]:
-                    best = (miss, Place(block.parity, rank, place.correlation))
-            assert best is not None
-            found.append(best[1])
-        return tuple(found)
+        start = baseline.every.starts[setup]
+        wanted = baseline.every.log_frequency[start : start + len(of_base)]
+        found: dict[int, Place] = {}
+        for block in model.exact.reduced.blocks:
+            rows = [
+                i for i, place in enumerate(of_base) if merged(place.parity, symmetry_of([model])[0]) == block.parity
+            ]
+            there = 0.5 * np.log(block.eigenvalues(weights)[0]) - np.log(2.0 * np.pi)
+            misses = (wanted[rows, None] - there) ** 2
+            for row, rank in zip(*linear_sum_assignment(misses), strict=True):
+                at = rows[int(row)]
+                found[at] = Place(block.parity, int(rank), of_base[at].correlation)
+        return tuple(found[i] for i in range(len(of_base)))
 
 
 def form_law(baseline: Baseline, form: Form, half_width: float | None = None) -> FormLaw:
@@ -145,7 +148,10 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
     values = dict(_inputs(baseline, form))
     middle = {free.name: np.asarray(free.prior.median) for free in form.free}
     at_middle = {**values, **middle, **{n: baseline.values[n] for n in RIGIDITIES}}
-    models = tuple(setup_model(system_of(board, setup), at_middle) for setup in board.setups)
+    models = tuple(
+        _with_others(setup_model(system_of(board, setup), at_middle), baseline, i)
+        for i, setup in enumerate(board.setups)
+    )
     noise = np.array([setup.noise.median for setup in board.setups])
     centre = parameters.theta(at_middle, noise)
     covariance = np.eye(parameters.n_dim)
@@ -157,14 +163,33 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
     return FormLaw(form, exact_models(board, models, centre, covariance))
 
 
+def merged(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:
+    """The class of a mode on a plate that has only the given symmetries left."""
+    return Parity(parity.x if symmetry[0] else 0, parity.y if symmetry[1] else 0)
+
+
+def _with_others(model: SetupModel, baseline: Baseline, setup: int) -> SetupModel:
+    """A model of as many modes of each class as the baseline has of those that fall into it."""
+    of_base = baseline.every.places[setup]
+    n_readings = len(model.setup.readings)
+    if len(of_base) == n_readings:
+        return model
+    symmetry = symmetry_of([model])[0]
+    counts = Counter(merged(place.parity, symmetry) for place in of_base)
+    others = [Place(parity, rank, 0.0) for parity, n in counts.items() for rank in range(n)]
+    if symmetry == baseline.symmetry[setup]:
+        others = list(of_base[n_readings:])
+    return replace(model, others=tuple(OtherMode(place, None) for place in others))
+
+
 def _log_frequencies(model: SetupModel, following: Sequence[Following], values: Values) -> Floats:
-    """ln f of a setup's labelled modes: by rank, or followed by their shapes."""
+    """ln f of all modes of a setup: by rank, or followed by their shapes."""
     if not following:
-        return model.log_frequencies(values, "exact")
+        return model.every_log_frequency(values, "exact")
     weights = model.system.weights(values)
-    squared = np.empty((len(weights.stiffness), len(model.places)))
+    squared = np.empty((len(weights.stiffness), len(model.every_place)))
     for each in following:
-        squared[:, [place.parity == each.block.parity for place in model.places]] = each.eigenvalues(weights)
+        squared[:, [place.parity == each.block.parity for place in model.every_place]] = each.eigenvalues(weights)
     return log_frequency(squared)
 
 

@@ -43,7 +43,8 @@ class Table:
     weights : (n_cells,) array
         Prior probability, summing to 1.
     shift : (n_cells, n_modes) array
-        ln f with the effect, constants refitted, less ln f of the baseline.
+        ln f with the effect, constants refitted, less ln f of the baseline; of all modes that readings may be, or of
+        those that they are taken for.
     slopes : (n_cells, n_modes, n_tangents) array
         Change of the shift over one standard deviation of the cell.
     moved : (n_cells, 3) array
@@ -71,6 +72,12 @@ class Table:
     def n_cells(self) -> int:
         """Number of cells."""
         return int(self.weights.size)
+
+    def of(self, rows: NDArray[np.intp]) -> Table:
+        """The same cells for some of the modes, by their indices."""
+        if np.array_equal(rows, np.arange(self.shift.shape[1])):
+            return self
+        return replace(self, shift=self.shift[:, rows], slopes=self.slopes[:, rows])
 
 
 def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
@@ -146,7 +153,7 @@ def nothing(n_modes: int) -> Table:
 
 
 def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
-    """Shifts with the constants refitted to the baseline, and what the refit changed.
+    """Shifts of all modes with the constants refitted to the baseline's readings, and what the refit changed.
 
     Parameters
     ----------
@@ -157,19 +164,19 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Float
 
     Returns
     -------
-    shift : (n, n_modes) array
+    shift : (n, n_every) array
         Not a number where the law gives no frequency.
     moved : (n, 3) array
     """
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
     moved = np.zeros((len(z), N_RIGIDITIES))
-    shift = np.empty((len(z), baseline.n_modes))
+    shift = np.empty((len(z), baseline.every.log_frequency.size))
     moving = np.arange(len(z))
     for n_done in range(_REFITS):
         there = {name: value[moving] for name, value in values.items()}
         at = baseline.log_rigidities + moved[moving]
-        shift[moving] = law.log_frequencies(baseline, at, there) - baseline.log_frequency
-        step = -np.nan_to_num(shift[moving]) @ baseline.absorbing.T
+        shift[moving] = law.every_log_frequency(baseline, at, there) - baseline.every.log_frequency
+        step = -np.nan_to_num(shift[moving][:, baseline.rows]) @ baseline.absorbing.T
         longest = np.abs(step).max(axis=1)
         moving, step, longest = (each[longest > _SETTLED] for each in (moving, step, longest))
         if not moving.size or n_done == _REFITS - 1:
@@ -189,7 +196,7 @@ def nominal_shift(baseline: Baseline, law: FormLaw) -> tuple[Floats, Floats, Flo
 def traced_shift(baseline: Baseline, law: FormLaw) -> Floats:
     """Visible shift at the form's nominal size where the search finds the constants: (n_modes,) array, ln f."""
     z = np.array([[float(free.prior.standard(free.nominal)) for free in law.form.free]])
-    return refitted(baseline, law, z)[0][0]
+    return np.asarray(refitted(baseline, law, z)[0][0, baseline.rows])
 
 
 def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: tuple[int, int, int]) -> Table:

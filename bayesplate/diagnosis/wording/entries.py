@@ -121,12 +121,13 @@ def _best_fit(found: Found, index: int) -> float:
     """Log density at the best size, noise averaged: what the evidence would be without the width of the prior."""
     hypothesis = found.ground.hypotheses[index]
     seen = hypothesis.seen(found.ground.baseline, found.residual[None, :])
-    log_density = hypothesis.terms(found.ground.whole).log_densities(seen)[:, 0]
+    terms = hypothesis.terms(found.ground.whole)
+    log_density = terms.log_densities(seen)[:, 0]
     by_cell = log_density.reshape(hypothesis.noise.weights.size, -1)
     top = by_cell.max(axis=0)
     with np.errstate(divide="ignore"):
         summed = top + np.log(np.exp(by_cell - top).sum(axis=0)) - np.log(hypothesis.table.weights)
-    return float(summed[hypothesis.table.weights > 0].max()) - found.ground.whole.half_log_det
+    return float(summed[hypothesis.table.weights > 0].max()) - terms.fold.half_log_det + hypothesis.log_labels
 
 
 def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:

@@ -46,11 +46,12 @@ _N_AVERAGED = 8000
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """The model before or after: its hypothesis, its summary and its draws."""
+    """The model before or after: its hypothesis, its summary and its draws, and its labelled readings, Hz."""
 
     index: int
     summary: Summary
     draws: Draws
+    measured: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +152,10 @@ def _errors(case: Case, side: Side) -> Errors:
     found, folded = case.found, case.folded
     nested = None
     if folded is not None:
-        nested = rms(cents(folded.after[0] if side.index else folded.before[0]))
-    low, high = np.quantile(side.draws.predictive.reshape(-1, found.ground.baseline.n_modes), [0.05, 0.95], axis=0)
-    measured = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
+        both = np.isfinite(folded.before[0]) & np.isfinite(folded.after[0])
+        nested = rms(cents((folded.after if side.index else folded.before)[0, both]))
+    measured = side.measured
+    low, high = np.quantile(side.draws.predictive.reshape(-1, measured.size), [0.05, 0.95], axis=0)
     return Errors(
         in_sample_rms_cents=side.summary.error.in_sample_rms_cents,
         leave_one_out_rms_cents=side.summary.error.leave_one_out_rms_cents,

@@ -31,7 +31,7 @@ class BentLaw:
     def __init__(self, form, base, direction):
         self.form, self.base, self.direction = form, base, direction
 
-    def log_frequencies(self, base, log_rigidities, values):
+    def every_log_frequency(self, base, log_rigidities, values):
         (size,) = values.values()
         return bent(self.base)(log_rigidities) + np.outer(size, self.direction)
 
@@ -79,7 +79,7 @@ def quadrature(found, law):
         weights = weights / weights.sum()
     density = np.zeros(len(x))
     for size, weight in zip(sizes, weights, strict=True):
-        there = base.predict(x) if law is None else law.log_frequencies(base, x, {"size": np.full(len(x), size)})
+        there = base.predict(x) if law is None else law.every_log_frequency(base, x, {"size": np.full(len(x), size)})
         density += weight * np.exp(-0.5 * np.sum((readings - there) ** 2, axis=1) / NOISE**2)
     mean = density @ x / density.sum()
     return mean, np.sqrt(density @ (x - mean) ** 2 / density.sum()), np.log(density.sum())

@@ -82,8 +82,8 @@ def case_of(found: Found, control: NullControl, folded: Nested | None, **changed
     verdict = decided(found)
     readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
     draws = draws_of(readings * np.linspace(0.99, 1.01, 21)[None, :, None])
-    after = Side(verdict.index, MOVED, draws) if verdict.index else Side(0, FIGURES, draws)
-    case = Case(found, verdict, control, folded, Side(0, FIGURES, draws), after, Claim(), "Measure on.")
+    after = Side(verdict.index, MOVED, draws, readings) if verdict.index else Side(0, FIGURES, draws, readings)
+    case = Case(found, verdict, control, folded, Side(0, FIGURES, draws, readings), after, Claim(), "Measure on.")
     return replace(case, **changed)
 
 
