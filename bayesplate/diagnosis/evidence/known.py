@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.shifts.baseline import symmetry_of
+from bayesplate.diagnosis.evidence.peaks import likely_labels
+from bayesplate.diagnosis.shifts.baseline import baseline_of, symmetry_of
 from bayesplate.diagnosis.shifts.laws import FormLaw
 from bayesplate.effects import EFFECTS, effects_of
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -30,12 +31,14 @@ from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Models = Sequence[SetupModel]
+Rows = NDArray[np.intp]
 
 COMPUTED = ("transverse_shear", "air_loading")
 """Effects of every board whose sizes are known: from its own size, and from what is published."""
 STATED = ("attached_mass", "air_loading")
 """Effects that a card may state in full, so that they are declared."""
 
+_MOST_LABELLINGS = 4
 _NEAR = 0.1
 """Change of ln D up to which a law holds that was made before it: half a side of the smallest box it is trained in."""
 
@@ -147,15 +150,50 @@ def known_fit(
     board = with_known_sizes(problem.board.without(without), effects)
     inputs, target, scales = board.nominal(), log_measured(board), reading_scales(board)
     start = np.log(problem.estimate.rigidities) if start is None else start
-    law = _law(solved or _solved(problem, board, start), inputs)
-    fitted = refit(law, target, scales, start)
-    if np.abs(fitted - start).max() > _NEAR:
-        law = _law(_solved(problem, board, fitted), inputs)
-        fitted = refit(law, target, scales, fitted)
-    errors = prediction_errors(law, target, normal_misfit(target, scales), fitted[None, :])
+    models = solved or _solved(problem, board, start)
+    law, rows = _law(models, inputs), _labelled(models)
+    for _ in range(_MOST_LABELLINGS):
+        fitted = _refit(law, rows, target, scales, start)
+        if np.abs(fitted - start).max() > _NEAR:
+            law = _law(_solved(problem, board, fitted), inputs)
+            fitted = _refit(law, rows, target, scales, fitted)
+        before, start = rows, fitted
+        rows = _relabelled(problem, law(fitted[None, :]), rows)
+        if np.array_equal(rows, before):
+            break
+    kept = np.flatnonzero(before >= 0)
+    target, scales = target[kept], scales[kept]
+    labelled = before[kept]
+    errors = prediction_errors(lambda x: law(x)[:, labelled], target, normal_misfit(target, scales), fitted[None, :])
     D_x, D_y, D_s = np.exp(fitted)
     constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
     return KnownFit(tuple(effects), tuple(without), fitted, constants, errors)
+
+
+def _labelled(models: Models) -> Rows:
+    """Where the labelled modes of each setup stand among all that its model has: (n_modes,) array."""
+    starts = np.cumsum([0, *(len(model.every_place) for model in models)])[:-1]
+    return np.concatenate([start + np.arange(len(one.places)) for start, one in zip(starts, models, strict=True)])
+
+
+def _refit(law: Predict, rows: Rows, target: Floats, scales: Floats, start: Floats) -> Floats:
+    """The constants fitted to the readings that are a mode."""
+    kept = np.flatnonzero(rows >= 0)
+    return refit(lambda x: law(x)[:, rows[kept]], target[kept], scales[kept], start)
+
+
+def _relabelled(problem: PosedProblem, predicted: Floats, rows: Rows) -> Rows:
+    """The likely labels at fitted constants, whose own misfit tells the noise.
+
+    The same where all labels are certain, and where the plate's symmetry is another, so that modes cannot be told.
+    """
+    if not any(problem.posterior.peaks) or predicted.shape[1] != sum(problem.posterior.n_every):
+        return rows
+    kept = np.flatnonzero(rows >= 0)
+    off = log_measured(problem.board)[kept] - predicted[0, rows[kept]]
+    medians = np.array([setup.noise.median for setup in problem.board.setups])
+    noise = np.maximum(medians, float(np.sqrt(np.mean(off**2))))
+    return likely_labels(baseline_of(problem), predicted, noise[None, :], rows)
 
 
 def with_known_sizes(board: Board, effects: Sequence[str]) -> Board:
@@ -167,8 +205,8 @@ def with_known_sizes(board: Board, effects: Sequence[str]) -> Board:
 
 
 def _law(models: Models, inputs: Values) -> Predict:
-    """ln f (Hz) of the readings from (n, 3) ln D by the exact law, all else at its nominal value."""
-    return lambda x: np.concatenate([one.log_frequencies(_values(x, inputs), "exact") for one in models], axis=1)
+    """ln f (Hz) of all modes from (n, 3) ln D by the exact law, all else at its nominal value."""
+    return lambda x: np.concatenate([one.every_log_frequency(_values(x, inputs), "exact") for one in models], axis=1)
 
 
 def _values(log_rigidities: Floats, inputs: Values) -> Values:
@@ -189,7 +227,7 @@ def _solved(problem: PosedProblem, board: Board, at: Floats) -> Models:
         system = system_of(board, setup)
         model = setup_model(system, values, system.plate(meshed))
         keeps = symmetry_of([model]) == symmetry_of([before])
-        models.append(replace(model, places=before.places) if keeps else model)
+        models.append(replace(model, places=before.places, others=before.others) if keeps else model)
     weighted = np.concatenate([one.sensitivities(values) for one in models]) / reading_scales(board)[:, None]
     fixed = board.with_priors({name: Quantity.exact(float(value)) for name, value in inputs.items()})
     parameters = Parameters(fixed)

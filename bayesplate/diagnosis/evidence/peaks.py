@@ -110,24 +110,39 @@ def _annealed(ground: Ground, one: Hypothesis) -> Iterator[Rows]:
         drawn = _drawn(ground, noisy, _N_WIDE)
         every = log_summed(ground.baseline, drawn.predicted, drawn.noise)
         for best in np.argsort(-every)[:_N_BEST]:
-            yield _labels_of(ground.baseline, drawn.at(best[None]), rows)
-        rows = _labels_of(ground.baseline, drawn, rows)
+            yield _labels_of(ground, drawn.at(best[None]), rows)
+        rows = _labels_of(ground, drawn, rows)
         yield rows
 
 
 def _relabelled(ground: Ground, one: Hypothesis, rows: Rows) -> Rows:
     """The likely labels at draws that rest on other labels."""
-    return _labels_of(ground.baseline, _drawn(ground, one.labelled(ground.baseline, rows)), rows)
+    return _labels_of(ground, _drawn(ground, one.labelled(ground.baseline, rows)), rows)
 
 
-def _labels_of(baseline: Baseline, drawn: TermDraws, otherwise: Rows) -> Rows:
-    """The likely labels at some draws; other ones where too few are likely."""
+def _labels_of(ground: Ground, drawn: TermDraws, otherwise: Rows) -> Rows:
+    return likely_labels(ground.baseline, drawn.predicted, drawn.noise, otherwise)
+
+
+def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, otherwise: Rows) -> Rows:
+    """Which mode each reading likely is at some draws: (n_modes,) array, -1 where none is likely.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    log_frequency : (n_draws, n_every) array
+        ln f (Hz) of all modes that readings may be.
+    noise : (n_draws, n_setups) array
+        Relative.
+    otherwise : (n_modes,) array of int
+        What is given where too few have a likely label.
+    """
     result = baseline.rows.copy()
-    every = _by_setup(baseline, drawn.predicted)
+    every = _by_setup(baseline, log_frequency)
     n_before = 0
     for i, (setup, peaks) in enumerate(zip(baseline.board.setups, baseline.every.peaks, strict=True)):
         if peaks is not None:
-            likely = peaks.probabilities(every[i], drawn.noise[:, i])
+            likely = peaks.probabilities(every[i], noise[:, i])
             for at, row in zip(peaks.readings, likely, strict=True):
                 if at >= 0:
                     best = int(np.argmax(row))
