@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations_with_replacement, permutations
@@ -37,7 +37,7 @@ class ThicknessProfile(Effect):
     With readings at places p = p0 + sum z_k phi_k is a random field that they condition (`FieldProfile`): p0 is what is
     expected, each component phi_k has a standard normal parameter, and one more goes with the mean thickness h itself.
     Powers of p are expanded to second order in the components, so each product of them is a term of its own; rotary
-    inertia is small already, a thousandth of the kinetic energy, and follows them to first order.
+    inertia is small already, a thousandth of the kinetic energy, and follows them as the mass does.
 
     Without, p = 1 + alpha_x (s - 1/2) + alpha_y (t - 1/2), s and t from 0 to 1 along the whole sides: a taper around
     the mean thickness. Powers of p are polynomials in both tapers, so each power of s and t is a term of its own and
@@ -118,8 +118,7 @@ class ThicknessProfile(Effect):
             if self.profile.is_uniform:
                 return {}
             expanded = {n: self._expanded(n) for n in set(_POWERS.values())}
-            small = tuple(replace(one, order=one.order + 1) for one in expanded[_POWERS["rotary"]])
-            return {group: expanded[n] for group, n in _POWERS.items()} | {"rotary": small}
+            return {group: expanded[n] for group, n in _POWERS.items()} | {"rotary": self._rotary()}
         fields: dict[tuple[int, int], Field | None] = {
             (i, j): partial(_monomial, i=i, j=j) if i + j else None for i, j in _exponents(max(_POWERS.values()))
         }
@@ -152,12 +151,26 @@ class ThicknessProfile(Effect):
             for chosen in products
         )
 
+    def _rotary(self) -> tuple[Variation, ...]:
+        """p0^2 (p0 + d): the mass follows the components d, the radius of gyration what is expected alone.
+
+        To first order p^3 would be negative where d < -p0 / 3, and strains that carry no other mass with it.
+        """
+        cube = self._expanded(_POWERS["rotary"])
+        first = (replace(one, weight=_a_third(one.weight), order=2) for one in cube if one.order == 1)
+        return (*(replace(one, order=1) for one in cube if one.order == 0), *first)
+
     def _coefficient(self, values: Values, n: int, i: int, j: int) -> Floats:
         """Of u^i v^j in the n-th power of the taper, u and v from the middle of the vibrating part."""
         taper_x, taper_y = self.value(values, "taper_x"), self.value(values, "taper_y")
         middle = 1.0 + taper_x * self.part_x.middle + taper_y * self.part_y.middle
         along_x, along_y = taper_x * self.part_x.share, taper_y * self.part_y.share
         return comb(n, i) * comb(n - i, j) * middle ** (n - i - j) * along_x**i * along_y**j
+
+
+def _a_third(weight: Callable[[Values], Floats] | None) -> Callable[[Values], Floats]:
+    assert weight is not None
+    return lambda values: weight(values) / _POWERS["rotary"]
 
 
 @dataclass(frozen=True)

@@ -174,19 +174,27 @@ def reduced_order_model(
 def _reduce(
     block: Block, n_modes: int, training: list[Weights], held_out: Sequence[Weights]
 ) -> tuple[ReducedBlock, float]:
-    def solved(points: Sequence[Weights]) -> list[ClassModes]:
-        return [solve_class(block, weights, n_modes + _SPARE) for weights in points]
+    def solved(points: Sequence[Weights]) -> tuple[list[Weights], list[ClassModes]]:
+        found = [(weights, _modes_of(block, weights, n_modes + _SPARE)) for weights in points]
+        kept = [(weights, modes) for weights, modes in found if modes is not None]
+        return [weights for weights, _ in kept], [modes for _, modes in kept]
 
     n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
-    trained, checks = solved(training[:n_first]), solved(held_out)
+    first = solve_class(block, training[0], n_modes + _SPARE)
+    trained = [first, *solved(training[1:n_first])[1]]
+    held_out, checks = solved(held_out)
+    if not checks:
+        raise np.linalg.LinAlgError("none of the points that were held out is a plate")
     # A second mass or a support lets elastic modes carry some rigid motion; otherwise they are orthogonal to it.
     rigid = trained[0].rigid[:, : block.n_rigid if block.n_masses > 1 or _is_supported(block, trained[0]) else 0]
     exact = np.stack([solution.eigenvalues[:n_modes] for solution in checks])
     is_steady = _is_steady([*training, *held_out])
     together = Weights(*(np.stack(w) for w in zip(*held_out, strict=True)))
+    n_solved = n_first
     rounds = (n_first, 0), (len(training), 0), (len(training), len(held_out) // 2)
     for n_trained, n_joined in dict.fromkeys(rounds):
-        trained += solved(training[len(trained) : n_trained])
+        trained += solved(training[n_solved:n_trained])[1]
+        n_solved = max(n_solved, n_trained)
         elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
         whole = _project(block, rigid, elastic, trained[0], training[0], is_steady)
         for reduced in _cheapest_first(whole, training[0], n_modes):
@@ -195,6 +203,17 @@ def _reduce(
             if worst <= _ACCEPTED_CENTS:
                 return reduced, worst
     return reduced, worst
+
+
+def _modes_of(block: Block, weights: Weights, n_modes: int) -> ClassModes | None:
+    """The modes at one point; None where it is no plate.
+
+    An expansion to second order in fields need not be positive where several of them are far out at once.
+    """
+    try:
+        return solve_class(block, weights, n_modes)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _is_supported(block: Block, solution: ClassModes) -> bool:

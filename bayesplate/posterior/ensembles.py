@@ -44,20 +44,26 @@ class Learnt:
 
     @classmethod
     def of(
-        cls, warm_up: Sequence[Chunk], centre: FloatArray, covariance: FloatArray, rngs: Generators, n_chunks: int
+        cls,
+        warm_up: Sequence[Chunk],
+        centre: FloatArray,
+        covariance: FloatArray,
+        rngs: Generators,
+        n_last: int,
+        is_over: bool,
     ) -> Learnt:
         """From the chunks of the warm-up so far.
 
-        Before the first chunk there is the estimate alone; on the way each chunk teaches the next; the whole second
-        half of the warm-up, of `n_chunks` chunks, teaches all that is kept.
+        Before the first chunk there is the estimate alone; on the way each chunk teaches the next; the `n_last` chunks
+        at its end, once it is over, teach all that is kept.
         """
         if not warm_up:
             proposal = Proposal.with_covariance(centre, covariance)
             return cls(proposal, np.stack([proposal.points(_N_ARCHIVED, rng) for rng in rngs]))
-        late = warm_up[-1:] if len(warm_up) < n_chunks else warm_up[n_chunks // 2 :]
+        late = warm_up[-n_last:] if is_over else warm_up[-1:]
         draws = np.concatenate([chunk.draws for chunk in late], axis=1)
         log_prob = np.concatenate([chunk.log_prob for chunk in late], axis=1)
-        proposal = Proposal.one_fitted(draws) if len(warm_up) < n_chunks else Proposal.fitted(draws)
+        proposal = Proposal.fitted(draws) if is_over else Proposal.one_fitted(draws)
         flat = draws.reshape(len(draws), -1, draws.shape[-1])
         archives = flat[:, :: max(1, flat.shape[1] // _N_ARCHIVED)]
         return cls(proposal, archives, order_for((log_prob - proposal.log_density(draws)).ravel()))

@@ -18,7 +18,12 @@ from bayesplate.posterior.starting import GuardedPosterior, LogPosterior, random
 
 FloatArray = NDArray[np.float64]
 
-WARM_UP_CHUNKS = 6
+WARM_UP_CHUNKS, MOST_WARM_UP_CHUNKS = 6, 40
+_RISE = 1.0
+"""Of the mean log density within two chunks, from which on walkers are still on their way to the posterior.
+
+Where they are, it scatters by the square root of half the number of parameters over that of the walkers.
+"""
 
 
 @dataclass(frozen=True)
@@ -217,9 +222,10 @@ def sample(
         convergence = None
         while True:
             n_steps = len(chunks) * settings.chunk_steps
+            n_warm = warm_up_chunks(chunks)
             at_end = n_steps >= settings.max_steps
-            if at_end or _gate_is_due(n_steps, settings.chunk_steps):
-                chains = _joined(chunks, is_corrected=cheap is not None)
+            if at_end or _gate_is_due(n_steps, n_warm * settings.chunk_steps, settings.chunk_steps):
+                chains = _joined(chunks, n_warm, is_corrected=cheap is not None)
                 convergence = assess(chains.kept, settings.gate, names=names)
             if progress is not None and chunks:
                 progress(Progress(n_steps, settings.max_steps, convergence))
@@ -228,17 +234,19 @@ def sample(
             if chunks:
                 coords, log_prob = chunks[-1].draws[:, -1], chunks[-1].log_prob[:, -1]
             rngs = [random_numbers(settings.seed, i, len(chunks)) for i in range(settings.n_ensembles)]
-            if learnt is None or len(chunks) <= WARM_UP_CHUNKS:
-                learnt = Learnt.of(chunks[:WARM_UP_CHUNKS], centre, covariance, rngs, WARM_UP_CHUNKS)
+            if learnt is None or len(chunks) <= n_warm:
+                learnt = Learnt.of(
+                    chunks[:n_warm], centre, covariance, rngs, WARM_UP_CHUNKS // 2, len(chunks) >= n_warm
+                )
             supply = (learnt, settings.chunk_steps, n_walkers, rngs)
             move: Steps | CorrectedSteps
             if cheap is None:
                 move = stepping(guarded, *supply)
-            elif len(chunks) < WARM_UP_CHUNKS:
+            elif len(chunks) < n_warm:
                 move = stepping(cheap, *supply)
             else:
                 move = correcting(cheap, guarded, *supply)
-                if len(chunks) == WARM_UP_CHUNKS:
+                if len(chunks) == n_warm:
                     coords, log_prob = crossed(guarded, coords)
             chunk = Chunk(*advance(move, coords, log_prob, settings.chunk_steps))
             if checkpoint is not None:
@@ -246,19 +254,32 @@ def sample(
             chunks.append(chunk)
 
 
-def _gate_is_due(n_steps: int, chunk_steps: int) -> bool:
+def warm_up_chunks(chunks: Sequence[Chunk]) -> int:
+    """How many chunks the warm-up has: until the log density no longer rises; one more than there are, before that.
+
+    What the walkers will propose is learnt from the end of the warm-up and stays: learnt from walkers that are on their
+    way, it would never fit.
+    """
+    means = [float(chunk.log_prob.mean()) for chunk in chunks[:MOST_WARM_UP_CHUNKS]]
+    for n in range(WARM_UP_CHUNKS, len(means) + 1):
+        if n == MOST_WARM_UP_CHUNKS or means[n - 1] - means[n - 3] < _RISE:
+            return n
+    return max(len(chunks) + 1, WARM_UP_CHUNKS)
+
+
+def _gate_is_due(n_steps: int, warm_up: int, chunk_steps: int) -> bool:
     """Return True at steps that grow by 10 %: judging costs, and depends on the count only, so resuming repeats it."""
-    due = (WARM_UP_CHUNKS + 2) * chunk_steps
+    due = warm_up + 2 * chunk_steps
     while due < n_steps:
         due = -(-int(1.1 * due) // chunk_steps) * chunk_steps
     return due == n_steps
 
 
-def _joined(chunks: list[Chunk], *, is_corrected: bool) -> Chains:
+def _joined(chunks: list[Chunk], n_warm: int, *, is_corrected: bool) -> Chains:
     """All draws; behind a surrogate's warm-up a sixth of the corrected steps is discarded too."""
     draws = np.concatenate([chunk.draws for chunk in chunks], axis=1)
     log_prob = np.concatenate([chunk.log_prob for chunk in chunks], axis=1)
     n_steps = draws.shape[1]
-    warm_up = min(WARM_UP_CHUNKS, len(chunks) - 1) * chunks[0].draws.shape[1]
+    warm_up = min(n_warm, len(chunks) - 1) * chunks[0].draws.shape[1]
     burn_in = warm_up + -(-(n_steps - warm_up) // 6) if is_corrected else burn_in_steps(n_steps)
     return Chains(draws, log_prob, max(warm_up, burn_in))

@@ -155,3 +155,20 @@ def test_linear_law_is_the_tangent_of_the_exact_law(name, term):
     # As shares of the mode's energy; the tolerance is the directions that the basis drops and the step's square.
     eigenvalues = np.array([found[n].eigenvalue for n in names])
     np.testing.assert_allclose(slope(ExactLaw(reduced)) / eigenvalues, slope(linear) / eigenvalues, atol=2e-5)
+
+
+def test_points_that_are_no_plate_teach_nothing_and_check_nothing():
+    """An expansion of fields may be negative at a far corner of the box: the others serve, and one of them has to."""
+    board, names = WANTED["cantilever"]
+    centre = weights_at(board, np.zeros(3))
+    plate = thin_plate(*board.ends, *mesh(centre))
+    places = [mode.place for mode in find(plate, centre, names).values()]
+    near, far, checked = (weights_at(board, at * np.ones(3)) for at in (0.5, -0.5, 0.3))
+    nothing = Weights(centre.stiffness, -centre.mass)
+    without = reduced_order_model(plate, places, centre, [near, far], [checked])
+    found = reduced_order_model(plate, places, centre, [near, nothing, far], [nothing, checked])
+    assert found.worst_cents == pytest.approx(without.worst_cents, rel=1e-3)
+    draws = together([near, checked])
+    np.testing.assert_allclose(found.eigenvalues(draws), without.eigenvalues(draws), rtol=1e-8)
+    with pytest.raises(np.linalg.LinAlgError):
+        reduced_order_model(plate, places, centre, [near, far], [nothing])

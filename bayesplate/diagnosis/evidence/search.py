@@ -168,10 +168,7 @@ def prepare_search(
     candidates = {}
     every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
     for name, each in every.items():
-        try:
-            laws = tuple(solve(baseline, form).placed(baseline) for form in each)
-        except np.linalg.LinAlgError:  # within the range of its sizes there is no such plate
-            continue
+        laws = tuple(solve(baseline, form).placed(baseline) for form in each)
         candidates[name] = _candidate(baseline, name, laws)
         if tell is not None:
             tell(len(candidates) / len(every))
