@@ -24,6 +24,7 @@ from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
+from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
@@ -176,6 +177,11 @@ def diagnose(
             refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
             notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+    if verdict.index in refits:
+        with_words = next(answer_words(found, one) for one in finals if one.index == verdict.index)
+        first, last = (one.inference.problem.board for one in (before, refits[verdict.index]))
+        told = relabelled_sentence(first, last, with_words)
+        notes += [told] if told else []
     case = _case(found, verdict, control, known, before, refits, tuple(notes))
     diagnosis, after = diagnosis_of(case), refits.get(verdict.index, before)
     if folder is not None:
