@@ -44,25 +44,18 @@ class Learnt:
 
     @classmethod
     def of(
-        cls,
-        warm_up: Sequence[Chunk],
-        centre: FloatArray,
-        covariance: FloatArray,
-        rngs: Generators,
-        n_last: int,
-        is_over: bool,
+        cls, lesson: Sequence[Chunk], centre: FloatArray, covariance: FloatArray, rngs: Generators, is_over: bool
     ) -> Learnt:
-        """From the chunks of the warm-up so far.
+        """From some chunks of the warm-up.
 
-        Before the first chunk there is the estimate alone; on the way each chunk teaches the next; the `n_last` chunks
-        at its end, once it is over, teach all that is kept.
+        Before the first chunk there is the estimate alone; on the way each chunk teaches the next; those at the end of
+        the warm-up, once it is over, teach all that is kept.
         """
-        if not warm_up:
+        if not lesson:
             proposal = Proposal.with_covariance(centre, covariance)
             return cls(proposal, np.stack([proposal.points(_N_ARCHIVED, rng) for rng in rngs]))
-        late = warm_up[-n_last:] if is_over else warm_up[-1:]
-        draws = np.concatenate([chunk.draws for chunk in late], axis=1)
-        log_prob = np.concatenate([chunk.log_prob for chunk in late], axis=1)
+        draws = np.concatenate([chunk.draws for chunk in lesson], axis=1)
+        log_prob = np.concatenate([chunk.log_prob for chunk in lesson], axis=1)
         proposal = Proposal.fitted(draws) if is_over else Proposal.one_fitted(draws)
         flat = draws.reshape(len(draws), -1, draws.shape[-1])
         archives = flat[:, :: max(1, flat.shape[1] // _N_ARCHIVED)]

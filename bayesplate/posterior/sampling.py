@@ -15,15 +15,9 @@ from bayesplate.posterior.convergence import Convergence, Gate, acceptance_by_wa
 from bayesplate.posterior.ensembles import Learnt, advance, correcting, crossed, stepping
 from bayesplate.posterior.moves import CorrectedSteps, Steps
 from bayesplate.posterior.starting import GuardedPosterior, LogPosterior, random_numbers, start_ensembles
+from bayesplate.posterior.warm_up import WarmUp
 
 FloatArray = NDArray[np.float64]
-
-WARM_UP_CHUNKS, MOST_WARM_UP_CHUNKS = 6, 40
-_RISE = 1.0
-"""Of the mean log density within two chunks, from which on walkers are still on their way to the posterior.
-
-Where they are, it scatters by the square root of half the number of parameters over that of the walkers.
-"""
 
 
 @dataclass(frozen=True)
@@ -220,12 +214,14 @@ def sample(
             )
         learnt = None
         convergence = None
+        warm_up = WarmUp()
         while True:
             n_steps = len(chunks) * settings.chunk_steps
-            n_warm = warm_up_chunks(chunks)
+            is_taught = warm_up.follow(chunks)
+            is_over = warm_up.first is not None
             at_end = n_steps >= settings.max_steps
-            if at_end or _gate_is_due(n_steps, n_warm * settings.chunk_steps, settings.chunk_steps):
-                chains = _joined(chunks, n_warm, is_corrected=cheap is not None)
+            if at_end or (is_over and _gate_is_due(n_steps, warm_up.end * settings.chunk_steps, settings.chunk_steps)):
+                chains = _joined(chunks, warm_up.end, is_corrected=cheap is not None)
                 convergence = assess(chains.kept, settings.gate, names=names)
             if progress is not None and chunks:
                 progress(Progress(n_steps, settings.max_steps, convergence))
@@ -234,37 +230,23 @@ def sample(
             if chunks:
                 coords, log_prob = chunks[-1].draws[:, -1], chunks[-1].log_prob[:, -1]
             rngs = [random_numbers(settings.seed, i, len(chunks)) for i in range(settings.n_ensembles)]
-            if learnt is None or len(chunks) <= n_warm:
-                learnt = Learnt.of(
-                    chunks[:n_warm], centre, covariance, rngs, WARM_UP_CHUNKS // 2, len(chunks) >= n_warm
-                )
+            if learnt is None or is_taught or not is_over:
+                lesson = warm_up.lesson(chunks) if is_over else chunks[-1:]
+                learnt = Learnt.of(lesson, centre, covariance, rngs, is_over)
             supply = (learnt, settings.chunk_steps, n_walkers, rngs)
             move: Steps | CorrectedSteps
             if cheap is None:
                 move = stepping(guarded, *supply)
-            elif len(chunks) < n_warm:
+            elif not is_over:
                 move = stepping(cheap, *supply)
             else:
                 move = correcting(cheap, guarded, *supply)
-                if len(chunks) == n_warm:
+                if len(chunks) == warm_up.first:
                     coords, log_prob = crossed(guarded, coords)
             chunk = Chunk(*advance(move, coords, log_prob, settings.chunk_steps))
             if checkpoint is not None:
                 checkpoint.append(chunk)
             chunks.append(chunk)
-
-
-def warm_up_chunks(chunks: Sequence[Chunk]) -> int:
-    """How many chunks the warm-up has: until the log density no longer rises; one more than there are, before that.
-
-    What the walkers will propose is learnt from the end of the warm-up and stays: learnt from walkers that are on their
-    way, it would never fit.
-    """
-    means = [float(chunk.log_prob.mean()) for chunk in chunks[:MOST_WARM_UP_CHUNKS]]
-    for n in range(WARM_UP_CHUNKS, len(means) + 1):
-        if n == MOST_WARM_UP_CHUNKS or means[n - 1] - means[n - 3] < _RISE:
-            return n
-    return max(len(chunks) + 1, WARM_UP_CHUNKS)
 
 
 def _gate_is_due(n_steps: int, warm_up: int, chunk_steps: int) -> bool:

@@ -107,7 +107,7 @@ def moves_of(which, ensembles):
     """The moves of some of four ensembles, from their own random numbers and archives."""
     draws = np.random.default_rng(0).multivariate_normal(MEAN, COVARIANCE, (N_ENSEMBLES, 20, N_WALKERS))
     rngs = [random_numbers(7, i, 2) for i in ensembles]
-    whole = Learnt.of([Chunk(draws, log_density(draws))], MEAN, COVARIANCE, rngs, 1, True)
+    whole = Learnt.of([Chunk(draws, log_density(draws))], MEAN, COVARIANCE, rngs, True)
     learnt = Learnt(whole.proposal, whole.archives[ensembles])
     if which == "plain":
         return stepping(log_density, learnt, N_STEPS, N_WALKERS, rngs), draws[ensembles, -1]
@@ -137,7 +137,7 @@ def test_a_chunk_of_steps_asks_for_all_its_independent_proposals_in_one_call():
         return log_density(points)
 
     rngs = [random_numbers(7, i, 0) for i in range(N_ENSEMBLES)]
-    move = stepping(counted, Learnt.of([], MEAN, COVARIANCE, rngs, 1, False), N_STEPS, N_WALKERS, rngs)
+    move = stepping(counted, Learnt.of([], MEAN, COVARIANCE, rngs, False), N_STEPS, N_WALKERS, rngs)
     coords = np.random.default_rng(0).multivariate_normal(MEAN, COVARIANCE, (N_ENSEMBLES, N_WALKERS))
     advance(move, coords, log_density(coords.reshape(-1, 3)).reshape(coords.shape[:2]), N_STEPS)
     assert asked == [3 * N_STEPS // 4 * N_ENSEMBLES * N_WALKERS, *[N_ENSEMBLES * N_WALKERS] * (N_STEPS // 4)]

@@ -8,15 +8,8 @@ from statistics_checks import differences_from_normal
 
 from bayesplate.errors import BayesplateError, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior import sampling
-from bayesplate.posterior.checkpoint import Chunk
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.sampling import (
-    MOST_WARM_UP_CHUNKS,
-    WARM_UP_CHUNKS,
-    SamplerSettings,
-    sample,
-    warm_up_chunks,
-)
+from bayesplate.posterior.sampling import SamplerSettings, sample
 
 MEAN = np.array([3.0, -1.0, 0.0, 10.0])
 SD = np.array([1.0, 0.01, 30.0, 2.0])
@@ -187,18 +180,3 @@ def test_progress_counts_every_chunk():
     assert [progress.n_steps for progress in told] == [50, 100, 150, 200]
     assert told[0].convergence is None
     assert told[-1].convergence is not None
-
-
-def test_the_warm_up_lasts_until_the_density_no_longer_rises():
-    """Then two chunks later, never before six chunks, and not for ever."""
-
-    def chunks(means):
-        return [Chunk(np.zeros((2, 3, 4, 1)), np.full((2, 3, 4), float(mean))) for mean in means]
-
-    assert warm_up_chunks(chunks([])) == WARM_UP_CHUNKS
-    assert warm_up_chunks(chunks([0.0] * 4)) == WARM_UP_CHUNKS
-    assert warm_up_chunks(chunks([0.0] * 9)) == WARM_UP_CHUNKS
-    rising = [2.0 * min(i, 9) for i in range(20)]
-    assert warm_up_chunks(chunks(rising[:8])) == 9
-    assert warm_up_chunks(chunks(rising)) == 12
-    assert warm_up_chunks(chunks([3.0 * i for i in range(60)])) == MOST_WARM_UP_CHUNKS
