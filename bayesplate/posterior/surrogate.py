@@ -86,7 +86,8 @@ class Surrogate:
 
     @classmethod
     def fitted(cls, points: Solved, columns: NDArray[np.intp], degree: int) -> Surrogate:
-        """By weighted least squares."""
+        """By weighted least squares, to the points that are plates."""
+        points = points.where(np.isfinite(points.log_frequency).all(axis=1) & np.isfinite(points.log_density))
         x, weights = points.theta[:, columns], points.weights
         factor = np.linalg.cholesky(np.cov(x.T, aweights=weights))
         none = np.empty((0, points.log_frequency.shape[1]))
@@ -144,11 +145,14 @@ def acceptance(log_ratios: Floats) -> float:
     ----------
     log_ratios : (n_draws,) array
         ln of the posterior's density less that of the surrogate's, at draws of the latter. Weighted with their ratio
-        these are draws of the former, where walks begin.
+        these are draws of the former, where walks begin. Infinite where one of them is zero: such ends are refused.
     """
-    starts = np.exp(log_ratios - log_ratios.max())
-    gains = log_ratios[None, :] - log_ratios[:, None]
-    return float(starts @ np.exp(np.minimum(gains, 0.0)).mean(axis=1) / starts.sum())
+    finite = log_ratios[np.isfinite(log_ratios)]
+    if not finite.size:
+        return 0.0
+    starts = np.exp(finite - finite.max())
+    gains = np.minimum(finite[None, :] - finite[:, None], 0.0)
+    return float(starts @ np.exp(gains).sum(axis=1) / starts.sum()) / log_ratios.size
 
 
 def find_surrogate(

@@ -12,7 +12,14 @@ from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer, pose
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.posterior.surrogate import LEAST_ACCEPTANCE, Surrogate, acceptance, find_surrogate, with_surrogate
+from bayesplate.posterior.surrogate import (
+    LEAST_ACCEPTANCE,
+    Solved,
+    Surrogate,
+    acceptance,
+    find_surrogate,
+    with_surrogate,
+)
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import LINEAR_SHARE
 from bayesplate.workflow.prepare import prepare
@@ -72,6 +79,26 @@ def test_the_acceptance_is_the_one_of_normal_log_ratios(variance):
     """2 Phi(-sqrt(v / 2)), and no level of the density matters; 4000 even quantiles tell it to 0.02."""
     log_ratios = 30.0 + np.sqrt(variance) * ndtri((np.arange(4000) + 0.5) / 4000)
     assert acceptance(log_ratios) == pytest.approx(2.0 * ndtr(-np.sqrt(0.5 * variance)), abs=0.02)
+
+
+def test_points_that_are_no_plate_are_left_out_of_the_fit(problem):
+    """The law gives no frequency there: one such point would leave the polynomial without a number."""
+    rng = np.random.default_rng(0)
+    theta = rng.multivariate_normal(problem.centre, problem.covariance, 80)
+    log_frequency = np.concatenate(problem.posterior.log_frequencies(theta), axis=1)
+    columns = problem.parameters.fitted_columns
+    whole = Solved(theta, log_frequency, problem.posterior(theta))
+    holed = Solved(theta, log_frequency.copy(), whole.log_density.copy())
+    holed.log_frequency[3], holed.log_density[3] = np.nan, -np.inf
+    expected = Surrogate.fitted(whole.where(np.arange(80) != 3), columns, 2)
+    assert np.array_equal(Surrogate.fitted(holed, columns, 2).coefficients, expected.coefficients)
+
+
+def test_ends_without_a_density_are_refused():
+    log_ratios = 0.3 * np.random.default_rng(0).standard_normal(400)
+    half = np.where(np.arange(400) % 2 == 0, log_ratios, -np.inf)
+    assert acceptance(half) == pytest.approx(0.5 * acceptance(log_ratios[::2]))
+    assert acceptance(np.array([np.inf, -np.inf])) == 0.0
 
 
 def test_ends_of_walks_are_accepted_as_often_as_the_surrogate_was_judged_by(inference):
