@@ -41,15 +41,17 @@ def suspects(found: Found) -> tuple[Suspect, ...]:
     ground = found.ground
     if ground.baseline.n_modes < FEWEST or found.p_value(0) >= PASSES:
         return ()  # too few to tell, or all of them agree
-    bare, residuals = ground.hypotheses[0], found.residual[None, :]
-    whole = float(bare.terms(ground.whole).log_evidence(residuals)[0])
+    bare = ground.hypotheses[0]
+    seen = bare.seen(ground.baseline, found.residual[None, :])
+    whole = float(bare.terms(ground.whole).log_evidence(seen)[0])
     told = []
-    for index in range(ground.baseline.n_modes):
-        fold = Fold(ground.baseline, index)
-        p_value = float(predictive_p_value(bare, fold, residuals)[0])
+    for index in np.flatnonzero(bare.terms(ground.whole).fold.baseline.is_mode):
+        fold = Fold(ground.baseline, int(index))
+        p_value = float(predictive_p_value(bare, fold, found.residual[None, :])[0])
         if p_value >= PASSES:
-            weight = float(bare.terms(fold).log_evidence(residuals)[0]) - whole
-            told.append(Suspect(index, p_value, float(found.residual @ fold.misses), weight))
+            terms = bare.terms(fold)
+            weight = float(terms.log_evidence(seen)[0]) - whole
+            told.append(Suspect(int(index), p_value, float(seen[0] @ terms.fold.misses), weight))
     return tuple(sorted(told, key=lambda one: -one.log_weight))
 
 

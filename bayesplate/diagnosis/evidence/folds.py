@@ -69,11 +69,12 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
         return None
     before, after = np.empty(residuals.shape), np.empty(residuals.shape)
     chosen = np.empty(residuals.shape, dtype=np.intp)
+    none = ground.hypotheses[0]
     for mode in range(n_modes):
         fold = Fold(ground.baseline, mode)
         picked = choices(ground, fold, residuals, needed_from)
         chosen[:, mode] = picked
-        before[:, mode] = residuals @ fold.misses
+        before[:, mode] = none.seen(ground.baseline, residuals) @ none.terms(fold).fold.misses
         after[:, mode] = before[:, mode]
         for index in np.unique(picked[picked > 0]):
             sets = picked == index
