@@ -66,7 +66,10 @@ def _drawn(folder: Path, rng: np.random.Generator) -> tuple[Prepared, dict[str, 
     design = DESIGNS["free-12"]
     (setup,) = design.setups
     (folder / "spread.toml").write_text(prior_text())
-    plain = card_text("planted", design, {"free": {(1, 1): 50.0, (2, 0): 70.0}}, noise_cents=0.0, prior="./spread.toml")
+    stated = {"noise_percent": NOISE}
+    plain = card_text(
+        "planted", design, {"free": {(1, 1): 50.0, (2, 0): 70.0}}, noise_cents=0.0, prior="./spread.toml", stated=stated
+    )
     for _ in range(_MOST_REDRAWS):
         (folder / "planted.toml").write_text(plain)
         asked = prepare(folder / "planted.toml")
@@ -86,9 +89,7 @@ def _drawn(folder: Path, rng: np.random.Generator) -> tuple[Prepared, dict[str, 
             break
     labelled = {beams: hertz for hertz, beams in sorted(read.items())[:N_LABELLED]}
     bare = [hertz for hertz in sorted(peaks) if hertz not in labelled.values()]
-    text = card_text(
-        "planted", design, {"free": labelled}, noise_cents=0.0, prior="./spread.toml", stated={"noise_percent": NOISE}
-    )
+    text = card_text("planted", design, {"free": labelled}, noise_cents=0.0, prior="./spread.toml", stated=stated)
     told = f"missed_probability = {MISSED}\nspurious_probability = {SPURIOUS:.4f}\nunlabelled_hz = {bare}\n"
     (folder / "planted.toml").write_text(text.replace("\n[setup.frequencies_hz]", f"{told}\n[setup.frequencies_hz]"))
     return prepare(folder / "planted.toml"), truth, {hertz: peaks[hertz] for hertz in bare}
