@@ -37,7 +37,7 @@ COLUMNS = ("board", "verdict", "effects", "claim", "in sample", "left out", "nes
 
 
 def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, Diagnosis]:
-    """Diagnose each board.
+    """Diagnose each board, and print its verdict as soon as it is there.
 
     Parameters
     ----------
@@ -50,7 +50,11 @@ def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, D
     dict of Diagnosis
         By board.
     """
-    return {board: diagnose(board, seed=seed).diagnosis for board in boards}
+    found = {}
+    for board in boards:
+        found[board] = diagnose(board, seed=seed).diagnosis
+        print(f"{len(found)} of {len(boards)} boards: {found[board]!r}", flush=True)
+    return found
 
 
 def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
