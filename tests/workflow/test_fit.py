@@ -135,7 +135,7 @@ def test_modes_are_keyed_by_label(summaries, board, setup, hertz):
 
 
 def test_peaks_are_assigned_to_modes(free):
-    """2R: fifteen of its sixteen peaks are one mode for certain; (4,0) is at 404 Hz, which nobody labelled."""
+    """2R: fourteen of its sixteen peaks are one mode for certain; (4,0) is at 404 Hz, which nobody labelled."""
     peaks = {peak["hz"]: peak for peak in free.summary["peaks"]}
     modes = {mode["label"]: mode for mode in free.summary["modes"]}
 
@@ -151,7 +151,7 @@ def test_peaks_are_assigned_to_modes(free):
         if best["probability"] > 0.5:
             assert modes[best["label"]]["measured_hz"] == hertz
     assert peaks[404.01]["assignments"][0]["label"] == "(4,0)"
-    assert sum(peak["assignments"][0]["probability"] > 0.95 for peak in peaks.values()) >= 15
+    assert sum(peak["assignments"][0]["probability"] > 0.95 for peak in peaks.values()) >= 14
     assert {mode["label_origin"] for mode in modes.values()} == {"doubtful", "proposed"}
     (spectrum,) = free.summary["spectra"]
     assert (spectrum["missed_probability"], spectrum["spurious_probability"]) == (0.2, 0.02)
