@@ -130,15 +130,17 @@ def hypotheses(
 def confusable(baseline: Baseline) -> tuple[Swap, ...]:
     """Neighbouring readings of one setup that lie close together and whose labels may be each other's.
 
-    Where a card doubts a label, the assignments of peaks to modes say what it may be instead.
+    None where a card doubts a label or a peak has none: there the sums over assignments of peaks to modes say what each
+    may be instead, and a label that is stated for sure stands.
     Either they belong to different symmetry classes; or to one, and stand in the other order than the modes of the
     fitted plate, which an effect that mixes the two may cause as well as a slip.
     """
     readings = baseline.residual + baseline.log_frequency
-    is_sure = np.array([reading.is_sure for setup in baseline.board.setups for reading in setup.readings])
+    if baseline.every.is_open:
+        return ()
     swaps = []
     for setup in range(len(baseline.board.setups)):
-        members = np.flatnonzero((baseline.setup_index == setup) & is_sure)
+        members = np.flatnonzero(baseline.setup_index == setup)
         ordered = members[np.argsort(readings[members])]
         for first, second in pairwise(ordered):
             differ = baseline.places[first].parity != baseline.places[second].parity
