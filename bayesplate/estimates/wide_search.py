@@ -13,9 +13,10 @@ Neal, Annealed importance sampling, Statistics and Computing, 2001.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +26,17 @@ from bayesplate.frequencies.laws import log_frequency
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.prior_bands import prior_draws
-from bayesplate.frequencies.system import system_of
+from bayesplate.frequencies.system import System, system_of
 from bayesplate.modes.naming import Place
-from bayesplate.modes.plate import Parity, Weights
-from bayesplate.modes.reduced import reduced_order_model
+from bayesplate.modes.plate import Parity
+from bayesplate.modes.reduced import ReducedOrderModel, reduced_order_model
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.measured import Peak
-from bayesplate.plate.setup import Setup
+from bayesplate.plate.setup import DEFAULT_NOISE, Setup
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +47,9 @@ LOUD = 0.02
 MOST_FOUND = 4
 """Ways to take the peaks that are looked at under one noise."""
 _N_DRAWS, _N_STEPS, _N_LOOKED_AT = 3000, 3, 1000
-_N_NODES, _N_TRAINED = 11, 3
+_N_NODES = (21, 15, 11, 11)
+"""Of the tables under each noise, per axis: between them frequencies are off by less than the noise."""
+_N_TRAINED = 3
 _RANGE = 0.005
 """Of the prior draws, on either side, that the tables leave out."""
 _SPARE = 8
@@ -95,15 +101,13 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
     drawn = prior_draws(board, prior, rng, _N_DRAWS)
     population = np.log(np.stack([drawn[name] for name in RIGIDITIES], axis=1))
     population = population[np.isfinite(population).all(axis=1)]
-    setups = [_Spectrum.of(board, setup, population) for setup in board.setups if setup.readings or setup.peaks]
-
-    def log_likelihood(x: Floats, noise: float) -> Floats:
-        return np.sum([one.log_likelihood(x, noise) for one in setups], axis=0)
-
+    used = [setup for setup in board.setups if setup.readings or setup.peaks]
+    every = [_Modes.of(board, setups, population) for setups in _alike(used)]
     weighted = np.zeros(len(population))
     guesses: list[Guess] = []
-    for noise in NOISES:
-        found = log_likelihood(population, noise)
+    for noise, n_nodes in zip(NOISES, _N_NODES, strict=True):
+        tabled = _Tabled(tuple((modes.table(population, n_nodes), modes.peaks) for modes in every))
+        found = tabled.log_likelihood(population, noise)
         log_weights = found - weighted
         if not np.isfinite(log_weights).any():
             break
@@ -111,16 +115,16 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
         chosen = rng.choice(len(population), size=_N_DRAWS, p=shares / shares.sum())
         population, weighted = population[chosen], found[chosen]
         for _ in range(_N_STEPS):
-            population, weighted = _walked(population, weighted, log_prior, log_likelihood, noise, rng)
+            population, weighted = _walked(population, weighted, log_prior, tabled, noise, rng)
         if noise <= LOUD:
-            guesses = [*_guesses(nominal, population, setups, noise), *guesses]
+            guesses = [*_guesses(nominal, population, tabled, noise), *guesses]
     return guesses
 
 
-def _guesses(nominal: Values, population: Floats, setups: Sequence[_Spectrum], noise: float) -> list[Guess]:
+def _guesses(nominal: Values, population: Floats, tabled: _Tabled, noise: float) -> list[Guess]:
     """Members that take the peaks alike, the most frequent ways first."""
     some = population[:: max(1, len(population) // _N_LOOKED_AT)]
-    ways = np.concatenate([one.assignments(some, noise) for one in setups], axis=1)
+    ways = tabled.assignments(some, noise)
     order = Counter(map(tuple, ways.tolist())).most_common(MOST_FOUND)
     members = (some[(ways == np.array(way)).all(axis=1)] for way, _ in order)
     return [_guess(nominal, each, noise) for each in members]
@@ -145,7 +149,7 @@ def _walked(
     population: Floats,
     log_likelihood_there: Floats,
     log_prior: Callable[[Floats], Floats],
-    log_likelihood: Callable[[Floats, float], Floats],
+    tabled: _Tabled,
     noise: float,
     rng: np.random.Generator,
 ) -> tuple[Floats, Floats]:
@@ -154,7 +158,7 @@ def _walked(
     first, second = rng.integers(n, size=(2, n))
     jump = _JUMP * rng.random((n, 1)) * (population[first] - population[second])
     proposed = population + jump + _JITTER * rng.standard_normal((n, n_dim))
-    there = log_likelihood(proposed, noise)
+    there = tabled.log_likelihood(proposed, noise)
     gain = there - log_likelihood_there + log_prior(proposed) - log_prior(population)
     taken = np.log(rng.random(n)) < np.nan_to_num(gain, nan=-np.inf)
     return np.where(taken[:, None], proposed, population), np.where(taken, there, log_likelihood_there)
@@ -166,70 +170,123 @@ def _guess(nominal: Values, members: Floats, noise: float) -> Guess:
 
 
 @dataclass(frozen=True, eq=False)
-class _Spectrum:
-    """The modes of a setup over the whole prior, and the peaks among which its readings are.
+class _Modes:
+    """The modes of a plate in one setup, and the peaks of the setups that are like it.
 
     Attributes
     ----------
-    peaks : PeakLikelihood
-    axes : tuple of array
-        Nodes in ln D_x / D_s and ln D_y / D_s.
-    table : (n, n, n_modes) array
-        ln f (Hz) there at D_s = 1.
+    system : System
+    nominal : dict of float
+    reduced : ReducedOrderModel
+        Within a cent or so wherever the prior reaches.
+    scale : float
+        ln D_s at which it is evaluated.
+    peaks : tuple of PeakLikelihood
+        Of each setup.
     """
 
-    peaks: PeakLikelihood
-    axes: tuple[Floats, Floats]
-    table: Floats
+    system: System
+    nominal: Values
+    reduced: ReducedOrderModel
+    scale: float
+    peaks: tuple[PeakLikelihood, ...]
 
     @classmethod
-    def of(cls, board: Board, setup: Setup, population: Floats) -> _Spectrum:
-        ratios = population[:, :2] - population[:, 2:]
-        low, high = np.quantile(ratios, [_RANGE, 1.0 - _RANGE], axis=0)
-        axes = np.linspace(low[0], high[0], _N_NODES), np.linspace(low[1], high[1], _N_NODES)
-        bare = replace(setup, readings=(), peaks=_as_peaks(setup), hammer=None)
-        scale = float(np.median(population[:, 2]))
-        nominal = board.nominal()
-
-        def weights(ratios: Floats) -> Weights:
-            constants = np.exp(np.concatenate([ratios + scale, np.full((len(ratios), 1), scale)], axis=1))
-            return system.weights({**nominal, **dict(zip(RIGIDITIES, constants.T, strict=True))})
-
-        system = system_of(replace(board, setups=(bare,)), bare)
-        middle = 0.5 * (low + high)[None]
-        values = {**nominal, **dict(zip(RIGIDITIES, np.exp(np.r_[middle[0] + scale, scale]), strict=True))}
-        model = setup_model(system, values)
-        places = _places(model, len(bare.peaks))
-        trained = np.array(list(product(*(np.linspace(*ends, _N_TRAINED) for ends in zip(low, high, strict=True)))))
-        every = weights(trained)
-        reduced = reduced_order_model(
-            model.plate, places, weights(middle).at(0), [every.at(i) for i in range(len(trained))], [every.at(0)]
-        )
-        nodes = np.array(list(product(*axes)))
-        table = log_frequency(reduced.eigenvalues(weights(nodes))) - 0.5 * scale
+    def of(cls, board: Board, setups: Sequence[Setup], population: Floats) -> _Modes:
+        bare = [replace(setup, readings=(), peaks=_as_peaks(setup), hammer=None) for setup in setups]
+        system = _symmetric(system_of(replace(board, setups=(bare[0],)), bare[0]))
+        nominal, scale = board.nominal(), float(np.median(population[:, 2]))
+        low, middle, high = np.quantile(_ratios(population), [_RANGE, 0.5, 1.0 - _RANGE], axis=0)
+        trained = np.array(list(product(*np.linspace(low, high, _N_TRAINED).T)))
+        every = system.weights(_values(nominal, trained, scale))
+        centre = system.weights(_values(nominal, middle[None], scale)).at(0)
+        constants = dict(zip(RIGIDITIES, np.exp(np.r_[middle + scale, scale]), strict=True))
+        model = setup_model(system, {**nominal, **constants})
+        places = _places(model, max(len(one.peaks) for one in bare))
+        around = [every.at(i) for i in range(len(trained))]
+        reduced = reduced_order_model(model.plate, places, centre, around, around[:1])
         others = tuple(OtherMode(place, None) for place in places)
-        peaks = PeakLikelihood.of(replace(model, others=others))
-        assert peaks is not None
-        return cls(_by_class(peaks, setup, model, places), axes, table.reshape(_N_NODES, _N_NODES, -1))
+        peaks = []
+        for setup, one in zip(setups, bare, strict=True):
+            found = PeakLikelihood.of(replace(model, system=replace(system, setup=one), others=others))
+            assert found is not None
+            peaks.append(_by_class(found, setup, model, places))
+        return cls(system, nominal, reduced, scale, tuple(peaks))
+
+    def table(self, population: Floats, n_nodes: int) -> RegularGridInterpolator:
+        """ln f (Hz) of each mode at D_s = 1 over ln D_x / D_s and ln D_y / D_s, where a population is.
+
+        There are as many nodes between any two ranks of the members.
+        """
+        from scipy.interpolate import RegularGridInterpolator
+
+        ranks = np.linspace(_RANGE, 1.0 - _RANGE, n_nodes)
+        axes = tuple(np.unique(np.quantile(one, ranks)) for one in _ratios(population).T)
+        weights = self.system.weights(_values(self.nominal, np.array(list(product(*axes))), self.scale))
+        log_hertz = log_frequency(self.reduced.eigenvalues(weights)) - 0.5 * self.scale
+        return RegularGridInterpolator(axes, log_hertz.reshape(*(axis.size for axis in axes), -1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Tabled:
+    """The likelihood of the peaks of all setups where a population is.
+
+    Attributes
+    ----------
+    every : tuple of (RegularGridInterpolator, tuple of PeakLikelihood)
+        Frequencies of setups that are alike, and the peaks of each.
+    """
+
+    every: tuple[tuple[RegularGridInterpolator, tuple[PeakLikelihood, ...]], ...]
 
     def log_likelihood(self, x: Floats, noise: float) -> Floats:
         """Of the peaks at (n, 3) ln D: (n,) array."""
-        return self.peaks.log_likelihood(self._log_frequency(x), np.full(len(x), noise))
+        noises = np.full(len(x), noise)
+        return np.sum([one.log_likelihood(there, noises) for there, peaks in self._there(x) for one in peaks], axis=0)
 
     def assignments(self, x: Floats, noise: float) -> NDArray[np.intp]:
-        """The likeliest mode of each peak at each member, -1 for none: (n, n_peaks) array."""
-        result = np.empty((len(x), self.peaks.log_alone.size), dtype=np.intp)
-        every = self._log_frequency(x)
-        for i in range(len(x)):
-            shares = self.peaks.probabilities(every[i : i + 1], np.array([noise]))
-            result[i] = np.where(shares.max(axis=1) > 1.0 - shares.sum(axis=1), shares.argmax(axis=1), -1)
-        return result
+        """The likeliest mode of each peak at each member, -1 for none: (n, n_peaks) array, setup by setup."""
+        ways = []
+        for there, peaks in self._there(x):
+            for one in peaks:
+                each = (one.probabilities(row[None], np.array([noise])) for row in there)
+                ways.append([np.where(p.max(axis=1) > 1.0 - p.sum(axis=1), p.argmax(axis=1), -1) for p in each])
+        return np.concatenate(ways, axis=1)
 
-    def _log_frequency(self, x: Floats) -> Floats:
-        from scipy.interpolate import RegularGridInterpolator
+    def _there(self, x: Floats) -> Iterator[tuple[Floats, tuple[PeakLikelihood, ...]]]:
+        for table, peaks in self.every:
+            ends = np.array([[axis[0], axis[-1]] for axis in table.grid]).T
+            at = np.clip(_ratios(x), *ends)
+            yield np.asarray(table(at) + 0.5 * x[:, 2:]), peaks
 
-        at = np.stack([np.clip(x[:, i] - x[:, 2], axis[0], axis[-1]) for i, axis in enumerate(self.axes)], axis=1)
-        return np.asarray(RegularGridInterpolator(self.axes, self.table)(at) + 0.5 * x[:, 2:])
+
+def _ratios(x: Floats) -> Floats:
+    """ln D_x / D_s and ln D_y / D_s: (n, 2) array."""
+    return x[:, :2] - x[:, 2:]
+
+
+def _values(nominal: Values, ratios: Floats, scale: float) -> Values:
+    """Values at (n, 2) ratios, with ln D_s at a scale."""
+    constants = np.exp(np.concatenate([ratios + scale, np.full((len(ratios), 1), scale)], axis=1))
+    return {**nominal, **dict(zip(RIGIDITIES, constants.T, strict=True))}
+
+
+def _symmetric(system: System) -> System:
+    """Without the effects that break the plate's symmetry: they cost much, and move its frequencies by little."""
+    return replace(system, effects=tuple(effect for effect in system.effects if all(effect.keeps_symmetry())))
+
+
+def _alike(setups: Iterable[Setup]) -> list[list[Setup]]:
+    """Setups that hold the plate alike, together."""
+    found: list[tuple[Setup, list[Setup]]] = []
+    for setup in setups:
+        held = replace(setup, name="", readings=(), peaks=(), noise=DEFAULT_NOISE, hammer=None)
+        same = [members for one, members in found if one == held]
+        if same:
+            same[0].append(setup)
+        else:
+            found.append((held, [setup]))
+    return [members for _, members in found]
 
 
 def _as_peaks(setup: Setup) -> tuple[Peak, ...]:

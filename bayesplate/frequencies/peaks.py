@@ -30,13 +30,14 @@ _SIGNS = {"+": 1, "-": -1, "": 0}
 class PeakLikelihood:
     """The probability of a setup's peaks, summed over all assignments to its modes (`Assignments`).
 
-    A peak is no mode with a prior probability, and then lies anywhere up to the highest one; otherwise it is one of the
-    modes that no certain label has taken, about which it scatters as a reading does. A mode leaves no peak with a prior
-    probability, which is higher the nearer hammer or sensor stand to its nodal lines, or if it lies above the highest
-    peak. Where the signs of residues are known, on the card and from the shapes, a peak of the other sign is not that
-    mode, and peaks and modes keep their order within a sign only; a mode with so small a residue that it may have
-    either sign is in both orders. A label that may be wrong is right with the
-    probability that the card gives, and otherwise any other mode's.
+    A peak is no mode with a prior probability s, and then lies anywhere up to the highest one; otherwise it is one of
+    the modes that no certain label has taken, about which it scatters as a reading does. Of n peaks n s are expected to
+    be none: each that is weighs n s, for it may stand anywhere among the others, while a mode has one place. A mode
+    leaves no peak with a prior probability, which is higher the nearer hammer or sensor stand to its nodal lines, or if
+    it lies above the highest peak. Where the signs of residues are known, on the card and from the shapes, a peak of
+    the other sign is not that mode, and peaks and modes keep their order within a sign only; a mode with so small a
+    residue that it may have either sign is in both orders. A label that may be wrong is right with the probability that
+    the card gives, and otherwise any other mode's.
 
     Attributes
     ----------
@@ -111,7 +112,7 @@ class PeakLikelihood:
         is_split = len(orders[0]) > 1
         log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
         in_both = np.isin(np.arange(columns.size), orders[0][0][1]) & np.isin(np.arange(columns.size), orders[0][-1][1])
-        log_alone = np.log(setup.spurious * wide) + log_label[:, -1] + log_sign
+        log_alone = np.log(setup.spurious * len(errors.frequency) * wide) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
             readings=readings,

@@ -56,16 +56,16 @@ def every_of(setup: Setup, modes=MODES):
     return modes[:, [*labelled, *(i for i in range(len(BEAMS)) if i not in labelled)]]
 
 
-def enumerated(peaks, modes, seen, noise, cut, alone=SPURIOUS, pair=lambda i, j: 1.0):
+def enumerated(peaks, modes, seen, noise, cut, alone=SPURIOUS, pair=lambda i, j: 1.0, n_peaks=None):
     """The sum over sets of pairs that rise, from peaks (Hz) and modes (ln f) in any order, and each pair's share."""
-    order = np.argsort(modes)
+    order, n_peaks = np.argsort(modes), len(peaks) if n_peaks is None else n_peaks
     peaks, total, pairs = sorted(peaks), 0.0, np.zeros((len(peaks), len(modes)))
     gone = [1.0 - seen[j] * norm.cdf((np.log(cut) - modes[j]) / noise) for j in range(len(modes))]
     for size in range(min(len(peaks), len(modes)) + 1):
         for rows in combinations(range(len(peaks)), size):
             for columns in combinations(order, size):
                 weight = np.prod([gone[j] for j in order if j not in columns])
-                weight *= np.prod([alone * peaks[i] / cut for i in range(len(peaks)) if i not in rows])
+                weight *= np.prod([n_peaks * alone * peaks[i] / cut for i in range(len(peaks)) if i not in rows])
                 for i, j in zip(rows, columns, strict=True):
                     weight *= (1.0 - SPURIOUS) * seen[j] * norm.pdf(np.log(peaks[i]), modes[j], noise) * pair(i, j)
                 total += weight
@@ -124,6 +124,31 @@ def test_a_proposed_label_says_nothing() -> None:
     assert other.log_likelihood(every_of(proposed), NOISE) == pytest.approx(expected, abs=1e-12)
 
 
+def test_as_many_peaks_are_none_as_stated():
+    """Spectra drawn as the likelihood says: a fifth of the peaks, on average, is no mode, and is found to be none."""
+    rng = np.random.default_rng(4)
+    spurious, missed, noise, n_sets = 0.2, 0.3, 0.02, 300
+    modes = np.log(60.0) + 0.1 * np.arange(12)
+    names = [(i + 2, 0) for i in range(modes.size)]
+    told, true, spread = [], [], []
+    for _ in range(n_sets):
+        seen = modes[rng.random(modes.size) > missed]
+        read = np.exp(seen + noise * rng.standard_normal(seen.size))
+        n_none = rng.poisson(spurious / (1.0 - spurious) * (1.0 - missed) * modes.size)
+        hertz = np.sort(np.concatenate([read, rng.uniform(0.0, np.exp(modes[-1]), n_none)]))
+        setup = replace(setup_of(peaks=[Peak(exact(float(one))) for one in hertz]), missed=missed, spurious=spurious)
+        others = tuple(OtherMode(PLACE, beams) for beams in names)
+        model = SimpleNamespace(setup=setup, others=others, residues=None, every_place=(PLACE,) * modes.size)
+        shares = 1.0 - PeakLikelihood.of(model).probabilities(modes[None], np.array([noise])).sum(axis=1)
+        told.append(shares.sum())
+        true.append(n_none)
+        spread.append(np.sum(shares * (1.0 - shares)))
+    error = 4.0 * np.sqrt(np.var(np.subtract(told, true)) * n_sets)
+    assert abs(np.sum(told) - np.sum(true)) < error + 0.05 * np.sum(true)  # the highest peak ends the range
+    assert error < 0.15 * np.sum(true)
+    assert np.sum(spread) > 0.0
+
+
 RESIDUES = np.array([0.6, -0.4, 0.5, -0.02, 0.3])
 
 
@@ -140,7 +165,9 @@ def test_signs_keep_peaks_and_modes_apart() -> None:
             has_plus = np.array([True, False, True, is_positive, True])
             for sign, wanted in (("+", has_plus), ("-", ~has_plus)):
                 hertz = [one for one, own in signed.items() if own == sign]
-                weight *= enumerated(hertz, MODES[draw, wanted], seen[wanted], NOISE[draw], 181.0, 0.5 * SPURIOUS)[0]
+                weight *= enumerated(
+                    hertz, MODES[draw, wanted], seen[wanted], NOISE[draw], 181.0, 0.5 * SPURIOUS, n_peaks=4
+                )[0]
             expected += weight
         assert found[draw] == pytest.approx(np.log(expected), abs=1e-9)
 

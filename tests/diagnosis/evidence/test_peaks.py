@@ -79,7 +79,9 @@ def enumerated(base: Baseline) -> float:
                 fit = -0.5 * off @ off / NOISE**2 - 0.5 * (n - 3) * np.log(2.0 * np.pi) - n * np.log(NOISE)
                 fit -= 0.5 * np.linalg.slogdet(precision)[1]
                 known = n * np.log((1.0 - SPURIOUS) * (1.0 - MISSED)) + (len(modes) - n) * np.log(MISSED)
-                known += sum(np.log(SPURIOUS) + readings[i] - readings.max() for i in peaks if i not in rows)
+                known += sum(
+                    np.log(len(peaks) * SPURIOUS) + readings[i] - readings.max() for i in peaks if i not in rows
+                )
                 logs.append(fit + known)
     return float(logsumexp(logs))
 
@@ -187,7 +189,7 @@ def test_a_reading_that_is_no_mode_is_left_out_of_folds():
     rms = [np.sqrt(np.mean(part[0, kept] ** 2)) for part in (folded.after, folded.before)]
     assert folded.ratio[0] == pytest.approx(rms[0] / rms[1])
     gains = log_score_gains(ground, base.residual, np.array([0, 0, 1, 0, 0, 0]))
-    alone = np.log(SPURIOUS) + base.residual[2] + base.log_frequency[2] - (base.residual + base.log_frequency).max()
+    alone = np.log(6 * SPURIOUS) + base.residual[2] + base.log_frequency[2] - (base.residual + base.log_frequency).max()
     own = log_score_gains(ground, base.residual, np.array([0, 0, 0, 0, 0, 0]))
     assert own[2] == 0.0
     expected = log_score_of(ground, 2)
