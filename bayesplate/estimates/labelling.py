@@ -170,6 +170,8 @@ def _labelled_setup(board: Board, setup: Setup, guess: Guess, least: float) -> S
     model = with_others(setup_model(system_of(board, setup), guess.values), guess.values)
     peaks = PeakLikelihood.of(model)
     assert peaks is not None
+    # Where a guess is off, few peaks are near a mode: they are taken for one the sooner, and the next guess is better.
+    peaks = replace(peaks, log_alone=peaks.log_alone - np.log(peaks.log_alone.size))
     values = {**guess.values, **dict(zip(RIGIDITIES, np.exp(guess.log_rigidities).T, strict=True))}
     every = model.every_log_frequency(values, "linear")
     usable = np.isfinite(every).all(axis=1)
