@@ -15,7 +15,8 @@ from bayesplate.diagnosis.evidence.folds import log_score_gains, nested
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, confusable
 from bayesplate.diagnosis.evidence.peaks import log_summed, with_own_labels
 from bayesplate.diagnosis.evidence.search import search
-from bayesplate.diagnosis.shifts.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.spectrum import Spectrum
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.modes.naming import Place
