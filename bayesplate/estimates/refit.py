@@ -113,7 +113,7 @@ def most_likely(
         return np.concatenate([without(chained), np.eye(x.size)[N_CONSTANTS:]])
 
     if bounds is None or bounds.are_open:
-        return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x)
+        return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-10, ftol=1e-10).x)
     limits = (bounds.lower, bounds.upper)
     return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac").x)
 

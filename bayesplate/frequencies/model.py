@@ -13,7 +13,7 @@ from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
 from bayesplate.modes.plate import Beams, PlateMatrices
-from bayesplate.modes.reduced import reduced_order_model
+from bayesplate.modes.reduced import ACCEPTED_CENTS, reduced_order_model
 from bayesplate.modes.solve import solve_up_to
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
@@ -213,7 +213,13 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
     return replace(model, linear=linear, exact=None, others=others, residues=residues)
 
 
-def with_exact(model: SetupModel, centre: Values, around: Sequence[Values], held_out: Sequence[Values]) -> SetupModel:
+def with_exact(
+    model: SetupModel,
+    centre: Values,
+    around: Sequence[Values],
+    held_out: Sequence[Values],
+    accepted_cents: float = ACCEPTED_CENTS,
+) -> SetupModel:
     """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`."""
     reduced = reduced_order_model(
         model.plate,
@@ -221,5 +227,6 @@ def with_exact(model: SetupModel, centre: Values, around: Sequence[Values], held
         model.system.weights(centre).at(0),
         [model.system.weights(values).at(0) for values in around],
         [model.system.weights(values).at(0) for values in held_out],
+        accepted_cents,
     )
     return replace(model, exact=ExactLaw(reduced))

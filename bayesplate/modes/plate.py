@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from bayesplate.modes.line import Line, rigid_degrees
 from bayesplate.modes.sparse import sum_of_krons
+from bayesplate.modes.threads import in_threads
 from bayesplate.plate.setup import Ends
 
 KronSum = tuple[tuple[Any, Any], ...]
@@ -137,7 +138,7 @@ class Block:
 
     def project(self, terms: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Terms on the span of (n_dof, n_vectors) vectors: (n_terms, n_vectors, n_vectors) array."""
-        small = np.stack([vectors.T @ (self.matrix(term) @ vectors) for term in terms])
+        small = np.stack(in_threads(lambda term: vectors.T @ (self.matrix(term) @ vectors), terms))
         return (small + np.swapaxes(small, -1, -2)) / 2.0
 
     def project_masses(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:

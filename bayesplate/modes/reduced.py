@@ -16,11 +16,12 @@ from bayesplate.modes.naming import Place
 from bayesplate.modes.pencils import condensed_eigenvalues, pencil_eigenvalues, pencil_modes
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 from bayesplate.modes.solve import ClassModes, solve_class
+from bayesplate.modes.threads import in_threads
 
 _SPARE = 2
 _RESISTS = 1e-6
 _LOWEST_SHARE = 1e-7
-_ACCEPTED_CENTS = 0.1
+ACCEPTED_CENTS = 0.1
 _FEW = 9
 """Training points that are always solved, all of them."""
 _STEADY = 0.05
@@ -28,7 +29,7 @@ _WHOLE = 40
 """Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
 _BEYOND = 10
 """Modes above the wanted ones that are kept from it."""
-_BATCH, _SMALL_BATCH = 64, 512
+_BATCH, _SMALL_BATCH = 16, 512
 """Draws whose large or small matrices are held at once: those of a whole posterior would not fit any cache."""
 
 
@@ -64,11 +65,13 @@ class ReducedBlock:
 
         All r - n_rigid of them, or n_kept - n_rigid where the others are condensed.
         """
-        batch = _BATCH if self.n_kept else _SMALL_BATCH
-        if len(weights.stiffness) > batch:
-            starts = range(0, len(weights.stiffness), batch)
-            parts = [Weights(*(w[start : start + batch] for w in weights)) for start in starts]
-            return np.concatenate([self.eigenvalues(part) for part in parts])
+        is_large = self.stiffness.shape[-1] > _WHOLE
+        starts = range(0, max(len(weights.stiffness), 1), _BATCH if is_large else _SMALL_BATCH)
+        parts = [Weights(*(w[start : start + starts.step] for w in weights)) for start in starts]
+        found = in_threads(self._eigenvalues, parts) if is_large else [self._eigenvalues(part) for part in parts]
+        return np.concatenate(found)
+
+    def _eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
         stiffness = _weighted(weights.stiffness, self.stiffness)
         mass = _weighted(weights.mass, self.masses) if len(self.masses) else None
         if self.n_kept:
@@ -136,10 +139,11 @@ def reduced_order_model(
     centre: Weights,
     around: Iterable[Weights],
     held_out: Sequence[Weights],
+    accepted_cents: float = ACCEPTED_CENTS,
 ) -> ReducedOrderModel:
     """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
 
-    Of many points around the first half will do if the error at the held-out ones stays below a tenth of a cent. While
+    Of many points around the first half will do if the error at the held-out ones stays below what is accepted. While
     it does not, the second half joins the basis, then half of the held-out points. The check is
     made at those that did not join: they lie as far out as the others, and none was chosen for its error, so that it is
     an honest sample of the error over the region.
@@ -153,6 +157,7 @@ def reduced_order_model(
         At the estimate.
     around, held_out : sequences of Weights
         At least one is held out.
+    accepted_cents : float
 
     Returns
     -------
@@ -165,17 +170,17 @@ def reduced_order_model(
     blocks = []
     worst = 0.0
     for parity, n_modes in ranks.items():
-        block, error = _reduce(plate.block(parity), n_modes, training, held_out)
+        block, error = _reduce(plate.block(parity), n_modes, training, held_out, accepted_cents)
         blocks.append(block)
         worst = max(worst, error)
     return ReducedOrderModel(tuple(places), tuple(blocks), worst)
 
 
 def _reduce(
-    block: Block, n_modes: int, training: list[Weights], held_out: Sequence[Weights]
+    block: Block, n_modes: int, training: list[Weights], held_out: Sequence[Weights], accepted_cents: float
 ) -> tuple[ReducedBlock, float]:
     def solved(points: Sequence[Weights]) -> tuple[list[Weights], list[ClassModes]]:
-        found = [(weights, _modes_of(block, weights, n_modes + _SPARE)) for weights in points]
+        found = list(zip(points, in_threads(lambda one: _modes_of(block, one, n_modes + _SPARE), points), strict=True))
         kept = [(weights, modes) for weights, modes in found if modes is not None]
         return [weights for weights, _ in kept], [modes for _, modes in kept]
 
@@ -200,7 +205,7 @@ def _reduce(
         for reduced in _cheapest_first(whole, training[0], n_modes):
             ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
             worst = 600.0 * float(np.abs(np.log2(ratios)).max())
-            if worst <= _ACCEPTED_CENTS:
+            if worst <= accepted_cents:
                 return reduced, worst
     return reduced, worst
 

@@ -15,6 +15,7 @@ from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, setup_model, with_exact, with_others
 from bayesplate.frequencies.peaks import takes_part
+from bayesplate.modes.reduced import ACCEPTED_CENTS
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
@@ -172,7 +173,13 @@ def _covariance(
 
 
 def exact_models(
-    board: Board, models: Sequence[SetupModel], centre: Floats, covariance: Floats, *, is_rough: bool = False
+    board: Board,
+    models: Sequence[SetupModel],
+    centre: Floats,
+    covariance: Floats,
+    *,
+    is_rough: bool = False,
+    accepted_cents: float = ACCEPTED_CENTS,
 ) -> tuple[SetupModel, ...]:
     """Models with the exact law, trained at the centre and at the corners of a box around it.
 
@@ -189,6 +196,8 @@ def exact_models(
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
     is_rough : bool
         Two opposite corners, one end per effect and one check will do: near the centre the error is small all the same.
+    accepted_cents : float
+        Error at the checks up to which no further points are solved.
     """
     parameters = Parameters(board)
     ratios = np.eye(N_RIGIDITIES)[:2] - np.eye(N_RIGIDITIES)[2]
@@ -229,7 +238,7 @@ def exact_models(
 
     (middle,) = points(np.zeros((1, parameters.n_dim)))
     around, checks = points(corners), points(held_out)
-    return tuple(with_exact(model, middle, around, checks) for model in models)
+    return tuple(with_exact(model, middle, around, checks, accepted_cents) for model in models)
 
 
 def worst_cents(models: Sequence[SetupModel]) -> float:

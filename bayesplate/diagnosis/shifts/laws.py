@@ -24,6 +24,9 @@ from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 
 Floats = NDArray[np.float64]
 
+_ACCEPTED_CENTS = 0.5
+"""Error of a law at the ends of its region: small beside what readings scatter."""
+
 
 @dataclass(frozen=True, eq=False)
 class FormLaw:
@@ -160,7 +163,7 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
         covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.linalg.inv(weighted.T @ weighted)
     else:
         covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.diag([half_width**2 / 9.0] * 2 + [0.0])
-    return FormLaw(form, exact_models(board, models, centre, covariance))
+    return FormLaw(form, exact_models(board, models, centre, covariance, accepted_cents=_ACCEPTED_CENTS))
 
 
 def merged(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:

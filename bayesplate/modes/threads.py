@@ -1,0 +1,52 @@
+"""Independent parts of one computation on all cores of a machine: the numbers are the same on any number of them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import Any, TypeVar
+
+from numpy.typing import NDArray
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
+_local = threading.local()
+
+
+def in_threads(compute: Callable[[Part], Result], parts: Sequence[Part] | NDArray[Any]) -> list[Result]:
+    """What comes of each part, in their order.
+
+    Worker processes share the cores between them already, and have one thread each.
+
+    Parameters
+    ----------
+    compute : callable
+        Spends its time in compiled code. Where it calls this function again its parts follow one another.
+    parts : sequence or (n_parts, ...) array
+
+    Returns
+    -------
+    list
+    """
+    is_part = hasattr(_local, "is_part") or multiprocessing.parent_process() is not None
+    if is_part or len(parts) < 2 or _n_cores() < 2:
+        return [compute(part) for part in parts]
+    return list(_pool().map(compute, parts))
+
+
+def _n_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(_n_cores(), initializer=setattr, initargs=(_local, "is_part", True))
+
+
+if hasattr(os, "register_at_fork"):  # threads do not survive a fork
+    os.register_at_fork(after_in_child=_pool.cache_clear)
