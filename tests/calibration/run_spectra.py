@@ -19,12 +19,22 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from calibration.planted import Settings
 from calibration.records import Record, add_to, publish, read_done
-from calibration.spectra import MISSED, N_LABELLED, N_MODES, coverage, is_calibrated, reliability, simulate_one
+from calibration.spectra import (
+    MISSED,
+    N_LABELLED,
+    N_MODES,
+    coverage,
+    doubtful,
+    is_calibrated,
+    reliability,
+    simulate_one,
+    taken_for_sure,
+)  # fmt: skip
 
 
 def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
     """Do what is not done yet, and return the records of all boards asked for, in their order."""
-    identity = {"format": 1, "settings": asdict(settings), "modes": N_MODES, "missed": MISSED, "labelled": N_LABELLED}
+    identity = {"format": 2, "settings": asdict(settings), "modes": N_MODES, "missed": MISSED, "labelled": N_LABELLED}
     records = read_done(out, identity)
     done = {record["simulation"] for record in records}
     records += add_to(
@@ -47,11 +57,22 @@ def told(records: Sequence[Record]) -> list[str]:
         f"{row['low']:5.2f}-{row['high']:5.2f}  {row['n']:6d} {row['true']:7.3f} {row['mean']:9.3f} +- {row['sd']:.3f}"
         for row in reliability(records)
     ]
-    lines += ["", "intervals of 90 % that hold the truth", f"{'':8s} {'summed':>12s} {'assigned for sure':>18s}"]
-    summed, control = coverage(records, "holds"), coverage(records, "control")
-    for name, (hits, n) in summed.items():
-        sure, m = control[name]
-        lines.append(f"{name:8s} {hits:4d} of {n:4d} {sure:10d} of {m:4d}")
+    n_exchanged = sum(record.get("exchanged", 0) for record in records)
+    n_sure, n_false = taken_for_sure(records)
+    lines += [
+        f"{n_exchanged} readings were exchanged by the noise with another; they count in the order of frequency",
+        f"{n_sure} labels are the most probable: taken for sure, {n_false} of them are false",
+    ]
+    for words, some in ("all boards", records), ("boards in doubt", doubtful(records)):
+        lines += [
+            "",
+            f"intervals of 90 % that hold the truth, {words}",
+            f"{'':8s} {'summed':>12s} {'assigned for sure':>18s}",
+        ]
+        summed, control = coverage(some, "holds"), coverage(some, "control")
+        for name, (hits, n) in summed.items():
+            sure, m = control[name]
+            lines.append(f"{name:8s} {hits:4d} of {n:4d} {sure:10d} of {m:4d}")
     return [*lines, "first error: " + failed[0]["error"][:200]] if failed else lines
 
 

@@ -5,6 +5,9 @@ two lowest peaks have a label. Constants and noise are drawn from the priors tha
 another discretisation, makes the frequencies. Of all pairs of a peak and a mode that are given a probability p, a share
 p should be true; intervals of 90 % should hold the truth in 90 of 100 boards. The control takes the most probable
 assignment of every peak for sure and is fitted again.
+
+Peaks keep the order of their modes, as the likelihood has it: where the noise exchanges the readings of two modes, each
+reading belongs to the mode that has its place in the order. How many were exchanged is told.
 """
 
 from __future__ import annotations
@@ -49,7 +52,8 @@ def simulate_one(settings: Settings, index: int) -> Record:
     record: Record = {"simulation": index}
     with tempfile.TemporaryDirectory() as folder:
         try:
-            asked, truth, peaks = _drawn(Path(folder), rng)
+            asked, truth, peaks, n_exchanged = _drawn(Path(folder), rng)
+            record |= {"exchanged": n_exchanged}
             problem = pose(asked.board, asked.prior)
             inference, draws, attempts = fitted(problem, settings, rng)
             record |= {"pairs": _pairs(inference.problem, draws, peaks), "attempts": attempts}
@@ -61,8 +65,11 @@ def simulate_one(settings: Settings, index: int) -> Record:
     return record | {"seconds": round(time.perf_counter() - started, 2)}
 
 
-def _drawn(folder: Path, rng: np.random.Generator) -> tuple[Prepared, dict[str, float], dict[float, Label | None]]:
-    """A card with peaks, the constants behind it, and which mode each peak is; None for the spurious one."""
+def _drawn(folder: Path, rng: np.random.Generator) -> tuple[Prepared, dict[str, float], dict[float, Label | None], int]:
+    """A card with peaks, the constants behind it, which mode each peak is, and how many the noise has exchanged.
+
+    The spurious peak is None.
+    """
     design = DESIGNS["free-12"]
     (setup,) = design.setups
     (folder / "spread.toml").write_text(prior_text())
@@ -82,7 +89,9 @@ def _drawn(folder: Path, rng: np.random.Generator) -> tuple[Prepared, dict[str, 
             continue
         noise = drawn(asked.board.setups[0].noise, rng)
         seen = [beams for beams in lowest if rng.random() > MISSED]
-        read = {float(elastic[b][0] * np.exp(noise * rng.standard_normal())): b for b in seen}
+        hertz = [float(elastic[b][0] * np.exp(noise * rng.standard_normal())) for b in seen]
+        read = dict(zip(sorted(hertz), seen, strict=True))
+        n_exchanged = sum(read[one] != b for one, b in zip(hertz, seen, strict=True))
         peaks: dict[float, Label | None] = dict(read)
         peaks[float(rng.uniform(elastic[lowest[0]][0], elastic[lowest[-1]][0]))] = None
         if len(seen) > N_LABELLED:
@@ -92,7 +101,7 @@ def _drawn(folder: Path, rng: np.random.Generator) -> tuple[Prepared, dict[str, 
     text = card_text("planted", design, {"free": labelled}, noise_cents=0.0, prior="./spread.toml", stated=stated)
     told = f"missed_probability = {MISSED}\nspurious_probability = {SPURIOUS:.4f}\nunlabelled_hz = {bare}\n"
     (folder / "planted.toml").write_text(text.replace("\n[setup.frequencies_hz]", f"{told}\n[setup.frequencies_hz]"))
-    return prepare(folder / "planted.toml"), truth, {hertz: peaks[hertz] for hertz in bare}
+    return prepare(folder / "planted.toml"), truth, {hertz: peaks[hertz] for hertz in bare}, n_exchanged
 
 
 def _pairs(problem: PosedProblem, draws: Draws, truth: Mapping[float, Label | None]) -> list[list[float]]:
@@ -153,6 +162,17 @@ def _may_be(hits: int, n: int, low: float, high: float) -> bool:
     at_least = beta.ppf(0.05, hits, n - hits + 1) if hits else 0.0
     at_most = beta.ppf(0.95, hits + 1, n - hits) if hits < n else 1.0
     return bool(at_least <= high and at_most >= low)
+
+
+def taken_for_sure(records: Sequence[Record]) -> tuple[int, int]:
+    """How many labels the control takes for sure, and how many of them are false."""
+    sure = [true for record in records for share, true in record.get("pairs", []) if share > 0.5]
+    return len(sure), len(sure) - int(sum(sure))
+
+
+def doubtful(records: Sequence[Record]) -> list[Record]:
+    """Boards on which some assignment is in doubt: half a peak or more is expected to be taken wrongly."""
+    return [one for one in records if sum(share * (1.0 - share) for share, _ in one.get("pairs", [])) > 0.5]
 
 
 def coverage(records: Sequence[Record], key: str) -> dict[str, tuple[int, int]]:
