@@ -230,3 +230,23 @@ def with_exact(
         accepted_cents,
     )
     return replace(model, exact=ExactLaw(reduced))
+
+
+def with_exact_of(model: SetupModel, twin: SetupModel) -> SetupModel:
+    """Add the exact law of another setup of which this one is a twin (`are_twins`)."""
+    assert isinstance(twin.exact, ExactLaw)
+    return replace(model, exact=ExactLaw(replace(twin.exact.reduced, places=model.every_place)))
+
+
+def are_twins(one: SetupModel, other: SetupModel, points: Sequence[Values]) -> bool:
+    """Whether two setups are one plate at some points: the same matrices with the same weights, and the same modes."""
+    blocks = zip(one.plate.blocks, other.plate.blocks, strict=False)
+    if len(one.plate.blocks) != len(other.plate.blocks):
+        return False
+    if any(a.terms is not b.terms or a.masses is not b.masses or a.projected or b.projected for a, b in blocks):
+        return False
+    modes = ({(place.parity, place.rank) for place in each.every_place} for each in (one, other))
+    if next(modes) != next(modes):
+        return False
+    weights = ((one.system.weights(values), other.system.weights(values)) for values in points)
+    return all(np.array_equal(a, b) for first, second in weights for a, b in zip(first, second, strict=True))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import Predict, design, refit
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.model import SetupModel, setup_model, with_exact, with_others
+from bayesplate.frequencies.model import SetupModel, are_twins, setup_model, with_exact, with_exact_of, with_others
 from bayesplate.frequencies.peaks import takes_part
 from bayesplate.modes.reduced import ACCEPTED_CENTS
 from bayesplate.plate.board import Board, Values
@@ -186,7 +186,7 @@ def exact_models(
     The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies of a bare plate are homogeneous in
     the rigidities, so a common factor needs no training, and side lengths only rescale the same terms. Parameters of
     effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
-    the box.
+    the box. Sessions that hold the plate alike are solved once.
 
     Parameters
     ----------
@@ -238,7 +238,13 @@ def exact_models(
 
     (middle,) = points(np.zeros((1, parameters.n_dim)))
     around, checks = points(corners), points(held_out)
-    return tuple(with_exact(model, middle, around, checks, accepted_cents) for model in models)
+    every = [middle, *around, *checks]
+    made: list[SetupModel] = []
+    for model in models:
+        twin = next((one for one in made if are_twins(one, model, every)), None)
+        solved = with_exact_of(model, twin) if twin else with_exact(model, middle, around, checks, accepted_cents)
+        made.append(solved)
+    return tuple(made)
 
 
 def worst_cents(models: Sequence[SetupModel]) -> float:
