@@ -107,11 +107,14 @@ def test_a_blind_board_that_is_named_or_grouped_is_so_with_what_its_peaks_ask_fo
 
 
 @slow
-def test_on_one_blind_board_shear_halves_the_error_of_modes_left_out(diagnosed):
-    told = diagnosed("spruce-free-3R").diagnosis
-    assert told.effects == (SHEAR,)
-    before, after = (one.nested_leave_one_out_rms_cents for one in (told.before, told.after))
-    assert after < 0.6 * before
+def test_on_one_blind_board_shear_of_the_usual_size_lowers_the_error_of_modes_left_out(diagnosed):
+    """Nothing is fitted but the constants; on another it rises, for its readings ask for a plate stiffer in shear."""
+    errors = {}
+    for name in ("spruce-free-3R", "spruce-free-2R"):
+        known = {one.effects: one.leave_one_out_rms_cents for one in diagnosed(name).diagnosis.known if not one.without}
+        errors[name] = known[SHEAR,] / known[()]
+    assert errors["spruce-free-3R"] < 0.75
+    assert errors["spruce-free-2R"] > 1.0
 
 
 @slow
