@@ -69,12 +69,16 @@ def test_the_readme_says_what_the_table_shows():
     assert all(row[1:3] == ("named", "transverse_shear") for row in computed.values())
     measured = [row for name, row in rows.items() if name not in computed]
     assert all(row[3] == "no claim" for row in measured)
-    named = [row for row in measured if row[1] == "named"]
-    assert "On two of these it names an effect all the same" in readme
-    assert len(named) == 2
-    for name, _, effect, *_, nested, _, _, _ in named:
-        assert f"{effect.replace('_', ' ')} on {name}, where" in readme
-        assert "goes from {} to {}".format(*nested.split(" → ")) in readme
+    groups = [row for row in measured if row[1] == "indistinguishable group"]
+    assert "On two of these a group is left that the readings cannot tell apart" in readme
+    assert len(groups) == 2
+    for name, _, effects, *_ in groups:
+        assert f"{effects.replace('_', ' ').replace(', ', ' or ')} on {name}" in readme
+    (nested,) = [row[6] for row in groups if row[0] == "spruce-free-1R"]
+    assert "goes from {} to {}".format(*nested.split(" → ")) in readme
+    assert "On two nothing that the library knows explains the residual." in readme
+    assert [row[1] for row in measured].count("unexplained") == 2
+    assert [row[1] for row in measured].count("named") == 0
 
 
 def test_every_board_is_shown(example):
