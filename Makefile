@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs calibration spectra coverage trial benchmarks
+.PHONY: fit test slow docs calibration spectra campaigns coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -30,6 +30,9 @@ calibration: $(VENV)/tested-with
 
 spectra: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_spectra.py --boards 200 --workers 2 --out results/spectra.jsonl --publish docs/validation
+
+campaigns: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_campaigns.py --campaigns 100 --workers 2 --out results/campaigns.jsonl --publish docs/validation
 
 trial: $(VENV)/tested-with
 	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl

@@ -9,7 +9,8 @@
     new(path)        a first card, to be completed
 
 `card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
-densities and the frequencies that other samplers ask for. Nothing is written unless `out=` names a folder.
+densities and the frequencies that other samplers ask for; `fit`, `check` and `diagnose` take a `Campaign` or its card
+too. Nothing is written unless `out=` names a folder.
 
 Glossary of symbols
 -------------------
@@ -34,6 +35,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from bayesplate.campaigns.checking import CampaignCheck
+    from bayesplate.campaigns.diagnosis import CampaignDiagnosis
+    from bayesplate.campaigns.summary import CampaignSummary
     from bayesplate.cards.prior import PriorCard
     from bayesplate.diagnosis.wording.diagnosis import Diagnosis
     from bayesplate.errors import (
@@ -54,6 +58,9 @@ if TYPE_CHECKING:
     from bayesplate.results.comparison import Comparison
     from bayesplate.results.sheets import ModesReport
     from bayesplate.results.summary import Summary
+    from bayesplate.workflow.campaign import Campaign
+    from bayesplate.workflow.campaign_diagnose import CampaignDiagnoseResult
+    from bayesplate.workflow.campaign_result import CampaignFitResult
     from bayesplate.workflow.check import CheckResult, check
     from bayesplate.workflow.cite import cite
     from bayesplate.workflow.compare import CompareResult, compare
@@ -68,6 +75,12 @@ __all__ = [
     "BatchError",
     "BayesplateError",
     "Board",
+    "Campaign",
+    "CampaignCheck",
+    "CampaignDiagnoseResult",
+    "CampaignDiagnosis",
+    "CampaignFitResult",
+    "CampaignSummary",
     "CheckReport",
     "CheckResult",
     "CheckpointError",
@@ -105,6 +118,12 @@ _HOMES = {
     "BatchError": "bayesplate.errors",
     "BayesplateError": "bayesplate.errors",
     "Board": "bayesplate.plate.board",
+    "Campaign": "bayesplate.workflow.campaign",
+    "CampaignCheck": "bayesplate.campaigns.checking",
+    "CampaignDiagnoseResult": "bayesplate.workflow.campaign_diagnose",
+    "CampaignDiagnosis": "bayesplate.campaigns.diagnosis",
+    "CampaignFitResult": "bayesplate.workflow.campaign_result",
+    "CampaignSummary": "bayesplate.campaigns.summary",
     "CheckReport": "bayesplate.results.checking",
     "CheckResult": "bayesplate.workflow.check",
     "CheckpointError": "bayesplate.errors",

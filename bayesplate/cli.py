@@ -85,7 +85,7 @@ def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None
 def main() -> None:
     """Learn the elastic constants of a rectangular plate from its modes.
 
-    CARD is the name of a shipped board or the path of a card (a .toml file).
+    CARD is the name of a shipped board or the path of a card (a .toml file). Campaigns go to check, fit and diagnose.
     """
     # Thousands of small matrices: more than one thread each only waits for the others. Before numpy is loaded.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -66,7 +66,7 @@ copybutton_prompt_text = "$ "
 html_show_sphinx = False
 html_copy_source = False
 
-TOO_LONG = ("closing_the_loop", "known_effects")
+TOO_LONG = ("campaign", "closing_the_loop", "known_effects")
 """Examples that take more than about twenty seconds: shown, not run."""
 
 sphinx_gallery_conf = {

@@ -18,7 +18,7 @@ from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
 from bayesplate.modes.solve import Modes, solve
 from bayesplate.plate.parameter import Owner, shown_name
-from bayesplate.plate.setup import AttachedItem, Setup
+from bayesplate.plate.setup import AttachedItem, Reading, Setup
 from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.workflow.prepare import prepare
 
@@ -90,10 +90,18 @@ def shifts(plate: Plate, effects: Sequence[Effect], parameters: Parameters, beam
     return 600.0 * np.log2(squared[1] / squared[0])
 
 
-def posed(card: str, effects: Sequence[str], attached: AttachedItem | None = None) -> PosedProblem:
-    """A shipped board with declared effects, ready to be sampled."""
+def _taken_for_sure(setup: Setup) -> tuple[Reading, ...]:
+    return tuple(replace(reading, confidence=1.0) for reading in setup.readings)
+
+
+def posed(
+    card: str, effects: Sequence[str], attached: AttachedItem | None = None, *, with_peaks: bool = False
+) -> PosedProblem:
+    """A shipped board with declared effects, ready to be sampled; its labels taken for sure, or with all its peaks."""
     prepared = prepare(card)
     setups = prepared.board.setups
+    if not with_peaks:
+        setups = tuple(replace(setup, peaks=(), readings=_taken_for_sure(setup)) for setup in setups)
     if attached is not None:
         setups = tuple(replace(setup, attached=(attached,)) for setup in setups)
     board = declare(replace(prepared.board, effects=tuple(effects), setups=setups))

@@ -8,6 +8,7 @@ from bayesplate.cards.board import (
     load_board,
     read_board_text,
 )
+from bayesplate.cards.campaign import CampaignCard, SharedSection, is_campaign, load_campaign
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.named import NamedCards, load_named
 from bayesplate.cards.physical import physical_faults, plate_mass_g
@@ -36,6 +37,7 @@ __all__ = [
     "AirSection",
     "AttachedItem",
     "BoardCard",
+    "CampaignCard",
     "CoefficientCard",
     "Edges",
     "HammerSection",
@@ -45,9 +47,12 @@ __all__ = [
     "PlateSection",
     "PriorCard",
     "SetupSection",
+    "SharedSection",
     "StatedPrior",
     "card_names",
+    "is_campaign",
     "load_board",
+    "load_campaign",
     "load_coefficients",
     "load_named",
     "load_prior",

@@ -64,7 +64,9 @@ def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | No
     got = f"no card of that name in {shelf_folder(kind)}"
     here = Path(f"{text}.toml")
     is_possible = "\0" not in text and len(text) < 200
-    if is_possible and here.is_file():
+    if kind == "boards" and text in card_names("campaigns"):
+        remedy = "it is a campaign: check, fit and diagnose take it"
+    elif is_possible and here.is_file():
         remedy = f"there is a file here: write {quoted(str(here))}"
     elif is_possible and Path(text).suffix and Path(text).is_file():
         remedy = "a card is a TOML file; bayesplate new writes a first one, for the frequencies to be put in"

@@ -45,6 +45,7 @@ class AirLoading(Effect):
 
     name: ClassVar[str] = "air_loading"
     scope: ClassVar[Scope] = "setup"
+    is_of_campaign: ClassVar[bool] = True
     sentence: ClassVar[str] = "The board carries air along, which makes it heavier, most of all in its low modes."
 
     @classmethod

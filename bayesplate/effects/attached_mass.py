@@ -60,6 +60,7 @@ class AttachedMass(Effect):
 
     name: ClassVar[str] = "attached_mass"
     scope: ClassVar[Scope] = "setup"
+    is_of_campaign: ClassVar[bool] = True
     refines: ClassVar[float] = 1.4
     sentence: ClassVar[str] = "Something fixed to the board moves with it, so modes that move its place ring lower."
 

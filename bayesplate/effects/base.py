@@ -99,6 +99,25 @@ class EffectForm:
 
 
 @dataclass(frozen=True)
+class Ratio:
+    """A parameter as a multiple of one of the board's own constants.
+
+    Attributes
+    ----------
+    to : str
+        E_x, E_y or G_xy.
+    prior : Quantity
+        Of the ratio, no unit.
+    source : str
+        Where the prior comes from.
+    """
+
+    to: str
+    prior: Quantity
+    source: str
+
+
+@dataclass(frozen=True)
 class Effect(ABC):
     """One effect on one setup.
 
@@ -120,6 +139,10 @@ class Effect(ABC):
     theory: ClassVar[Theory] = "thin"
     releases: ClassVar[Release] = ""
     turns_grain: ClassVar[bool] = False
+    is_of_campaign: ClassVar[bool] = False
+    """Whether boards of one rig, day or species may have it alike: a search over a campaign tries it as shared."""
+    ratios: ClassVar[Mapping[str, Ratio]] = {}
+    """Parameters that boards of one species may share as ratios to their own moduli, by key."""
     refines: ClassVar[float] = 1.0
     """Factor on the elements a side of a thin plate, for what its mesh would show."""
 

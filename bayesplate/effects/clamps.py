@@ -37,6 +37,7 @@ class CompliantClamp(Effect):
     clamped: ClampedEnds = ((False, False), (False, False))
 
     scope: ClassVar[Scope] = "setup"
+    is_of_campaign: ClassVar[bool] = True
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Self:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.effects.base import Effect
+from bayesplate.effects.field_looks import look
 from bayesplate.effects.part import Part, vibrating_part
 from bayesplate.modes.element import assembled, element_products, gauss_points
 from bayesplate.modes.line import line
@@ -167,12 +168,18 @@ def _weighted_energies(ends: Ends, part: Part, highest: int) -> tuple[Floats, Fl
     return zero, one, two
 
 
-def field_parameters(effect: Effect, profile: FieldProfile, source: str) -> tuple[Parameter, ...]:
-    """The components' parameters: standard normal, zero where the profile is the expected one."""
+def field_parameters(effect: Effect, profile: FieldProfile, source: str, more: str) -> tuple[Parameter, ...]:
+    """The components' parameters: standard normal, zero where the profile is the expected one.
+
+    `more` says what the board is where the field is high: "thicker".
+    """
     standard = Quantity.from_mean(0.0, 1.0, "normal")
     return tuple(
-        replace(effect.parameter(f"field_{k}", standard, "1", 0.0, source, f"component {k}"), is_component=True)
-        for k in range(1, len(profile.components) + 1)
+        replace(
+            effect.parameter(f"field_{k}", standard, "1", 0.0, source, f"shape {k}"),
+            look=look(component, profile.mean, more),
+        )
+        for k, component in enumerate(profile.components, start=1)
     )
 
 

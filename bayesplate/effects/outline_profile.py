@@ -22,8 +22,8 @@ _SOURCE = "normal: what the readings leave open of a smooth width, in standard d
 _GROUPS: tuple[Group, ...] = ("bending", "shear", "mass", "rotary")
 _N_POINTS = 400
 _STRIP_SDS, _FURTHEST = 3.0, 2.94
-"""Width of the strip in steps of a component, and the steps at which a component ends: there the strip still weighs
-something, and beyond less than nothing."""
+"""Width of the strip of an only component in its steps, and the steps at which a component ends: there the strip still
+weighs something, and beyond less than nothing."""
 _FIRST_ORDER_ALONE = 2
 """Order of smallness at which what an outline gains is counted: its second is left out, and so are products with it."""
 
@@ -102,7 +102,7 @@ class OutlineProfile(Effect):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """The components of what the readings leave open."""
-        return () if self.profile is None else field_parameters(self, self.profile, _SOURCE)
+        return () if self.profile is None else field_parameters(self, self.profile, _SOURCE, "wider")
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """The halves along x differ; across, only if one edge alone recedes."""
@@ -136,11 +136,17 @@ class OutlineProfile(Effect):
         """Weight of the strip of a component that is gained."""
         assert self.profile is not None
         steps = self.value(values, self.parameters()[k].key)
-        return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / _STRIP_SDS)
+        return np.asarray(np.clip(steps, -_FURTHEST, _FURTHEST) / self._strip_steps)
 
     def direction(self, x: Floats, y: Floats, k: int) -> Floats:
         """Where a component widens the board, 1, and where it narrows it, -1."""
         return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
+
+    @property
+    def _strip_steps(self) -> float:
+        """Width of a strip in steps of its component: where all strips overlap, all at their end leave some weight."""
+        assert self.profile is not None
+        return _STRIP_SDS * len(self.profile.components)
 
     @cached_property
     def _widest(self) -> float:
@@ -150,7 +156,7 @@ class OutlineProfile(Effect):
     def limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
         """The outline, or the one within by the strip of a component."""
         at = self.part_x.on_whole(x)
-        strip = 0.0 if inside is None else _STRIP_SDS * np.abs(self._step(at, inside))
+        strip = 0.0 if inside is None else self._strip_steps * np.abs(self._step(at, inside))
         missing = 1.0 - (np.minimum(self._widths(at), self._widest) - strip) / self._widest
         low, high = {
             ("free", True): (0.5 * missing, 1.0 - 0.5 * missing),

@@ -28,6 +28,7 @@ class SupportMass(Effect):
 
     name: ClassVar[str] = "support_mass"
     scope: ClassVar[Scope] = "setup"
+    is_of_campaign: ClassVar[bool] = True
     sentence: ClassVar[str] = "The frame moves against the board, so modes that push on the whole frame ring higher."
 
     @classmethod

@@ -26,6 +26,7 @@ class SupportStiffness(Effect):
 
     name: ClassVar[str] = "support_stiffness"
     scope: ClassVar[Scope] = "setup"
+    is_of_campaign: ClassVar[bool] = True
     sentence: ClassVar[str] = "What the board lies on pushes back, so its lowest modes ring higher."
 
     @classmethod

@@ -100,7 +100,7 @@ class ThicknessProfile(Effect):
                 self.parameter(f"taper_{axis}", DEFAULT_TAPER, "1", 0.0, _SOURCE, f"taper along {axis}")
                 for axis in "xy"
             )
-        return field_parameters(self, self.profile, _FIELD_SOURCE)
+        return field_parameters(self, self.profile, _FIELD_SOURCE, "thicker")
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """Neither half mirrors the other, unless the board is equally thick."""

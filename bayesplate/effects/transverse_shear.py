@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesplate.effects.base import Effect, Scope, Theory
+from bayesplate.effects.base import Effect, Ratio, Scope, Theory
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -17,6 +18,7 @@ _RIGID = 1e13
 
 DEFAULT_XZ = Quantity.from_median(0.62e9, 1.5)
 DEFAULT_YZ = Quantity.from_median(0.030e9, 1.8)
+_RATIO_SOURCE = "log-normal around the published G_xz / E_x 0.05-0.12 and G_yz / E_y 0.025-0.08 of spruces"
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,12 @@ class TransverseShear(Effect):
 
     name: ClassVar[str] = "transverse_shear"
     scope: ClassVar[Scope] = "board"
+    is_of_campaign: ClassVar[bool] = True
     theory: ClassVar[Theory] = "shear-flexible"
+    ratios: ClassVar[Mapping[str, Ratio]] = {
+        "G_xz": Ratio("E_x", Quantity.from_median(0.060, 1.5), _RATIO_SOURCE),
+        "G_yz": Ratio("E_y", Quantity.from_median(0.036, 1.8), _RATIO_SOURCE),
+    }
     sentence: ClassVar[str] = "The board gives way in shear through its thickness, so higher modes ring lower."
 
     references: ClassVar[tuple[str, ...]] = (

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.effects.words import joined
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
@@ -122,11 +123,18 @@ def require_identifiable(board: Board, found: Identifiability) -> None:
         if name in blind:
             reach = f"only within a factor {factor:.3g}" if np.isfinite(factor) and factor < 1e6 else "not at all"
             parts.append(f"{name} (so {_MODULUS[name]}) {reach}; add {_HELP[name]}")
-    labels = ", ".join(str(label) for setup in board.setups for label in setup.labels)
     raise NotIdentifiableError(
-        f"{board.name}: the modes {labels} determine " + "; ".join(parts) + f" (condition number "
+        f"{board.name}: the modes {_modes(board)} determine " + "; ".join(parts) + f" (condition number "
         f"{found.condition_number:.3g})"
     )
+
+
+def _modes(board: Board) -> str:
+    """Labels of the readings, setup by setup where there are several: two sessions may have the same ones."""
+    by_setup = {setup.name: ", ".join(str(label) for label in setup.labels) for setup in board.setups}
+    if len(by_setup) == 1:
+        return "".join(by_setup.values())
+    return joined([f"{labels} of {name}" for name, labels in by_setup.items()])
 
 
 def remarks(board: Board, found: Identifiability) -> tuple[str, ...]:

@@ -69,7 +69,10 @@ def log_measured(board: Board) -> NDArray[np.float64]:
 
 
 def weighted_least_squares(
-    board: Board, most_steps: int = MOST_STEPS, start: NDArray[np.float64] | None = None
+    board: Board,
+    most_steps: int = MOST_STEPS,
+    start: NDArray[np.float64] | None = None,
+    accepted: float = _CONVERGED,
 ) -> Estimate:
     """Rigidities that minimise the weighted squares of relative frequency errors over all setups.
 
@@ -81,6 +84,8 @@ def weighted_least_squares(
         After which they end, settled or not.
     start : (3,) array, optional
         Rigidities to begin with, N m; by default rough ones from the readings.
+    accepted : float
+        What ln D may be off by when they end.
 
     Returns
     -------
@@ -108,7 +113,7 @@ def weighted_least_squares(
             step *= 0.5
         log_next = log_next + step
         size = float(np.abs(step).max())
-        settled, previous = has_settled(size, previous), size
+        settled, previous = has_settled(size, previous, accepted), size
     return Estimate(rigidities, values, models, sensitivities, residuals, scales, settled)
 
 
@@ -117,14 +122,14 @@ def _is_material(log_rigidities: NDArray[np.float64], inputs: Values) -> bool:
     return bool(inputs["poisson_xy"] ** 2 * np.exp(log_rigidities[1] - log_rigidities[0]) < 1.0)
 
 
-def has_settled(step: float, previous: float) -> bool:
+def has_settled(step: float, previous: float, accepted: float = _CONVERGED) -> bool:
     """Whether steps of ln D end here: what they leave is too small to count, or they are small and shrink no more.
 
     They shrink evenly, so that after one of them there remains about as much of it as there was of the one before.
     Stiff shear strains and fields of thickness cost the eigen-solves half their digits, so that steps stay at 1e-6.
     """
     remaining = step * min(1.0, step / previous) if np.isfinite(previous) else step
-    return remaining < _CONVERGED or previous <= step < _SMALL
+    return remaining < accepted or previous <= step < _SMALL
 
 
 def starting_rigidities(board: Board) -> NDArray[np.float64]:

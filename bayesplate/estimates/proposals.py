@@ -21,7 +21,7 @@ from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
 from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
-from bayesplate.labels import Label
+from bayesplate.labels import HIGHEST_INDEX, Label
 from bayesplate.modes.plate import is_rigid
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
@@ -224,8 +224,13 @@ def _modes_at(board: Board, estimate: Estimate, highest: float) -> Named:
     while True:
         _, named = spectrum(estimate.models[0].system, estimate.values, n_modes, estimate.models[0].plate)
         if named[-1].frequency > 1.1 * highest or n_modes > 64:
-            return [(float(np.log(mode.frequency)), mode.label) for mode in named]
+            return [(float(np.log(mode.frequency)), _on_card(mode.label)) for mode in named]
         n_modes *= 2
+
+
+def _on_card(label: Label | None) -> Label | None:
+    """A label that a card may state: modes of higher orders have none."""
+    return label if label is not None and max(label) <= HIGHEST_INDEX else None
 
 
 def _assign(peaks: Floats, modes: Named, sd: float) -> Assignment:

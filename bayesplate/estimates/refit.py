@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.frequencies.predictor import Predictor
 from bayesplate.plate.readings import ReadingErrors
 
 Floats = NDArray[np.float64]
@@ -124,7 +125,11 @@ def design(predict: Predict, scales: Floats, at: Floats) -> Floats:
 
 
 def sensitivities(predict: Predict, at: Floats) -> Floats:
-    """Sensitivities of ln f to all parameters at a point, by differences: (n_modes, n_free) array."""
+    """Sensitivities of ln f to all parameters at a point, by differences: (n_modes, n_free) array.
+
+    Those of its tangent where the predictor has one: a single solution of the modes gives them all.
+    """
     steps = _STEP * np.eye(at.size)
-    both = predict(np.concatenate([at + steps, at - steps]))
+    near = predict.tangent(at) if isinstance(predict, Predictor) else predict
+    both = near(np.concatenate([at + steps, at - steps]))
     return np.asarray(((both[: at.size] - both[at.size :]) / (2 * _STEP)).T)

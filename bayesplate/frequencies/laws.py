@@ -55,6 +55,10 @@ class ExactLaw:
         """omega^2 in s^-2: (n_draws, n_modes) array."""
         return self.reduced.eigenvalues(weights)
 
+    def tangent(self, weights: Weights) -> LinearLaw:
+        """The linear law of the modes at one draw, which has the same slopes there."""
+        return LinearLaw(*self.reduced.energies(weights))
+
 
 def log_frequency(squared: NDArray[np.float64]) -> NDArray[np.float64]:
     """ln f (f in Hz) from omega^2; not a number where omega^2 is not positive."""

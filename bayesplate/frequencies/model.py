@@ -18,6 +18,7 @@ from bayesplate.modes.solve import solve_up_to
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
 
+_SLACK = 0.01
 _ABOVE = 1.15
 """Frequency up to which modes are looked for, over the highest peak: what lies higher will not come down to it."""
 
@@ -91,6 +92,11 @@ class SetupModel:
     def every_log_frequency(self, values: Values, law: LawName) -> NDArray[np.float64]:
         """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         return log_frequency(self.law(law).squared(self.system.weights(values)))
+
+    def tangent(self, values: Values) -> SetupModel:
+        """The same with the linear law of the modes that the exact law has at one draw of values."""
+        assert self.exact is not None
+        return replace(self, linear=self.exact.tangent(self.system.weights(values)))
 
     @property
     def every_beams(self) -> tuple[Beams | None, ...]:
@@ -239,7 +245,13 @@ def with_exact_of(model: SetupModel, twin: SetupModel) -> SetupModel:
 
 
 def are_twins(one: SetupModel, other: SetupModel, points: Sequence[Values]) -> bool:
-    """Whether two setups are one plate at some points: the same matrices with the same weights, and the same modes."""
+    """Whether two setups are one plate at some points: the same matrices with the same weights, and the same modes.
+
+    Each may have a size of its own of the same effect, if the points of the first one's reach as far as the other's.
+    """
+    names = _names_in_twin(one.system, other.system)
+    if names is None or not all(_reaches(points, *pair) for pair in names.items()):
+        return False
     blocks = zip(one.plate.blocks, other.plate.blocks, strict=False)
     if len(one.plate.blocks) != len(other.plate.blocks):
         return False
@@ -248,5 +260,25 @@ def are_twins(one: SetupModel, other: SetupModel, points: Sequence[Values]) -> b
     modes = ({(place.parity, place.rank) for place in each.every_place} for each in (one, other))
     if next(modes) != next(modes):
         return False
-    weights = ((one.system.weights(values), other.system.weights(values)) for values in points)
-    return all(np.array_equal(a, b) for first, second in weights for a, b in zip(first, second, strict=True))
+    for values in points:
+        of_other = {**values, **{name: values[its_own] for its_own, name in names.items()}}
+        weights = one.system.weights(values), other.system.weights(of_other)
+        if not all(np.array_equal(a, b) for a, b in zip(*weights, strict=True)):
+            return False
+    return True
+
+
+def _reaches(points: Sequence[Values], one: str, other: str) -> bool:
+    """Whether all values of one parameter lie between the least and the greatest of another, but for a hundredth."""
+    first, second = (np.array([values[name] for values in points]) for name in (one, other))
+    slack = _SLACK * np.ptp(first)
+    return bool(first.min() - slack <= second.min() and second.max() <= first.max() + slack)
+
+
+def _names_in_twin(one: System, other: System) -> dict[str, str] | None:
+    """Names of one system's parameters -> those of another's that stand for the same; None if they have others."""
+    first, second = (
+        {(effect.name, size.key): size.name for effect in system.effects for size in effect.parameters()}
+        for system in (one, other)
+    )
+    return {name: second[key] for key, name in first.items()} if first.keys() == second.keys() else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from bayesplate.modes.plate import PlateMatrices, Weights
 from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, assemble_shear_flexible
 from bayesplate.modes.thin import assemble, thin_masses, thin_terms
 from bayesplate.plate.board import Board, Values
+from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.setup import Ends, Setup
 
 
@@ -113,7 +114,8 @@ def system_of(board: Board, setup: Setup) -> System:
 def _plate(
     ends_x: Ends, ends_y: Ends, theory: Theory, effects: tuple[Effect, ...], n_x: int, n_y: int
 ) -> PlateMatrices:
-    shaping = tuple(effect for effect in effects if not _only_projects(effect))
+    # Whose sizes they are does not matter to the matrices, so that setups held alike have the same ones.
+    shaping = tuple(replace(effect, owner=BOARD) for effect in effects if not _only_projects(effect))
     projected = tuple(one.projection for one in contributions_of(effects).projected)
     return _assembled(ends_x, ends_y, theory, shaping, n_x, n_y).with_projected(projected)
 

@@ -1,4 +1,4 @@
-"""Eigenvalues of many small pencils K x = omega^2 M x at once: all of them, or the lowest by condensation.
+"""Eigenvalues of many small pencils K x = omega^2 M x at once: all of them, or the lowest by a step from near modes.
 
 With several effects the basis of a block counts a hundred vectors, of which two dozen modes are wanted. The modes at
 the centre are near those of every draw already. Let each take along, of every other vector q, the share
@@ -7,9 +7,16 @@ the centre are near those of every draw already. Let each take along, of every o
 
 that first-order perturbation gives, omega_i^2 = K_ii / M_ii of the draw; the Ritz values on the modes so corrected are
 those of the whole basis to the fourth order of the perturbation, at a quarter of the cost of all its eigenvalues.
+
+Where the draws lie too far from the centre for that, as with shear moduli that are known to a factor only, one step of
+inverse iteration from the same modes goes further: x = K^-1 M x_centre, which asks for one solution of equations
+instead of all eigenvalues, and spans those wanted the better, the more modes beyond them take part (Bathe and Wilson,
+Numerical Methods in Finite Element Analysis, 1976, chapter 12).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,13 +70,13 @@ def _one_or_nan(stiffness: Floats, mass: Floats, shift: Floats) -> Floats:
         return np.full((1, len(stiffness)), np.nan)
 
 
-def pencil_modes(stiffness: Floats, mass: Floats, shift: float, n_modes: int) -> tuple[Floats, Floats]:
+def pencil_modes(stiffness: Floats, mass: Floats, shift: Floats | float, n_modes: int) -> tuple[Floats, Floats]:
     """Lowest eigenvalues, increasing, and their vectors.
 
     Parameters
     ----------
     stiffness, mass : (n_draws, r, r) arrays
-    shift : float, s^-2
+    shift : float or (n_draws, 1, 1) array, s^-2
         Lifts rigid motions off zero.
     n_modes : int
 
@@ -88,7 +95,7 @@ def pencil_modes(stiffness: Floats, mass: Floats, shift: float, n_modes: int) ->
     flexibilities, turned = np.linalg.eigh(flexibility)
     highest = flexibilities[:, : -n_modes - 1 : -1]
     vectors = across @ turned[:, :, : -n_modes - 1 : -1] / np.sqrt(highest)[:, None, :]
-    return 1.0 / highest - shift, vectors
+    return 1.0 / highest - np.reshape(shift, (-1, 1)), vectors
 
 
 def condensed_eigenvalues(stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int) -> Floats:
@@ -127,6 +134,70 @@ def condensed_eigenvalues(stiffness: Floats, mass: Floats | None, n_kept: int, n
         small_mass = _with_followers(mass, followed, n_kept)
     # The shift is the draw's own, so that eigenvalues are homogeneous in the stiffness.
     return pencil_eigenvalues(small_stiffness, small_mass, quotients[:, :, n_rigid, None])
+
+
+def stepped_eigenvalues(stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int) -> Floats:
+    """Eigenvalues on the first vectors after one step of inverse iteration, increasing.
+
+    Parameters
+    ----------
+    stiffness, mass, n_kept, n_rigid
+        As of `condensed_eigenvalues`.
+
+    Returns
+    -------
+    (n_draws, n_kept) array, s^-2
+        Never below the eigenvalues on the whole basis; not a number where the weights are those of no material.
+    """
+    step = _step(stiffness, mass, n_kept, n_rigid)
+    return pencil_eigenvalues(step.stiffness, step.mass, step.shift)
+
+
+def stepped_modes(
+    stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int, n_modes: int
+) -> tuple[Floats, Floats]:
+    """The lowest modes from the first vectors after one step of inverse iteration.
+
+    Parameters
+    ----------
+    stiffness, mass, n_kept, n_rigid
+        As of `condensed_eigenvalues`.
+    n_modes : int
+        Not more than are kept.
+
+    Returns
+    -------
+    values, vectors
+        As of `pencil_modes`.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the weights are those of no material.
+    """
+    step = _step(stiffness, mass, n_kept, n_rigid)
+    values, vectors = pencil_modes(step.stiffness, step.mass, step.shift, n_modes)
+    return values, step.vectors @ vectors
+
+
+class _Step(NamedTuple):
+    """Vectors after a step, (n_draws, r, n_kept), both matrices on them, and the draw's own shift, (n_draws, 1, 1)."""
+
+    vectors: Floats
+    stiffness: Floats
+    mass: Floats
+    shift: Floats
+
+
+def _step(stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int) -> _Step:
+    if mass is None:
+        mass = np.broadcast_to(np.eye(stiffness.shape[-1]), stiffness.shape)
+    # The shift is the draw's own, so that eigenvalues are homogeneous in the stiffness.
+    shift = np.asarray(stiffness[:, n_rigid, n_rigid] / mass[:, n_rigid, n_rigid])[:, None, None]
+    vectors = np.linalg.solve(stiffness + shift * mass, mass[:, :, :n_kept])
+    vectors = vectors / np.sqrt((vectors**2).sum(axis=1, keepdims=True))
+    across = np.swapaxes(vectors, -1, -2)
+    return _Step(vectors, across @ (stiffness @ vectors), across @ (mass @ vectors), shift)
 
 
 def _with_followers(matrix: Floats, followed: Floats, n_kept: int) -> Floats:

@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.naming import Place
-from bayesplate.modes.pencils import condensed_eigenvalues, pencil_eigenvalues, pencil_modes
+from bayesplate.modes.pencils import (
+    condensed_eigenvalues,
+    pencil_eigenvalues,
+    pencil_modes,
+    stepped_eigenvalues,
+    stepped_modes,
+)
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 from bayesplate.modes.solve import ClassModes, solve_class
 from bayesplate.modes.threads import in_threads
@@ -29,6 +35,9 @@ _WHOLE = 40
 """Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
 _BEYOND = 10
 """Modes above the wanted ones that are kept from it."""
+_LARGE, _SHARED = 80, 2 / 3
+"""Vectors from which on a step from the modes at the centre pays, and the share of them that is tried before the whole:
+the last ones, which are what the modes have most in common."""
 _BATCH, _SMALL_BATCH = 16, 512
 """Draws whose large or small matrices are held at once: those of a whole posterior would not fit any cache."""
 
@@ -49,8 +58,10 @@ class ReducedBlock:
     shift : float, s^-2
         Keeps the stiffness of rigid motions above zero where several masses ask for a pencil.
     n_kept : int
-        Where it is not 0, the basis is the block's modes at the centre in the order of their frequencies, and all above
-        so many are condensed for each draw (`bayesplate.modes.pencils`).
+        Where it is not 0, the basis is the block's modes at the centre in the order of their frequencies, and the
+        modes of each draw are found from so many of them (`bayesplate.modes.pencils`).
+    is_condensed : bool
+        Whether they take all others along to first order; otherwise they go one step of inverse iteration.
     """
 
     parity: Parity
@@ -59,6 +70,7 @@ class ReducedBlock:
     n_rigid: int = 0
     shift: float = 1.0
     n_kept: int = 0
+    is_condensed: bool = False
 
     def eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
         """Elastic eigenvalues of many draws, increasing: (n_draws, n) array, s^-2.
@@ -74,7 +86,9 @@ class ReducedBlock:
     def _eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
         stiffness = _weighted(weights.stiffness, self.stiffness)
         mass = _weighted(weights.mass, self.masses) if len(self.masses) else None
-        if self.n_kept:
+        if self.n_kept and not self.is_condensed:
+            values = stepped_eigenvalues(stiffness, mass, self.n_kept, self.n_rigid)
+        elif self.n_kept:
             values = condensed_eigenvalues(stiffness, mass, self.n_kept, self.n_rigid)
         elif mass is None:
             values = np.asarray(np.linalg.eigvalsh(stiffness), dtype=np.float64)
@@ -89,10 +103,24 @@ class ReducedBlock:
         The vectors are combinations of the basis, normalised in the draw's mass.
         """
         n_wanted = min(n_modes + self.n_rigid, self.stiffness.shape[-1])
-        values, vectors = pencil_modes(
-            _weighted(weights.stiffness, self.stiffness), self.mass(weights), self.shift, n_wanted
-        )
+        pencil = _weighted(weights.stiffness, self.stiffness), self.mass(weights)
+        if self.n_kept >= n_wanted and not self.is_condensed:
+            values, vectors = stepped_modes(*pencil, self.n_kept, self.n_rigid, n_wanted)
+        else:
+            values, vectors = pencil_modes(*pencil, self.shift, n_wanted)
         return values[:, self.n_rigid :], vectors[:, :, self.n_rigid :]
+
+    def energies(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What each term has of the lowest modes of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays.
+
+        The ratio of their weighted sums is omega^2 to second order around the draw.
+        """
+        vectors = self.modes(weights, n_modes)[1][0]
+        stiffness = np.einsum("ri,trs,si->it", vectors, self.stiffness, vectors, optimize=True)
+        if len(self.masses):
+            return stiffness, np.einsum("ri,trs,si->it", vectors, self.masses, vectors, optimize=True)
+        first = np.eye(weights.mass.shape[1])[:1]
+        return stiffness, (vectors**2).sum(axis=0)[:, None] * first
 
     def mass(self, weights: Weights) -> NDArray[np.float64]:
         """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
@@ -131,6 +159,16 @@ class ReducedOrderModel:
             columns = [i for i, place in enumerate(self.places) if place.parity == block.parity]
             values[:, columns] = block.eigenvalues(weights)[:, [self.places[i].rank for i in columns]]
         return values
+
+    def energies(self, weights: Weights) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What each term has of each wanted mode of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays."""
+        stiffness, mass = (np.empty((len(self.places), part.shape[1])) for part in weights)
+        for block in self.blocks:
+            columns = [i for i, place in enumerate(self.places) if place.parity == block.parity]
+            ranks = [self.places[i].rank for i in columns]
+            own = block.energies(weights, max(ranks) + 1)
+            stiffness[columns], mass[columns] = (part[ranks] for part in own)
+        return stiffness, mass
 
 
 def reduced_order_model(
@@ -238,7 +276,10 @@ def _project(
     weights: Weights,
     is_steady: bool,
 ) -> ReducedBlock:
-    """Orthonormalise in energy, dropping directions that the vectors hardly span, and project the terms."""
+    """Orthonormalise in energy, dropping directions that the vectors hardly span, and project the terms.
+
+    What the vectors have most in common comes last.
+    """
     vectors = np.concatenate([rigid, elastic], axis=1)
     highest = float(centre.eigenvalues[-1])
     norm = block.stiffness(weights) + highest * block.mass(weights)
@@ -257,17 +298,34 @@ def _project(
 
 
 def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Iterator[ReducedBlock]:
-    """The basis with all but its lowest modes at the centre condensed, where it is large; then as it is."""
+    """Ways to find the modes of a draw on a basis: of a large one first from the modes at the centre; then as it is.
+
+    A part of a basis that is orthonormal in the mass would not span what its vectors have in common.
+    """
+    size = whole.stiffness.shape[-1]
+    n_condensed, n_stepped = (whole.n_rigid + n for n in (n_modes + _BEYOND, 2 * n_modes))
+    if size > max(_WHOLE, 2 * n_condensed):
+        yield replace(_on_modes(whole, centre), n_kept=n_condensed, is_condensed=True)
+    if size > _LARGE:
+        last = slice(size - max(round(_SHARED * size), n_condensed), None)
+        parts = [replace(whole, stiffness=whole.stiffness[:, last, last], masses=whole.masses[:, last, last]), whole]
+        for part in parts if len(whole.masses) else [whole]:
+            if part.stiffness.shape[-1] > 2 * n_stepped:
+                yield replace(_on_modes(part, centre), n_kept=n_stepped)
+            elif part is not whole:
+                yield part
+    yield whole
+
+
+def _on_modes(block: ReducedBlock, centre: Weights) -> ReducedBlock:
+    """The same basis turned to its modes at the centre, in the order of their frequencies."""
     from scipy.linalg import eigh
 
-    n_kept = whole.n_rigid + n_modes + _BEYOND
-    if whole.stiffness.shape[-1] > max(_WHOLE, 2 * n_kept):
-        stiffness = np.tensordot(centre.stiffness, whole.stiffness, axes=1)
-        mass = np.tensordot(centre.mass, whole.masses, axes=1) if len(whole.masses) else None
-        modes = eigh(stiffness, mass)[1]
-        turned = [modes.T @ terms @ modes for terms in (whole.stiffness, whole.masses)]
-        yield replace(whole, stiffness=turned[0], masses=turned[1], n_kept=n_kept)
-    yield whole
+    stiffness = np.tensordot(centre.stiffness, block.stiffness, axes=1)
+    mass = np.tensordot(centre.mass, block.masses, axes=1) if len(block.masses) else None
+    modes = eigh(stiffness, mass)[1]
+    turned = [modes.T @ terms @ modes for terms in (block.stiffness, block.masses)]
+    return replace(block, stiffness=turned[0], masses=turned[1])
 
 
 def _is_steady(points: Sequence[Weights]) -> bool:

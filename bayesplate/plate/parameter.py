@@ -69,8 +69,8 @@ class Parameter:
         Where the prior comes from; empty if the card states it.
     words : str
         What people call it; empty where that is its key.
-    is_component : bool
-        Whether it means nothing alone, so that a budget counts it together with its effect's other ones.
+    look : str
+        What it does to the board if it is one of an effect's components, in words; empty for what has a meaning alone.
     """
 
     key: str
@@ -82,7 +82,7 @@ class Parameter:
     replaces: str = ""
     source: str = ""
     words: str = ""
-    is_component: bool = False
+    look: str = ""
 
     @property
     def name(self) -> str:
@@ -93,6 +93,11 @@ class Parameter:
     def is_of_effect(self) -> bool:
         """Whether it is the size of an effect, and not one of the board's own inputs."""
         return bool(self.effect) and not self.replaces
+
+    @property
+    def is_component(self) -> bool:
+        """Whether a budget counts it together with its effect's other ones."""
+        return bool(self.look)
 
     @property
     def nominal(self) -> float:

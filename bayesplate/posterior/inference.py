@@ -18,7 +18,7 @@ from bayesplate.estimates.identifiability import (
     require_identifiable,
     require_labels,
 )
-from bayesplate.estimates.labelling import LIKELY, propose_labels, with_labels
+from bayesplate.estimates.labelling import LIKELY, with_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
@@ -28,6 +28,7 @@ from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.doubts import slip_remarks
+from bayesplate.posterior.first_labels import propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
@@ -138,7 +139,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     proposed = propose_labels(board, prior)
     board = proposed.board
     require_labels(board)
-    estimate = weighted_least_squares(board)
+    estimate = weighted_least_squares(board, start=proposed.rigidities)
     found = identifiability(estimate.sensitivities, estimate.scales)
     require_identifiable(board, found)
     approximation = laplace_approximation(board, estimate, robust, proposed.spread)
@@ -189,7 +190,7 @@ def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noi
     board = replace(problem.board, setups=tuple(setups))
     if board.setups == problem.board.setups or sum(len(setup.readings) for setup in setups) < N_RIGIDITIES:
         return inference
-    estimate = weighted_least_squares(board)
+    estimate = weighted_least_squares(board, start=problem.estimate.rigidities)
     before = problem.posterior
     models = tuple(model.labelled_as(setup) for model, setup in zip(before.models, setups, strict=True))
     posterior = Posterior(board, before.prior, models, before.law, before.robust)

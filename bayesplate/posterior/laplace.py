@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.least_squares import Estimate, log_measured
-from bayesplate.estimates.refit import Predict, design, refit
+from bayesplate.estimates.refit import design, refit
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, are_twins, setup_model, with_exact, with_exact_of, with_others
 from bayesplate.frequencies.peaks import takes_part
+from bayesplate.frequencies.predictor import Predictor
 from bayesplate.modes.reduced import ACCEPTED_CENTS
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
@@ -135,25 +136,21 @@ def noise_widenings(board: Board, estimate: Estimate) -> Floats:
     return np.array([likely(setup.noise.log_sd) for setup in board.setups])
 
 
-def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predict:
-    """ln f (Hz) of the labelled modes as a function of the fitted columns, the noise columns kept as in `centre`."""
-    every = every_predictor(board, models, law, centre)
-    n_every = np.cumsum([0, *(len(model.every_place) for model in models)])[:-1]
-    labelled = np.concatenate([start + np.arange(len(m.places)) for start, m in zip(n_every, models, strict=True)])
-    return lambda x: every(x)[:, labelled]
-
-
-def every_predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predict:
-    """The same of all modes that peaks may be, setup after setup."""
+def every_predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predictor:
+    """ln f (Hz) of all modes that peaks may be as a function of the fitted columns, noise as in `centre`."""
     parameters = Parameters(board)
 
-    def predict(x: Floats) -> Floats:
+    def values(x: Floats) -> Values:
         theta = np.tile(centre, (len(x), 1))
         theta[:, parameters.fitted_columns] = x
-        values = parameters.values(theta)
-        return np.concatenate([model.every_log_frequency(values, law) for model in models], axis=1)
+        return parameters.values(theta)
 
-    return predict
+    return Predictor(values, models, law)
+
+
+def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predictor:
+    """The same of the labelled modes."""
+    return every_predictor(board, models, law, centre).of_labelled()
 
 
 def _covariance(

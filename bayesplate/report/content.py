@@ -5,7 +5,7 @@ from __future__ import annotations
 from bayesplate.cards import PriorCard
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import unit_of_people
+from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
@@ -103,15 +103,24 @@ def ratios_table(summary: Summary) -> Table:
     return Table("Ratios, density, rigidities", ("", "mean ± sd"), tuple(rows))
 
 
-def effects_table(summary: Summary) -> Table | None:
-    """Parameters of the declared effects; None if none is declared."""
+def effects_table(board: Board, summary: Summary) -> Table | None:
+    """Parameters of the declared effects, a component of a field with its look; None if none is declared."""
+    shapes = {(one.effect, one.key): one for one in board.parameters if one.is_component}
     rows = [
-        (f"{effect_name(effect)}, {where}", parameter, *_measured(entry))
+        (*_named(effect, where, parameter, shapes.get((effect, parameter))), *_measured(entry))
         for where, effects in summary.effects.items()
         for effect, parameters in effects.items()
         for parameter, entry in parameters.items()
     ]
     return Table("Declared effects", ("effect", "parameter", "mean ± sd", "unit"), tuple(rows)) if rows else None
+
+
+def _named(effect: str, where: str, parameter: str, shape: Parameter | None) -> tuple[str, str]:
+    """An effect and where it acts, and what its parameter is called."""
+    name = effect_name(effect)
+    if shape is None:
+        return f"{name}, {where}", parameter
+    return f"{name}, {where}: {shape.look}", shape.words.removesuffix(f" of {name}")
 
 
 def _measured(entry: Spread) -> tuple[str, str]:

@@ -103,7 +103,7 @@ def write_report(
         groups = pictures(inference, draws, summary, diagnosis)
         every = [one for found in groups.values() for one in found]
         vector = save_pictures(every, folder / FIGURES, "svg")
-        shown = {place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}
+        shown = {place: [shown_picture(one, vector[one.name]) for one in found] for place, found in groups.items()}
         title = inference.problem.board.title or summary.name
         write_exports(folder, quoted(summary, diagnosis), title)
         if diagnosis is not None:
@@ -186,7 +186,8 @@ def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list
     return found
 
 
-def _shown(picture: Picture, svg: bytes) -> Shown:
+def shown_picture(picture: Picture, svg: bytes) -> Shown:
+    """A picture as a page holds it, from the content of its SVG file."""
     from markupsafe import Markup
 
     width, height = (round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
@@ -208,7 +209,7 @@ def render(
     problem = inference.problem
     board, prior = problem.board, problem.prior
     css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    return _template().render(
+    return template("report.html").render(
         policy=policy(css),
         css=Markup(css),  # our own file; the policy lets in nothing else
         title=board.title or board.name,
@@ -221,7 +222,7 @@ def render(
         pictures=_with_all_places(shown),
         tables={
             "constants": content.constants_table(quoted(summary, diagnosis)),
-            "effects": content.effects_table(summary),
+            "effects": content.effects_table(board, summary),
             "makers": content.makers_table(summary),
             "ratios": content.ratios_table(summary),
             "laws": content.laws_table(summary),
@@ -253,8 +254,8 @@ def policy(css: str) -> str:
     return f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
 
 
-def _template() -> Any:
-    """The template, every value cleaned of what steers the way text runs, then escaped."""
+def template(name: str) -> Any:
+    """A template by its name, every value cleaned of what steers the way text runs, then escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -264,4 +265,4 @@ def _template() -> Any:
     loader = PackageLoader("bayesplate.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=cleaned)
     environment.filters["symbols"] = lambda text: in_page(visible(str(text)))
-    return environment.get_template("report.html")
+    return environment.get_template(name)

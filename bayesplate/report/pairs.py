@@ -31,6 +31,7 @@ _LEFT, _BOTTOM, _TOP, _RIGHT, _GAP = 0.72, 0.72, 0.08, 0.12, 0.07
 _STRONG = 0.5
 _LARGE = 0.75
 _CHARACTERS_AN_INCH = 17
+_BRIEF = {"length along the grain": "length", "length across the grain": "width", " ratio": "", " profile": ""}
 
 
 def pairs_picture(problem: PosedProblem, draws: Draws) -> Picture:
@@ -131,13 +132,14 @@ def _is_modulus(name: str) -> bool:
 
 
 def _broken(name: str, side: float) -> str:
-    """A name in two lines, the unit below, each no longer than the panel."""
+    """A name in two lines, below its unit or the effect that it is of, each no longer than the panel."""
     if _is_modulus(name):
         return in_figure(name).replace(", ", ",\n")
-    first, comma, unit = name.rpartition(", ") if ", " in name else (name, "", "")
-    for words, brief in (("length along the grain", "length"), ("length across the grain", "width"), (" ratio", "")):
-        first = first.replace(words, brief)
-    return f"{short(first, int(_CHARACTERS_AN_INCH * side))}{comma.strip()}\n{unit}"
+    for words, brief in _BRIEF.items():
+        name = name.replace(words, brief)
+    first, comma, below = name.rpartition(", ") if ", " in name else name.partition(" of ")
+    longest = int(_CHARACTERS_AN_INCH * side)
+    return f"{short(first, longest)}{',' if comma else ''}\n{short(below, longest)}"
 
 
 def _limits(values: Floats) -> tuple[float, float]:

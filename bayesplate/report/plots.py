@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.campaigns.diagnosis import CampaignDiagnosis
+from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.sheet import Sheet
@@ -224,3 +226,39 @@ def _factor_and_words(name: str, problem: PosedProblem) -> tuple[float, str]:
 def _methods(plots: object) -> str:
     """The figures that there are."""
     return ", ".join(f".{name}()" for name in dir(plots) if not name.startswith("_") and callable(getattr(plots, name)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CampaignPlots:
+    """The figures of a campaign, and of its diagnosis where there is one."""
+
+    summary: CampaignSummary
+    diagnosis: CampaignDiagnosis | None = None
+
+    def shared(self, name: str | None = None) -> Figure:
+        """A shared number, the first unless named: each board alone, the others, all boards."""
+        from bayesplate.report.campaign_figures import shared_picture
+
+        names = list(self.summary.shared)
+        return shared_picture(self.summary, names[_place("shared number", name, names)]).figure
+
+    def boards(self) -> Figure:
+        """The constants of all boards."""
+        from bayesplate.report.campaign_figures import boards_picture
+
+        return boards_picture(self.summary).figure
+
+    def common(self) -> Figure:
+        """What is left over on all boards alike."""
+        from bayesplate.report.campaign_figures import common_picture
+
+        return common_picture(self.summary.common_residual).figure
+
+    def left_out(self) -> Figure:
+        """How much better the others predict each board that is left out."""
+        from bayesplate.report.campaign_figures import left_out_picture
+
+        if self.diagnosis is None or not self.diagnosis.left_out_boards:
+            wanted, remedy = "a diagnosis that left boards out", "bayesplate.diagnose leaves them out"
+            raise InputError(Fault("left_out", wanted, "a fit, or nothing shared", remedy))
+        return left_out_picture(self.diagnosis).figure

@@ -21,6 +21,8 @@ DIAGNOSIS = "diagnosis.json"
 CHECKPOINT = "checkpoint"
 BEFORE = "before"
 """Subfolder of the fit that a diagnosis questioned, where it was fitted again."""
+BOARDS = "boards"
+"""Subfolder of a campaign, with one folder for each of its boards."""
 PAGE = "report.html"
 FIGURES = "figures"
 CONSTANTS = ("constants.csv", "constants.tex")
@@ -114,7 +116,10 @@ class OutputFolder:
         figures = self.path / FIGURES
         drawn = [path for path in figures.iterdir() if path.suffix in (".png", ".svg")] if figures.is_dir() else []
         before = (self.path / BEFORE / name for name in (SUMMARY, ARCHIVE))
-        return [*(self.path / name for name in RESULTS), *before, *drawn]
+        boards = (
+            path for name in RESULTS for part in (BOARDS, BEFORE) for path in (self.path / part).glob(f"*/{name}")
+        )
+        return [*(self.path / name for name in RESULTS), *before, *boards, *drawn]
 
     @property
     def has_checkpoint(self) -> bool:

@@ -90,7 +90,8 @@ def _priors(prior: PriorCard, board: Board) -> tuple[str, ...]:
         for effect in effects_of(board, setup):
             for parameter in effect.parameters():
                 if parameter.source:
-                    entries.append(f"{parameter.key} ({effect.name}): {_one_line(parameter.source)}")
+                    what = effect.name if parameter.is_component else f"{parameter.key} ({effect.name})"
+                    entries.append(f"{what}: {_one_line(parameter.source)}")
     return tuple(dict.fromkeys(entries))
 
 

@@ -10,7 +10,7 @@ from typing import get_args
 
 import numpy as np
 
-from bayesplate.cards import PriorCard
+from bayesplate.cards import CampaignCard, PriorCard
 from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
@@ -45,6 +45,8 @@ def require_arguments(**given: object) -> None:
 
 def _card(name: str, value: object) -> Iterator[Fault]:
     if isinstance(value, Board) or isinstance(getattr(value, "prepared", None), Prepared):
+        return
+    if isinstance(getattr(value, "card", None), CampaignCard):
         return
     for fault in _path(name, value):
         yield replace(fault, wanted="a name, a path, a Board or a Problem")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
@@ -16,8 +17,9 @@ from bayesplate.report.plots import CheckPlots
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic
 from bayesplate.workflow.arguments import require_arguments
+from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.prepare import Card
-from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.shown import show_check
 
 _N_DRAWS = 4000
@@ -53,18 +55,19 @@ class CheckResult(CheckReport):
         return show_check(self).html(self.title or self.name)
 
 
-def check(card: Problem | Card, *, effects: Sequence[str] | None = None) -> CheckResult:
+def check(card: Problem | Card | Campaign, *, effects: Sequence[str] | None = None) -> CheckResult | CampaignCheck:
     """Say what would be fitted, and what it can identify; nothing is sampled or written.
 
     Parameters
     ----------
-    card : Problem, str, path or Board
-        A problem, the name of a shipped board card, the path of a card, or a board made in Python.
+    card : Problem, str, path, Board or Campaign
+        A problem, the name of a shipped board or campaign card, the path of a card, or a board made in Python.
     effects : sequence of str, optional
 
     Returns
     -------
-    CheckResult
+    CheckResult or CampaignCheck
+        The latter of a campaign.
 
     Raises
     ------
@@ -72,7 +75,16 @@ def check(card: Problem | Card, *, effects: Sequence[str] | None = None) -> Chec
         As `fit` would.
     """
     require_arguments(card=card, effects=effects)
-    given = as_problem(card, effects=effects)
+    given = problem_or_campaign(card, effects=effects)
+    if isinstance(given, Campaign):
+        from bayesplate.workflow.campaign_check import check_campaign  # which checks boards in turn
+
+        return check_campaign(given)
+    return check_board(given)
+
+
+def check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
+    """Check one board; without candidates, what effects that are not declared would do is not computed."""
     problem = given.posed
     board = problem.board
     estimate, found = problem.estimate, problem.identifiability
@@ -110,7 +122,7 @@ def check(card: Problem | Card, *, effects: Sequence[str] | None = None) -> Chec
             for i, (setup, reading) in enumerate(rows)
         ),
         in_sample_rms_cents=float(np.sqrt(np.mean(residuals**2))),
-        signatures=tuple(_effects(signatures(problem))),
+        signatures=tuple(_effects(signatures(problem))) if candidates else (),
         invisible=INVISIBLE,
         identifiability=tuple(remarks(board, found)),
         notes=(*problem.doubts, *board.notes),

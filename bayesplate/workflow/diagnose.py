@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +34,15 @@ from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder,
 from bayesplate.results.store import attributes_of, posterior_archive
 from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments
+from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.workflow.fitting import Fitted, fitted, opened, with_board
 from bayesplate.workflow.prepare import Card
-from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.stages import Stages
+
+if TYPE_CHECKING:
+    from bayesplate.workflow.campaign_diagnose import CampaignDiagnoseResult
 
 _NULL_LINE = 7
 _MOST_ASKED = 4
@@ -95,7 +99,7 @@ class DiagnoseResult:
 
 @run_of_its_own()
 def diagnose(
-    card: Problem | Card,
+    card: Problem | Card | Campaign,
     *,
     out: str | os.PathLike[str] | None = None,
     report: bool = True,
@@ -105,13 +109,15 @@ def diagnose(
     resume: bool = False,
     n_null: int = N_SETS,
     progress: Callable[[Progress], None] | None = None,
-) -> DiagnoseResult:
+) -> DiagnoseResult | CampaignDiagnoseResult:
     """Trace the residual of a fit to an effect that the model lacks, add it, and report the error before and after.
 
     Parameters
     ----------
-    card : Problem, str, path or Board
-        A problem, the name of a shipped board card, the path of a card, or a board made in Python.
+    card : Problem, str, path, Board or Campaign
+        A problem, the name of a shipped board or campaign card, the path of a card, or a board made in Python. Of a
+        campaign what its card names as shared is judged by boards that were left out; if it names nothing, effects that
+        the boards may have alike are searched for.
     out : path, optional
         Output folder, for diagnosis.json and what `fit` writes; nothing is written without it.
     report : bool
@@ -129,7 +135,8 @@ def diagnose(
 
     Returns
     -------
-    DiagnoseResult
+    DiagnoseResult or CampaignDiagnoseResult
+        The latter of a campaign.
 
     Raises
     ------
@@ -140,7 +147,13 @@ def diagnose(
         card=card, out=out, report=report, seed=seed, effects=effects, force=force, resume=resume, n_null=n_null,
         progress=progress,
     )  # fmt: skip
-    problem = as_problem(card, effects=effects)
+    problem = problem_or_campaign(card, effects=effects)
+    if isinstance(problem, Campaign):
+        from bayesplate.workflow.campaign_diagnose import diagnose_campaign
+
+        return diagnose_campaign(
+            problem, out=out, report=report, seed=seed, force=force, resume=resume, progress=progress
+        )
     if problem.robust:
         wanted = "a problem with normal noise, which the search for an effect assumes"
         raise InputError(Fault("robust", wanted, "Student's distribution"))

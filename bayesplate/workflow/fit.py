@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.errors import NotConvergedError
@@ -23,10 +23,14 @@ from bayesplate.results.summarise import unconverged_summary
 from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
+from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fitting import Fitted, fitted, opened
 from bayesplate.workflow.prepare import Card
-from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.shown import show_fit
+
+if TYPE_CHECKING:
+    from bayesplate.workflow.campaign_result import CampaignFitResult
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,7 +81,7 @@ class FitResult:
 
 @run_of_its_own()
 def fit(
-    card: Problem | Card,
+    card: Problem | Card | Campaign,
     *,
     out: str | os.PathLike[str] | None = None,
     report: bool = True,
@@ -88,15 +92,16 @@ def fit(
     force: bool = False,
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
-) -> FitResult:
-    """Fit the elastic constants of a board.
+) -> FitResult | CampaignFitResult:
+    """Fit the elastic constants of a board, or of all boards of a campaign and what they share.
 
     Parameters
     ----------
-    card : Problem, str, path or Board
-        A problem, the name of a shipped board card, the path of a card, or a board made in Python.
+    card : Problem, str, path, Board or Campaign
+        A problem, the name of a shipped board or campaign card, the path of a card, or a board made in Python.
     out : path, optional
         Output folder, for summary.json, posterior.nc, the report and the checkpoints; nothing is written without it.
+        Of a campaign it has a folder boards/NAME for each board.
     report : bool
         Whether to write report.html, its figures and tables beside the numbers.
     seed : int
@@ -114,7 +119,8 @@ def fit(
 
     Returns
     -------
-    FitResult
+    FitResult or CampaignFitResult
+        The latter of a campaign.
 
     Raises
     ------
@@ -132,7 +138,11 @@ def fit(
         card=card, out=out, report=report, seed=seed, effects=effects, law=law, robust=robust,
         force=force, resume=resume, progress=progress,
     )  # fmt: skip
-    problem = as_problem(card, effects=effects, law=law, robust=robust)
+    problem = problem_or_campaign(card, effects=effects, law=law, robust=robust)
+    if isinstance(problem, Campaign):
+        from bayesplate.workflow.campaign_fit import fit_campaign  # which writes boards as this file does
+
+        return fit_campaign(problem, out=out, report=report, seed=seed, force=force, resume=resume, progress=progress)
     run = opened(problem, seed, out, force=force, resume=resume)
     if run.folder is not None and report:
         from bayesplate.report.page import load_libraries

@@ -13,6 +13,7 @@ from bayesplate.cards import (
     BoardCard,
     NamedCards,
     PriorCard,
+    is_campaign,
     load_board,
     load_named,
     load_prior,
@@ -76,9 +77,9 @@ def default_folder(card: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If there is no shipped card of that name.
+        If there is no shipped board or campaign of that name.
     """
-    return Path("results") / find("boards", card).stem
+    return Path("results") / find("campaigns" if is_campaign(card) else "boards", card).stem
 
 
 def prepare(

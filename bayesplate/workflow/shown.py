@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from bayesplate.campaigns.checking import CampaignCheck
+from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
+from bayesplate.campaigns.summary import CampaignSummary
+from bayesplate.campaigns.tables import campaign_check_tables, campaign_tables, diagnosis_tables
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
@@ -55,14 +59,25 @@ class Shown:
         return html(heading, (*self.remarks, *self.warnings, self.closing), self.tables)
 
 
-def show_check(report: CheckReport) -> Shown:
+def show_check(report: CheckReport | CampaignCheck) -> Shown:
     """The report of `bayesplate.workflow.check.check` for a person."""
+    if isinstance(report, CampaignCheck):
+        return _show_campaign_check(report)
     closing = f"{report.law} law; nothing was sampled. Next: bayesplate fit, with the same card"
     return Shown(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
 
 
-def show_fit(summary: Summary) -> Shown:
+def _show_campaign_check(report: CampaignCheck) -> Shown:
+    """The report of `bayesplate.workflow.check.check` on a campaign for a person."""
+    notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
+    closing = "nothing was sampled. bayesplate check tells more of each board. Next: bayesplate fit, with the same card"
+    return Shown(campaign_check_tables(report), (), notes, closing)
+
+
+def show_fit(summary: Summary | CampaignSummary) -> Shown:
     """The summary of `bayesplate.workflow.fit.fit` for a person."""
+    if isinstance(summary, CampaignSummary):
+        return _show_campaign_fit(summary)
     peaks = peaks_table(summary)
     tables = (constants_table(summary), modes_table(summary), *([peaks] if peaks else []))
     error, model = summary.error, summary.model
@@ -74,6 +89,14 @@ def show_fit(summary: Summary) -> Shown:
         + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )
     return Shown(tables, summary.identifiability, summary.warnings, closing)
+
+
+def _show_campaign_fit(summary: CampaignSummary) -> Shown:
+    told = tuple(f"{name}: {note}" for name, one in summary.boards.items() for note in one.warnings)
+    errors = [one.error.in_sample_rms_cents for one in summary.boards.values()]
+    pooled = (sum(error**2 for error in errors) / len(errors)) ** 0.5
+    closing = f"{len(errors)} boards; error rms {pooled:.1f} cents in sample, each board counted once."
+    return Shown(campaign_tables(summary), (), (*summary.warnings, *told), closing)
 
 
 def show_compare(comparison: Comparison) -> Shown:
@@ -89,8 +112,11 @@ def show_compare(comparison: Comparison) -> Shown:
     return Shown(tuple(tables), (*remarks, METHODS_REMARK), (), comparison.verdict.sentence)
 
 
-def show_diagnosis(diagnosis: Diagnosis) -> Shown:
+def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
     """The result of `bayesplate.workflow.diagnose.diagnose` for a person."""
+    if isinstance(diagnosis, CampaignDiagnosis):
+        told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
+        return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
     told = (known_sentence(diagnosis.known), *diagnosis.sentences, alike_sentence(diagnosis), diagnosis.recommendation)
     remarks = tuple(sentence for sentence in told if sentence)
     return Shown(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))

@@ -15,7 +15,8 @@ import bayesplate
 
 PACKAGE = Path(bayesplate.__file__).parent
 ROAD = (
-    "cards", "plate", "modes", "effects", "frequencies", "estimates", "posterior", "results", "diagnosis", "planning",
+    "cards", "plate", "modes", "effects", "frequencies", "estimates", "posterior", "results", "diagnosis", "campaigns",
+    "planning",
     "recordings", "report", "workflow",
 )  # fmt: skip
 """In the order in which a card passes through them; what is not there yet gets no page."""
@@ -33,6 +34,7 @@ SENTENCES = {
     "posterior": "Likelihood, sampling and the convergence gate.",
     "results": "Summaries, tables, the archive of draws, references.",
     "diagnosis": "Which effect a residual speaks of.",
+    "campaigns": "What several boards share.",
     "planning": "What to measure next.",
     "recordings": "Recordings to frequencies.",
     "report": "Figures and the page of a report.",

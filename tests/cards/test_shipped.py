@@ -12,6 +12,7 @@ import pytest
 from bayesplate.cards import (
     card_names,
     load_board,
+    load_campaign,
     load_coefficients,
     load_prior,
     physical_faults,
@@ -152,7 +153,7 @@ def readme_examples() -> list[str]:
 
 
 def test_the_examples_of_the_readme_are_cards(tmp_path: Path) -> None:
-    board, profile, sections, setups, prior, table = readme_examples()
+    board, profile, sections, setups, prior, table, campaign = readme_examples()
 
     card = read_board_text(board, "my-board")
     assert physical_faults(card) == []
@@ -166,6 +167,8 @@ def test_the_examples_of_the_readme_are_cards(tmp_path: Path) -> None:
     assert load_prior(tmp_path / "my-prior.toml").noise_percent is not None
     (tmp_path / "my-table.toml").write_text(table, encoding="utf-8")
     assert len(load_coefficients(tmp_path / "my-table.toml").table) == 3
+    (tmp_path / "my-campaign.toml").write_text(campaign, encoding="utf-8")
+    assert load_campaign(tmp_path / "my-campaign.toml").boards == ("spruce-free-2L", "./my-board.toml")
 
 
 def test_reading_cards_imports_no_heavy_library() -> None:

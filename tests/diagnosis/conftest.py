@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -26,15 +26,21 @@ class Grounded:
     ground: Ground
 
 
-def grounded(name: str) -> Grounded:
+def grounded(name: str, tried: Sequence[str] | None = None) -> Grounded:
     problem = Problem.from_card(name).posed
-    return Grounded(problem, prepare_search(baseline_of(problem)))
+    return Grounded(problem, prepare_search(baseline_of(problem), tried=tried))
 
 
 @pytest.fixture(scope="session")
 def finnish() -> Grounded:
     """The paper's cantilever board: rounded readings, exact inputs, one candidate pair."""
     return grounded("finnish-spruce-cantilever")
+
+
+@pytest.fixture(scope="session")
+def finnish_few() -> Grounded:
+    """The same board with three candidates only, for rules that look at these: a fifth of the work."""
+    return grounded("finnish-spruce-cantilever", ("transverse_shear", "clamp_rotation", "poisson_ratio"))
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ from bayesplate.plate.board import Board
 from bayesplate.workflow.prepare import prepare
 
 Parameters = Mapping[str, Any]
-SIZES = {1: 0.5, 2: 1.0, 3: 2.0}
+SIZES = {1: 0.5, 3: 2.0}
 """Multiple of the design's nominal size by seed."""
 LIGHT = 0.001
 """Share of the board that roves at nominal size: the mean over its places is right to first order, see AttachedMass."""
@@ -263,7 +263,7 @@ PAIRS = [(name, design) for name, case in CASES.items() for design in case.desig
 
 @pytest.mark.parametrize(("name", "design"), PAIRS, ids=[f"{name}, {design}" for name, design in PAIRS])
 def test_the_generators_frequencies_within_a_cent(name, design, tmp_path):
-    """Random boards with half, the whole and twice the nominal effect."""
+    """Random boards with half the nominal effect and twice it: an error grows with the effect, or is there without."""
     case = CASES[name]
     for seed in SIZES:
         board = planted(case, design, seed)

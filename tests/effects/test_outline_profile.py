@@ -154,6 +154,15 @@ def test_no_step_leaves_the_edge_weighing_less_than_nothing():
     assert 1.0 < np.abs(cents).max() < 20.0
 
 
+def test_two_components_at_their_ends_leave_a_plate():
+    """Their strips lie one in the other: where both narrow the board they must not weigh less than nothing."""
+    effect = outline(FREE, *CUT, components=(STEP, scaled(STEP, 0.8)))
+    parts = [f"outline_profile.field_{k}" for k in (1, 2)]
+    away = [hertz(FREE, [effect], dict.fromkeys(parts, at), 6) for at in (-2.94, 2.94)]
+    cents = 1200 * np.log2(np.array(away) / hertz(FREE, [outline(FREE, *CUT)], {}, 6))
+    assert 1.0 < np.abs(cents).max() < 40.0
+
+
 def scaled(surface, factor):
     return replace(surface, coefficients=tuple(factor * one for one in surface.coefficients))
 

@@ -197,16 +197,20 @@ def test_reduced_order_model_is_exact(card):
     assert worst_cents(posed(card, ["thickness_profile"]).posterior.models) < 0.5
 
 
-@pytest.mark.parametrize("z", [-2.9, 2.9])
-def test_the_exact_law_knows_the_mean_thickness_that_the_field_goes_with(z):
-    """A field that goes with its mean alone, and three times as much as the readings say."""
+@pytest.fixture(scope="module")
+def with_its_mean():
+    """A board whose field goes with its mean alone, and three times as much as the readings say."""
     prepared = prepare("spruce-free-2R", ["thickness_profile"])
     effect = ThicknessProfile.of(prepared.board, prepared.board.setups[0])
     profile = replace(effect.profile, components=(), with_mean=times(effect.profile.with_mean, 3.0))
     parameters = tuple(one for one in prepared.board.parameters if not one.is_of_effect)
-    problem = pose(
-        replace(prepared.board, parameters=parameters, chosen=(replace(effect, profile=profile),)), prepared.prior
-    )
+    board = replace(prepared.board, parameters=parameters, chosen=(replace(effect, profile=profile),))
+    return pose(board, prepared.prior)
+
+
+@pytest.mark.parametrize("z", [-2.9, 2.9])
+def test_the_exact_law_knows_the_mean_thickness_that_the_field_goes_with(with_its_mean, z):
+    problem = with_its_mean
     parameters, (model,) = problem.parameters, problem.posterior.models
     theta = problem.centre.copy()
     theta[parameters.first_input + parameters.inputs.index("thickness")] = z

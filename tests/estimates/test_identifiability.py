@@ -11,7 +11,7 @@ from made_boards import CANTILEVER_LABELS, board_of, peaks_of, setup_of
 
 from bayesplate.cards import load_prior
 from bayesplate.errors import NotIdentifiableError
-from bayesplate.estimates.identifiability import identifiability, remarks, require_labels
+from bayesplate.estimates.identifiability import identifiability, remarks, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.posterior.inference import pose
 from bayesplate.workflow.prepare import prepare
@@ -59,6 +59,17 @@ def test_three_modes_that_leave_a_constant_open_name_it_and_what_would_help(hert
     assert "D_x (so" not in message
     assert "condition number" in message
     posed(cantilever(hertz, (0, 0), (0, 1), (1, 1), (0, 2)))  # as advised: accepted
+
+
+def test_of_several_setups_each_is_named_with_its_modes(hertz):
+    """Two sessions with the same labels: else each label would stand there twice."""
+    board = cantilever(hertz, (0, 0), (0, 1), (1, 1))
+    (setup,) = board.setups
+    unseen = identifiability(np.array([[0.5, 0.0, 0.0], [0.25, 0.0, 0.25], [0.1, 0.0, 0.4]] * 2), np.full(6, 0.01))
+    with pytest.raises(NotIdentifiableError) as caught:
+        require_identifiable(replace(board, setups=(setup, replace(setup, name="again"))), unseen)
+    labels = ", ".join(str(label) for label in setup.labels)
+    assert f"the modes {labels} of {setup.name} and {labels} of again determine D_x" in str(caught.value)
 
 
 def test_three_modes_that_suffice_leave_nothing_to_check_with(hertz):

@@ -90,6 +90,19 @@ def test_the_weight_of_a_way_holds_the_prior_at_its_estimate_and_what_is_unusual
     assert UNUSUAL < 0.05
 
 
+def test_modes_of_orders_that_no_card_may_state_have_no_label(found, monkeypatch):
+    """A board with a peak so high was refused for a label that the search had given it itself."""
+    _, ways = found
+    estimate = weighted_least_squares(ways[0].board)
+    monkeypatch.setattr(proposed, "HIGHEST_INDEX", 99)
+    bold = [label for _, label in proposed._modes_at(ways[0].board, estimate, 2200.0)]
+    monkeypatch.undo()
+    labels = [label for _, label in proposed._modes_at(ways[0].board, estimate, 2200.0)]
+
+    assert (12, 0) in bold
+    assert labels == [None if label is None or max(label) > 11 else label for label in bold]
+
+
 def test_three_peaks_and_boards_with_a_label_are_left_alone():
     prior, rng = load_prior("spruce"), np.random.default_rng(1)
     labelled = made_boards.setup_of(ritz.ALL_FREE, {(1, 1): 35.0, (2, 0): 50.0})

@@ -1,4 +1,4 @@
-"""Small pencils: against scipy one by one, what condensation leaves out, bounds, homogeneity, no material."""
+"""Small pencils: against scipy one by one, what condensation and a step leave out, bounds, homogeneity, no material."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from bayesplate.modes.pencils import condensed_eigenvalues, pencil_eigenvalues
+from bayesplate.modes.pencils import condensed_eigenvalues, pencil_eigenvalues, stepped_eigenvalues, stepped_modes
 
 N_DRAWS, R, N_KEPT, N_WANTED, N_RIGID = 5, 40, 14, 8, 2
 EIGENVALUES = np.concatenate([np.zeros(N_RIGID), np.arange(1.0, R - N_RIGID + 1.0) ** 2])
@@ -27,11 +27,14 @@ def exact(stiffness, mass):
     return np.stack([eigh(k, m, eigvals_only=True) for k, m in zip(stiffness, masses, strict=True)])
 
 
-def errors(size, with_mass=True, seed=0):
-    """Relative errors of the wanted eigenvalues, condensed."""
+CHEAP = {"condensed": condensed_eigenvalues, "stepped": stepped_eigenvalues}
+
+
+def errors(size, with_mass=True, seed=0, *, way="condensed"):
+    """Relative errors of the wanted eigenvalues."""
     stiffness, mass = coupled(size, seed, with_mass)
     wanted = slice(N_RIGID, N_RIGID + N_WANTED)
-    found = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)[:, wanted]
+    found = CHEAP[way](stiffness, mass, N_KEPT, N_RIGID)[:, wanted]
     return found / exact(stiffness, mass)[:, wanted] - 1.0
 
 
@@ -40,10 +43,11 @@ def test_all_eigenvalues_are_those_of_scipy():
     np.testing.assert_allclose(pencil_eigenvalues(*pencils, 1.0), exact(*pencils), rtol=1e-10, atol=1e-9)
 
 
+@pytest.mark.parametrize("way", CHEAP)
 @pytest.mark.parametrize("with_mass", [True, False])
-def test_condensed_eigenvalues_are_exact_at_the_centre_and_never_below(with_mass):
-    assert np.abs(errors(0.0, with_mass)).max() < 1e-12
-    assert errors(0.2, with_mass).min() > -1e-10
+def test_eigenvalues_of_few_vectors_are_exact_at_the_centre_and_never_below(with_mass, way):
+    assert np.abs(errors(0.0, with_mass, way=way)).max() < 1e-12
+    assert errors(0.2, with_mass, way=way).min() > -1e-10
 
 
 @pytest.mark.parametrize("with_mass", [True, False])
@@ -65,17 +69,51 @@ def test_condensation_errs_by_the_fourth_power_of_the_distance(with_mass):
 
 
 @pytest.mark.parametrize("with_mass", [True, False])
-def test_condensed_eigenvalues_are_homogeneous_in_the_stiffness(with_mass):
-    stiffness, mass = coupled(0.2, 1, with_mass)
-    once = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)[:, N_RIGID:]
-    np.testing.assert_allclose(condensed_eigenvalues(2.7 * stiffness, mass, N_KEPT, N_RIGID)[:, N_RIGID:], 2.7 * once)
+def test_a_step_takes_off_what_the_centre_cuts_by_the_ratio_of_wanted_to_cut_modes(with_mass):
+    """Each mode errs by no more than (omega_i / omega_cut)^4 of what it did on the centre's modes, far from it too.
+
+    One step turns a subspace towards a mode by the ratio of eigenvalues, and what a mode errs by goes with the square;
+    a factor of three is for the wanted modes of the draws being others than those at the centre. Without the step the
+    ratio is one.
+    """
+    stiffness, mass = coupled(0.6, 0, with_mass)
+    wanted, kept = slice(N_RIGID, N_RIGID + N_WANTED), slice(N_KEPT)
+    cut = exact(stiffness[:, kept, kept], None if mass is None else mass[:, kept, kept])[:, wanted]
+    true = exact(stiffness, mass)[:, wanted]
+    left = (errors(0.6, with_mass, way="stepped") / (cut / true - 1.0)).max(axis=0)
+
+    bound = 3.0 * (EIGENVALUES[wanted] / EIGENVALUES[N_KEPT]) ** 2
+    assert np.all(left < bound)
+    assert np.all(bound < 1.0)
 
 
 @pytest.mark.parametrize("with_mass", [True, False])
-def test_no_material_is_no_number_and_the_other_draws_stay(with_mass):
+def test_stepped_modes_have_the_stepped_eigenvalues(with_mass):
+    stiffness, mass = coupled(0.2, 1, with_mass)
+    n = N_RIGID + N_WANTED
+    values, vectors = stepped_modes(stiffness, mass, N_KEPT, N_RIGID, n)
+    across = np.swapaxes(vectors, 1, 2)
+
+    np.testing.assert_allclose(values, stepped_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)[:, :n], atol=1e-9)
+    of_mass = vectors if mass is None else mass @ vectors
+    np.testing.assert_allclose(across @ of_mass, np.broadcast_to(np.eye(n), (N_DRAWS, n, n)), atol=1e-9)
+    np.testing.assert_allclose(np.diagonal(across @ stiffness @ vectors, axis1=1, axis2=2), values, atol=1e-8)
+
+
+@pytest.mark.parametrize("way", CHEAP)
+@pytest.mark.parametrize("with_mass", [True, False])
+def test_eigenvalues_of_few_vectors_are_homogeneous_in_the_stiffness(with_mass, way):
+    stiffness, mass = coupled(0.2, 1, with_mass)
+    once, scaled = (CHEAP[way](factor * stiffness, mass, N_KEPT, N_RIGID)[:, N_RIGID:] for factor in (1.0, 2.7))
+    np.testing.assert_allclose(scaled, 2.7 * once)
+
+
+@pytest.mark.parametrize("way", CHEAP)
+@pytest.mark.parametrize("with_mass", [True, False])
+def test_no_material_is_no_number_and_the_other_draws_stay(with_mass, way):
     stiffness, mass = coupled(0.1, 2, with_mass)
-    expected = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)
+    expected = CHEAP[way](stiffness, mass, N_KEPT, N_RIGID)
     stiffness[1] *= -1.0
-    found = condensed_eigenvalues(stiffness, mass, N_KEPT, N_RIGID)
+    found = CHEAP[way](stiffness, mass, N_KEPT, N_RIGID)
     assert np.isnan(found[1]).all()
     np.testing.assert_allclose(found[[0, 2, 3, 4]], expected[[0, 2, 3, 4]], rtol=1e-12, atol=1e-9)

@@ -9,8 +9,8 @@ import pytest
 
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import refit
-from bayesplate.frequencies.laws import cents, log_frequency
-from bayesplate.modes.solve import solve_class
+from bayesplate.frequencies.full import full_log_frequencies
+from bayesplate.frequencies.laws import cents
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import linearisation_errors, noise_widenings, predictor, worst_cents
@@ -33,23 +33,13 @@ def draws(problem, n, seed=5):
     return np.random.default_rng(seed).multivariate_normal(problem.centre, problem.covariance, n)
 
 
-def full_solve(model, values):
-    """ln f of every labelled mode at one point, by an eigen-solve of the whole plate."""
-    weights = model.system.weights(values).at(0)
-    found = [
-        solve_class(model.plate.block(place.parity), weights, place.rank + 1).eigenvalues[place.rank]
-        for place in model.places
-    ]
-    return log_frequency(np.array(found))
-
-
 def test_the_exact_law_errs_no_more_than_it_says_where_nobody_looked(problem):
     """The claim is the largest error of at least two points over the box; these are other points, inside it."""
     theta = draws(problem, N_FRESH)
     values = {n: np.broadcast_to(v, N_FRESH) for n, v in problem.parameters.values(theta).items()}
     worst, of_linear = 0.0, 0.0
     for model in problem.posterior.models:
-        solved = np.stack([full_solve(model, {n: v[i] for n, v in values.items()}) for i in range(N_FRESH)])
+        solved = np.stack([full_log_frequencies(model, {n: v[i] for n, v in values.items()}) for i in range(N_FRESH)])
         worst = max(worst, np.abs(cents(model.log_frequencies(values, "exact") - solved)).max())
         of_linear = max(of_linear, np.abs(cents(model.log_frequencies(values, "linear") - solved)).max())
     claimed = worst_cents(problem.posterior.models)

@@ -53,13 +53,39 @@ def test_they_are_solved_once_and_keep_their_own_order(solved):
 
 
 def test_sessions_that_hold_it_otherwise_are_solved_each(solved):
-    """A clamp that covers more has the same matrices, with other weights; one that gives way has a size of its own."""
+    """A clamp that covers more has the same matrices with other weights; one that may be softer leaves the region."""
     monday, tuesday, _ = SESSIONS
     covered = board_of(ritz.FINNISH, [monday, replace(tuesday, clamped={"x0": Quantity.exact(0.004)})])
     pose(covered, load_prior("spruce"))
     assert set(solved) == {"monday", "tuesday"}
 
     solved.clear()
-    soft = replace(board_of(ritz.FINNISH, [monday, tuesday]), effects=("clamp_rotation",))
-    pose(declare(soft), load_prior("spruce"))
+    soft = declare(replace(board_of(ritz.FINNISH, [monday, tuesday]), effects=("clamp_rotation",)))
+    own = next(one for one in soft.parameters if one.owner.name == "tuesday" and one.is_of_effect)
+    pose(soft.with_parameters([replace(own, prior=replace(own.prior, sd=3.0 * own.prior.sd))]), load_prior("spruce"))
     assert set(solved) == {"monday", "tuesday"}
+
+
+def test_sessions_with_a_size_of_their_own_each_are_solved_once(solved):
+    """The law of one with the sizes of the other: each answers to its own alone."""
+    monday, tuesday, _ = SESSIONS
+    soft = declare(replace(board_of(ritz.FINNISH, [monday, tuesday]), effects=("clamp_rotation",)))
+    problem = pose(soft, load_prior("spruce"))
+
+    assert set(solved) == {"monday"}
+    sizes = [one.name for one in problem.parameters.uncertain if one.is_of_effect]
+    values = problem.parameters.values(problem.centre[None, :])
+    first, second = problem.posterior.models
+    for own, model in zip(sizes, (first, second), strict=True):
+        changed = {**values, own: values[own] + 1e-3}
+        log = model.every_log_frequency(values, "exact")[0]
+        assert np.all(model.every_log_frequency(changed, "exact")[0] < log)
+        other = second if model is first else first
+        np.testing.assert_array_equal(
+            other.every_log_frequency(changed, "exact"), other.every_log_frequency(values, "exact")
+        )
+    both = {**values, sizes[0]: values[sizes[0]] + 1e-3, sizes[1]: values[sizes[0]] + 1e-3}
+    order = [first.every_beams.index(beams) for beams in second.every_beams]
+    np.testing.assert_allclose(
+        second.every_log_frequency(both, "exact")[0], first.every_log_frequency(both, "exact")[0][order], rtol=1e-12
+    )

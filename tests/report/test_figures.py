@@ -12,6 +12,7 @@ from payloads import PAYLOADS
 
 from bayesplate.report.health import health_picture
 from bayesplate.report.page import pictures
+from bayesplate.report.pairs import _broken
 from bayesplate.report.percentiles import percentiles_figure
 from bayesplate.report.priors import Compared, compared
 from bayesplate.report.residuals import predictive_picture
@@ -195,15 +196,21 @@ def test_colours_differ_in_grey():
     assert luminance(VERMILLION) < luminance(ORANGE)
 
 
-@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
-def test_any_title_can_be_drawn(clamped, payload):
-    """No mathematics, no warning for a sign that the font lacks: a warning is an error here."""
+@pytest.fixture(scope="module")
+def percentile(clamped):
     from bayesplate.estimates.paper import paper_system
     from bayesplate.estimates.percentile import percentile_estimate
 
     problem = clamped.inference.problem
-    system = paper_system(problem.board, problem.estimate, compared=False)
-    figure = percentiles_figure(payload, percentile_estimate(system), 6, clamped.draws.moduli)
+    return percentile_estimate(paper_system(problem.board, problem.estimate, compared=False))
+
+
+@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
+def test_any_title_can_be_drawn(clamped, percentile, payload):
+    """No mathematics, no warning for a sign that the font lacks: a warning is an error here."""
+    figure = percentiles_figure(payload, percentile, 6, clamped.draws.moduli)
+    for axes in figure.axes:
+        axes.set_visible(False)  # what is drawn is the title
     figure.draw_without_rendering()
 
     assert figure.get_suptitle() == drawable(payload)
@@ -230,3 +237,10 @@ def test_what_the_readings_made_of_each_prior(clamped):
     mean = clamped.summary.elastic.E_x.mean / 1e9
     assert found["E_x"].posterior_mean == pytest.approx(np.log(mean), rel=1e-3)
     assert found["noise"].prior_mean == pytest.approx(np.log(0.8))
+
+
+def test_the_corner_plot_names_a_quantity_in_two_lines():
+    assert _broken("thickness, mm", 0.75) == "thickness,\nmm"
+    assert _broken("shape 2 of thickness profile", 0.75) == "shape 2,\nthickness"
+    assert _broken("Poisson ratio nu_xy", 1.5) == "Poisson nu_xy\n"
+    assert _broken("compliance of clamp rotation", 0.75) == "compliance,\nclamp rotat…"

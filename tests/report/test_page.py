@@ -15,6 +15,7 @@ import runs
 from diagnoses import DIAGNOSES, NEXT, candidate, spread
 from payloads import DIRECTION_MARKS, PAYLOADS, shown
 
+from bayesplate.report.page import _of_diagnosis
 from bayesplate.report.style import visible
 from bayesplate.report.symbols import in_figure, in_page
 
@@ -279,14 +280,30 @@ def test_a_page_says_which_member_of_a_group_the_rest_is_of(clamped):
     assert "What to measure next" not in Read(clamped.page("A board", diagnosis=silent)).text
 
 
+@pytest.fixture
+def without_own_figures(monkeypatch):
+    """Reports whose only figures are those of their diagnosis: drawing the fit's takes most of the time."""
+    places = dict.fromkeys(("constants", "board", "modes", "errors", "folded"), ())
+    monkeypatch.setattr(
+        "bayesplate.report.page.pictures",
+        lambda inference, draws, summary, diagnosis: {
+            **places,
+            **dict(zip(("diagnosis_first", "diagnosis_more"), _of_diagnosis(diagnosis), strict=True)),
+        },
+    )
+
+
+@pytest.mark.usefixtures("without_own_figures")
 def test_the_exported_constants_are_those_to_quote(clamped, tmp_path):
     clamped.write(tmp_path / "group", DIAGNOSES["indistinguishable group"])
     rows = (tmp_path / "group" / "constants.csv").read_text(encoding="utf-8").splitlines()
     assert [float(row.split(",")[2]) for row in rows[1:]] == pytest.approx([10.25, 1.0, 0.5, 30.0, 2.5, 5.0])
 
 
-def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path):
+def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path, request):
+    """The fit's own figures are drawn once, for the first of them."""
     named = Read(clamped.write(tmp_path / "named", DIAGNOSES["named"]).read_text(encoding="utf-8"))
+    request.getfixturevalue("without_own_figures")
     clamped.write(tmp_path / "none", DIAGNOSES["none needed"])
     clamped.write(tmp_path / "hidden", DIAGNOSES["undetectable"])
     added = {name: {path.stem for path in (tmp_path / name / "figures").iterdir()} - set(FIGURES)

@@ -11,6 +11,7 @@ from made_summaries import SUMMARY, mode, spread
 from bayesplate.report import content
 from bayesplate.results.tables import constants_table, modes_table, peaks_table, rounding_that_decides
 from bayesplate.results.words import decimals, interval, number, percent, plus_minus, rounded, two_digits
+from bayesplate.workflow.prepare import prepare
 from bayesplate.workflow.shown import show_fit
 
 
@@ -111,7 +112,12 @@ def test_what_a_page_says():
         ("E_y, across the grain", "1.00 ± 0.12", "0.75 to 1.25", "–", "1.12", "–"),
         ("G_xy, shear", "0.500 ± 0.062", "0.375 to 0.625", "0.500", "0.500", "0.500"),
     )
-    assert content.effects_table(SUMMARY).rows == (("attached mass, bench", "mass", "2.00 ± 0.50", "g"),)
+    board = prepare("spruce-free-2L").board
+    assert content.effects_table(board, SUMMARY).rows == (("attached mass, bench", "mass", "2.00 ± 0.50", "g"),)
+    of_field = replace(SUMMARY, effects={"board": {"thickness_profile": {"field_2": spread(0.5, 1.0, "1")}}})
+    ((effect, shape, *_),) = content.effects_table(board, of_field).rows
+    assert effect.startswith("thickness profile, board: at +1 thicker along the middle and at mid-length, ")
+    assert shape == "shape 2"
     assert content.laws_table(SUMMARY).rows[0] == ("E_x", "–", "10.500")
     assert dict(content.sampler_rows(SUMMARY)) == {
         "ensembles, walkers, steps": "4, 32, 2000",

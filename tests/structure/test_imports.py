@@ -23,6 +23,7 @@ ROAD = (
     "posterior",
     "results",
     "diagnosis",
+    "campaigns",
     "planning",
     "report",
 )
@@ -211,6 +212,8 @@ BAD_FILES = [
     ("plate/bad.py", "import bayesplate.modes.plate", "plate imports modes"),
     ("cards/bad.py", "def f():\n    from bayesplate.plate.board import Board", "cards imports plate"),
     ("modes/bad.py", "import importlib\nimportlib.import_module('bayesplate.report.page')", "modes imports report"),
+    ("diagnosis/wording/bad.py", "from bayesplate.campaigns.shared import Shared", "diagnosis imports campaigns"),
+    ("campaigns/bad.py", "from bayesplate.report.page import policy", "campaigns imports report"),
     ("recordings/bad.py", "from bayesplate.plate.board import Board", "recordings imports plate"),
     ("posterior/bad.py", "from bayesplate.workflow.fit import fit", "posterior imports workflow"),
     ("modes/bad.py", "def f():\n    from bayesplate.workflow.modes import modes", "modes imports workflow"),

@@ -21,9 +21,22 @@ from trial.run import BASE_SEED, run
 from trial.shared import baseline_of_card, control_of
 from trial.summary import CONDITIONS
 
-from bayesplate.diagnosis.evidence.null_control import N_SETS
+from bayesplate.diagnosis.evidence.null_control import null_control
 
 FEW = (Cell("one", "cantilever-6", 2, size=2.0), Cell("null", "cantilever-6", 2))
+
+
+N_FEW_SETS = 60
+"""Null simulations of a setting here: enough to rank against, and to compare one run with another."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_sets():
+    """Fewer null simulations than in the trial, which leaves their number to the package, in forked processes too."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("trial.shared.null_control", lambda ground, rng: null_control(ground, rng, N_FEW_SETS))
+        yield
+    control_of.cache_clear()
 
 
 def without_time(records):
@@ -106,7 +119,7 @@ def test_null_simulations_are_shared_by_boards_of_a_setting():
     others = {Cell("null", "cantilever-6", 1, noise=noise).setting for noise in NOISES}
     assert len(others | {Cell("null", "cantilever-6", 1, 2.0).setting, Cell("null", "free-12", 1).setting}) == 5
     assert control_of(cell.setting) is control_of(Cell("null", "cantilever-6", 9).setting)
-    assert control_of(cell.setting).against.shape == (N_SETS,)
+    assert control_of(cell.setting).against.shape == (N_FEW_SETS,)
     assert cell.setting.rng().random() == cell.setting.rng().random()
     assert len({one.rng().random() for one in others}) == 3
 

@@ -17,6 +17,7 @@ from bayesplate.diagnosis.evidence.search import prepare_search
 from bayesplate.errors import InputError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.results.folder import OutputFolder
 from bayesplate.workflow.check import check
 from bayesplate.workflow.diagnose import diagnose as run_diagnose
 from bayesplate.workflow.fit import fit
@@ -162,7 +163,10 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, qu
     assert other.files["summary.json"] != with_shear.files["summary.json"]
 
 
-def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_path, quick, with_shear):
+def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_path, quick, with_shear, monkeypatch):
+    """What is computed besides is left out: known effects, and advice."""
+    monkeypatch.setattr("bayesplate.workflow.diagnose.known_fits", lambda *_: ())
+    monkeypatch.setattr("bayesplate.workflow.diagnose.recommendation", lambda *_: "")
     folder = tmp_path / "out"
     for name, content in with_shear.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -178,11 +182,15 @@ def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_
     assert not (folder / "before").exists()
 
 
-def test_what_somebody_else_keeps_in_before_stays(tmp_path, quick):
-    folder = tmp_path / "out"
-    (folder / "before").mkdir(parents=True)
-    (folder / "before" / "notes.txt").write_bytes(b"mine")
-    assert diagnose(folder, CALM, "--force", "--quiet").files["before/notes.txt"] == b"mine"
+def test_what_somebody_else_keeps_in_before_stays(tmp_path):
+    before = tmp_path / "before"
+    before.mkdir()
+    for name in (*FIT, "notes.txt"):
+        (before / name).write_bytes(b"mine")
+    folder = OutputFolder(tmp_path)
+    folder.open(resume=False)
+    folder.release()
+    assert files_in(tmp_path) == {"before/notes.txt": b"mine"}
 
 
 @pytest.mark.parametrize(
@@ -257,13 +265,14 @@ def test_there_is_nothing_to_resume(tmp_path):
 
 @pytest.mark.parametrize("place", [pytest.param("prepare_search", marks=pytest.mark.slow), "_case"])
 def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, monkeypatch, with_shear, place):
-    """Stopped after the first fit, and after both."""
+    """Stopped after the first fit, and after both; what is computed between the two is of the resumed run."""
 
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(f"bayesplate.workflow.diagnose.{place}", stop)
+        patch.setattr("bayesplate.workflow.diagnose.known_fits", lambda *_: ())
         stopped = diagnose(tmp_path / "out", WITH_SHEAR)
     assert stopped.exit_code == 130
     assert "--resume continues" in stopped.stderr

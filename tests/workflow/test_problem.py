@@ -126,7 +126,11 @@ WIDE = {
 def wide() -> bayesplate.Problem:
     """Moduli so uncertain that a part of the prior is no material's, at an uncertain thickness and Poisson ratio."""
     board = bayesplate.Problem.from_card(UNCERTAIN).board
-    free = board.with_priors({"poisson_xy": bayesplate.Quantity.from_mean(0.6, 0.2, "normal")})
+    (setup,) = board.setups
+    labelled = replace(setup, peaks=(), readings=tuple(replace(one, confidence=1.0) for one in setup.readings))
+    free = replace(board, setups=(labelled,)).with_priors(
+        {"poisson_xy": bayesplate.Quantity.from_mean(0.6, 0.2, "normal")}
+    )
     prior = bayesplate.PriorCard.from_quantities("wide", WIDE, source="a test")
     return bayesplate.Problem.from_card(free, prior=prior)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none, probabilities
 from bayesplate.diagnosis.evidence.search import Ground
 from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.modes.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -67,21 +68,22 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
     n_modes = ground.baseline.n_modes
     if n_modes < FEWEST:
         return None
-    before, after = np.empty(residuals.shape), np.empty(residuals.shape)
-    chosen = np.empty(residuals.shape, dtype=np.intp)
     none = ground.hypotheses[0]
-    for mode in range(n_modes):
+
+    def folded(mode: int) -> tuple[Floats, Floats, NDArray[np.intp]]:
         fold = Fold(ground.baseline, mode)
-        picked = choices(ground, fold, residuals, needed_from)
-        chosen[:, mode] = picked
-        before[:, mode] = none.seen(ground.baseline, residuals) @ none.terms(fold).fold.misses
-        after[:, mode] = before[:, mode]
-        for index in np.unique(picked[picked > 0]):
-            sets = picked == index
+        chosen = choices(ground, fold, residuals, needed_from)
+        before = none.seen(ground.baseline, residuals) @ none.terms(fold).fold.misses
+        after = before.copy()
+        for index in np.unique(chosen[chosen > 0]):
+            sets = chosen == index
             hypothesis = ground.hypotheses[index]
             seen = hypothesis.seen(ground.baseline, residuals[sets])
-            after[sets, mode] = hypothesis.terms(fold).left_out_errors(seen)
-    return Nested(before, after, chosen)
+            after[sets] = hypothesis.terms(fold).left_out_errors(seen)
+        return before, after, chosen
+
+    before, after, chosen = zip(*in_threads(folded, range(n_modes)), strict=True)
+    return Nested(*(np.stack(each, axis=1) for each in (before, after, chosen)))
 
 
 def choices(ground: Ground, fold: Fold, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> NDArray[np.intp]:

@@ -19,8 +19,9 @@ from bayesplate.diagnosis.shifts.laws import FormLaw
 from bayesplate.effects import EFFECTS, effects_of
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.leave_one_out import Errors, prediction_errors
-from bayesplate.estimates.refit import Predict, normal_misfit, refit
+from bayesplate.estimates.refit import normal_misfit, refit
 from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
@@ -164,7 +165,7 @@ def known_fit(
     kept = np.flatnonzero(before >= 0)
     target, scales = target[kept], scales[kept]
     labelled = before[kept]
-    errors = prediction_errors(lambda x: law(x)[:, labelled], target, normal_misfit(target, scales), fitted[None, :])
+    errors = prediction_errors(law.of(labelled), target, normal_misfit(target, scales), fitted[None, :])
     D_x, D_y, D_s = np.exp(fitted)
     constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
     return KnownFit(tuple(effects), tuple(without), fitted, constants, errors)
@@ -176,10 +177,10 @@ def _labelled(models: Models) -> Rows:
     return np.concatenate([start + np.arange(len(one.places)) for start, one in zip(starts, models, strict=True)])
 
 
-def _refit(law: Predict, rows: Rows, target: Floats, scales: Floats, start: Floats) -> Floats:
+def _refit(law: Predictor, rows: Rows, target: Floats, scales: Floats, start: Floats) -> Floats:
     """The constants fitted to the readings that are a mode."""
     kept = np.flatnonzero(rows >= 0)
-    return refit(lambda x: law(x)[:, rows[kept]], target[kept], scales[kept], start)
+    return refit(law.of(rows[kept]), target[kept], scales[kept], start)
 
 
 def _relabelled(problem: PosedProblem, predicted: Floats, rows: Rows) -> Rows:
@@ -204,9 +205,9 @@ def with_known_sizes(board: Board, effects: Sequence[str]) -> Board:
     return added.with_parameters(replace(size, prior=Quantity.exact(size.prior.median)) for size in sizes)
 
 
-def _law(models: Models, inputs: Values) -> Predict:
+def _law(models: Models, inputs: Values) -> Predictor:
     """ln f (Hz) of all modes from (n, 3) ln D by the exact law, all else at its nominal value."""
-    return lambda x: np.concatenate([one.every_log_frequency(_values(x, inputs), "exact") for one in models], axis=1)
+    return Predictor(lambda x: _values(x, inputs), models, "exact")
 
 
 def _values(log_rigidities: Floats, inputs: Values) -> Values:

@@ -13,8 +13,10 @@ from bayesplate.plate.board import Board
 Floats = NDArray[np.float64]
 
 _LOW, _HIGH = -2.5, 3.5
-_LEVELS = {1: 9, 2: 5, 3: 4}
-_FEW_LEVELS = {1: 5, 2: 4, 3: 3}
+_LEVELS, _FEW_LEVELS = {1: 9, 2: 5}, {1: 5, 2: 4}
+"""Along each of one or two setups."""
+_POINTS, _FEW_POINTS = 64, 32
+"""Of more setups together, whose product would grow without bound; powers of two, as Sobol's sequence wants them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,10 @@ class NoiseGrid:
 
 
 def noise_grid(board: Board, *, few: bool = False) -> NoiseGrid:
-    """Equidistant levels in the logarithm of the noise, every setup's with every other's.
+    """Equidistant levels in the logarithm of the noise of one setup, each with each of two, and points among more.
+
+    The points are the first of Sobol's sequence (USSR Comput. Math. Math. Phys. 7, 1967), each in the middle of its
+    share of the prior: as many for twenty setups as for three, so that the more setups, the coarser they lie.
 
     Parameters
     ----------
@@ -41,11 +46,23 @@ def noise_grid(board: Board, *, few: bool = False) -> NoiseGrid:
     few : bool
         Fewer levels, for combinations of effects.
     """
+    n_setups = len(board.setups)
     counts = _FEW_LEVELS if few else _LEVELS
-    n = counts.get(len(board.setups), 3)
-    t = np.linspace(_LOW, _HIGH, 2 * n + 1)[1::2]
-    each = np.exp(-0.5 * t**2)
-    levels = [setup.noise.median * np.exp(setup.noise.log_sd * t) for setup in board.setups]
-    sd = np.array(list(product(*levels)))
-    weights = np.prod(np.array(list(product(*([each] * len(board.setups))))), axis=1)
-    return NoiseGrid(sd, weights / weights.sum())
+    if n_setups in counts:
+        axis = np.linspace(_LOW, _HIGH, 2 * counts[n_setups] + 1)[1::2]
+        t = np.array(list(product(*[axis] * n_setups)))
+        weights = np.exp(-0.5 * (t**2).sum(axis=1))
+    else:
+        t = _points(_FEW_POINTS if few else _POINTS, n_setups)
+        weights = np.ones(len(t))
+    each = [setup.noise.median * np.exp(setup.noise.log_sd * t[:, i]) for i, setup in enumerate(board.setups)]
+    return NoiseGrid(np.stack(each, axis=1), weights / weights.sum())
+
+
+def _points(n_points: int, n_dim: int) -> Floats:
+    """Standard normal coordinates of equally weighted points: (n_points, n_dim) array."""
+    from scipy.special import ndtri
+    from scipy.stats.qmc import Sobol
+
+    shares = Sobol(n_dim, scramble=False).random(n_points) + 0.5 / n_points
+    return np.asarray(ndtri(shares))

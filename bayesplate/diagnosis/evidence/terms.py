@@ -8,7 +8,8 @@ and the posterior of constants and sizes are sums of normal terms; many data set
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,6 +22,8 @@ from bayesplate.diagnosis.shifts.tables import Table
 
 Floats = NDArray[np.float64]
 
+_MOST_NUMBERS = 200_000
+"""Held at once of any one kind: larger arrays cost more to fetch and to give back than to fill."""
 _LOG_TWO_PI = float(np.log(2.0 * np.pi))
 
 
@@ -160,16 +163,33 @@ class Terms:
 
     def log_evidence(self, residuals: Floats) -> Floats:
         """Logarithm of the restricted marginal density of data sets: (n_sets,) array."""
-        return np.asarray(log_sum(self.log_densities(residuals)) - self.fold.half_log_det)
+        parts = [log_sum(part.log_densities(residuals)) for part in self._in_parts(len(residuals))]
+        return np.asarray(log_sum(np.stack(parts)) - self.fold.half_log_det)
+
+    def _in_parts(self, n_sets: int) -> Iterator[Terms]:
+        """The terms of some cells at a time, so many that what they make of the data sets stays small."""
+        n_modes, n_tangents = self.table.slopes.shape[1:]
+        per_cell = self.noise.weights.size * max(n_sets, n_modes * n_tangents)
+        step = max(1, _MOST_NUMBERS // per_cell)
+        for first in range(0, self.table.n_cells, step):
+            yield replace(self, table=self.table.some(slice(first, first + step)))
 
     def left_out_errors(self, residuals: Floats) -> Floats:
         """Reading that was left out less its mean prediction: (n_sets,) array, ln f."""
-        shares = normalised(self.log_densities(residuals))
+        parts = [part._mean_errors(residuals) for part in self._in_parts(len(residuals))]
+        log_masses, errors = (np.stack(each) for each in zip(*parts, strict=True))
+        return np.asarray((normalised(log_masses) * errors).sum(axis=0))
+
+    def _mean_errors(self, residuals: Floats) -> tuple[Floats, Floats]:
+        """ln of the weighted density of all cells, and the error of their mean prediction: (n_sets,) arrays."""
+        log_densities = self.log_densities(residuals)
+        log_mass = np.asarray(log_sum(log_densities))
+        shares = np.exp(log_densities - log_mass)
         misses = self.fold.misses
         by_cell = shares.reshape(self.noise.weights.size, self.table.n_cells, -1)
         own = (residuals @ misses)[None, :] - (self.table.shift @ misses)[:, None]
         if not self.table.slopes.shape[2]:
-            return np.asarray((by_cell.sum(axis=0) * own).sum(axis=0))
+            return log_mass, np.asarray((by_cell.sum(axis=0) * own).sum(axis=0))
         gains = self._gains
         seen = residuals @ self.fold.blind.T
         along = np.einsum("i,kip->kp", misses, self.table.slopes)
@@ -177,7 +197,7 @@ class Terms:
         rows = np.einsum("kp,lkpd->lkd", along, gains)
         offsets = np.einsum("lkd,kd->lk", rows, self.middles)
         inside = np.einsum("lkd,nd->lkn", rows, seen) - offsets[:, :, None]
-        return np.asarray(total - (by_cell * inside).sum(axis=(0, 1)))
+        return log_mass, np.asarray(total - (by_cell * inside).sum(axis=(0, 1)))
 
     @cached_property
     def _gains(self) -> Floats:

@@ -22,6 +22,7 @@ from bayesplate.diagnosis.shifts.spectrum import Spectrum
 from bayesplate.estimates.least_squares import Estimate, log_measured, reading_scales
 from bayesplate.estimates.refit import Predict, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.predictor import Predictor
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
@@ -119,14 +120,13 @@ class Baseline:
         Baseline
         """
         every = self.every
-        predict = every.predict
         changed = replace(
             self,
             log_frequency=every.log_frequency[rows],
             slopes=every.slopes[rows],
             input_slopes=every.input_slopes[rows],
             places=tuple(every.flat_places[row] for row in rows),
-            predict=None if predict is None else lambda x: predict(x)[:, rows],
+            predict=_of_rows(every.predict, rows),
             modes=rows,
         )
         return replace(changed, residual=self.residual + self.middle - changed.middle)
@@ -192,6 +192,12 @@ class Baseline:
         return weighted_rms(shift, self.scales)
 
 
+def _of_rows(predict: Predict | None, rows: NDArray[np.intp]) -> Predict | None:
+    if predict is None or isinstance(predict, Predictor):
+        return predict and predict.of(rows)
+    return lambda x: predict(x)[:, rows]
+
+
 def baseline_of(problem: PosedProblem) -> Baseline:
     """The baseline of a problem that is ready to be sampled, at the centre of its posterior under the exact law."""
     board, parameters, models = problem.board, problem.parameters, problem.posterior.models
@@ -207,7 +213,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
         places=tuple(model.every_place for model in models),
         inputs=inputs,
         peaks=problem.posterior.peaks,
-        predict=lambda x: predict(np.concatenate([x, np.tile(inputs, (len(x), 1))], axis=1)),
+        predict=predict.with_fixed(inputs),
     )
     rows = spectrum.first_of_each([len(setup.readings) for setup in board.setups])
     bare = Baseline(

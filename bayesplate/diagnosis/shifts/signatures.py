@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.shifts.baseline import weighted_rms
 from bayesplate.effects import EFFECTS, declare, effects_of
-from bayesplate.estimates.refit import Predict, refit
+from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, Moduli, moduli
@@ -129,15 +130,10 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
     return tuple(result)
 
 
-def constants_predictor(problem: PosedProblem) -> Predict:
+def constants_predictor(problem: PosedProblem) -> Predictor:
     """ln f of all modes as a function of ln D_x, ln D_y, ln D_s alone, inputs as at the estimate."""
-    predict_all = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
-    inputs = problem.centre[problem.parameters.fitted_columns][N_RIGIDITIES:]
-
-    def predict(x: Floats) -> Floats:
-        return predict_all(np.concatenate([x, np.tile(inputs, (len(x), 1))], axis=1))
-
-    return predict
+    predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
+    return predict.with_fixed(problem.centre[problem.parameters.fitted_columns][N_RIGIDITIES:])
 
 
 def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, dict[str, float]]:

@@ -73,6 +73,10 @@ class Table:
         """Number of cells."""
         return int(self.weights.size)
 
+    def some(self, cells: slice) -> Table:
+        """Some of the cells, with the weights that they have among all."""
+        return replace(self, **{key: getattr(self, key)[cells] for key in _PER_CELL})
+
     def of(self, rows: NDArray[np.intp]) -> Table:
         """The same cells for some of the modes, by their indices."""
         if np.array_equal(rows, np.arange(self.shift.shape[1])):

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, p_words
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.wording.candidates import Fate
+from bayesplate.posterior.doubts import times
 
 _LIKELY = 0.1
 """Probability from which on an effect that is hardly visible by itself is told as any other."""
@@ -82,5 +81,5 @@ def _less_probable(found: Found, ranked: Sequence[Answer], name: str | None, ind
 def ratio_words(found: Found, index: int) -> str:
     """How much likelier the readings are under a hypothesis that exchanges two labels than as they are called."""
     gained = float(found.log_evidence[index] - found.log_evidence[0])
-    times = "more than a million" if abs(gained) > np.log(1e6) else f"{np.exp(abs(gained)):.3g}"
-    return f"with these labels exchanged the readings are {times} times {'likelier' if gained > 0 else 'less likely'}"
+    likelier = "likelier" if gained > 0 else "less likely"
+    return f"with these labels exchanged the readings are {times(abs(gained))} {likelier}"

@@ -43,6 +43,17 @@ CHECKS = (
         "after, and the shift of each constant in standard deviations.",
     ),
     (
+        "campaign",
+        "python examples/campaign.py --out docs/validation --results results/campaign",
+        "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it.",
+    ),
+    (
+        "campaigns",
+        "make campaigns",
+        "Simulated campaigns of eight boards with one sensor on all of them, on three, or on none: intervals of its "
+        "mass, and how often it is claimed.",
+    ),
+    (
         "calibration",
         "make calibration",
         "Boards are drawn from the prior, measured with noise and fitted; if the inference is right, the truth falls "

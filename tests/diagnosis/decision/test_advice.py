@@ -11,12 +11,12 @@ ASKED = ("transverse_shear", "clamp_rotation")
 
 
 @pytest.fixture(scope="module")
-def told(finnish):
-    return options(search(finnish.ground), ASKED)
+def told(finnish_few):
+    return options(search(finnish_few.ground), ASKED)
 
 
-def test_as_measured_the_options_begin_with_what_the_search_saw(finnish, told):
-    ground = finnish.ground
+def test_as_measured_the_options_begin_with_what_the_search_saw(finnish_few, told):
+    ground = finnish_few.ground
     assert told[0].sentence == ""
     assert told[0].likeness == pytest.approx(abs(ground.cosine(*ASKED)), abs=0.1)
     assert told[0].seen == pytest.approx([ground.visibility(name) for name in ASKED], rel=0.1)
@@ -69,8 +69,8 @@ def test_of_several_ways_the_one_that_shows_most_is_recommended(monkeypatch):
     assert recommendation(None, ("a", "b")) == recommendation(None, ()) == ""
 
 
-def test_the_recommendation_names_the_effects_and_what_to_measure(finnish, told, monkeypatch):
+def test_the_recommendation_names_the_effects_and_what_to_measure(finnish_few, told, monkeypatch):
     monkeypatch.setattr("bayesplate.diagnosis.decision.advice.options", lambda *_: told)
-    sentence = recommendation(search(finnish.ground), ASKED)
+    sentence = recommendation(search(finnish_few.ground), ASKED)
     assert sentence.startswith("Measure ")
     assert "clamp rotation would then show" in sentence

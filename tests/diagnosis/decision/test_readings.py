@@ -72,3 +72,8 @@ def test_the_setup_is_named_where_there_are_several():
 
 def test_four_readings_cannot_tell():
     assert suspects(found_of(0.2 * np.eye(4)[0], n_modes=4)) == ()
+
+
+@pytest.mark.parametrize("mode", range(5))
+def test_five_readings_can_tell(mode):
+    assert wrong_reading(found_of(0.2 * np.eye(5)[mode], n_modes=5)).startswith(f"Read ({mode},0) again")

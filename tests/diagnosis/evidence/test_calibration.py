@@ -53,13 +53,18 @@ def found_in(ground, readings):
     return probabilities(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, readings))
 
 
-@pytest.mark.parametrize("board", ["finnish", pytest.param("simulated", marks=pytest.mark.slow)])
+slow = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "board", ["finnish_few", pytest.param("finnish", marks=slow), pytest.param("simulated", marks=slow)]
+)
 def test_probabilities_are_frequencies(board, request):
     ground = request.getfixturevalue(board).ground
     drawn, readings = simulated_sets(ground, np.random.default_rng(1), N_SETS)
     assert np.abs(misses(found_in(ground, readings), drawn)).max() < ALLOWED
 
 
-def test_with_twice_the_noise_they_are_not(finnish):
-    drawn, readings = simulated_sets(finnish.ground, np.random.default_rng(2), N_SETS, noise_factor=2.0)
-    assert np.abs(misses(found_in(finnish.ground, readings), drawn)).max() > 2.0 * ALLOWED
+def test_with_twice_the_noise_they_are_not(finnish_few):
+    drawn, readings = simulated_sets(finnish_few.ground, np.random.default_rng(2), N_SETS, noise_factor=2.0)
+    assert np.abs(misses(found_in(finnish_few.ground, readings), drawn)).max() > 2.0 * ALLOWED

@@ -104,6 +104,24 @@ def test_many_sets_at_once_are_each_alone():
     assert terms.log_evidence(residuals) == pytest.approx(alone, abs=1e-12)
 
 
+@pytest.mark.parametrize("n_tangents", [0, 2])
+def test_few_cells_at_a_time_give_what_all_together_do(n_tangents, monkeypatch):
+    rng = np.random.default_rng(4)
+    base = baseline(rng, noise=(0.004, 0.009))
+    cells = table(rng, n_cells=7, n_tangents=n_tangents)
+    residuals = 0.01 * rng.standard_normal((5, base.n_modes))
+
+    def found():
+        terms = Terms(cells, Fold(base, 2), noise_grid(base.board))
+        return terms.log_evidence(residuals), terms.left_out_errors(residuals)
+
+    together = found()
+    monkeypatch.setattr("bayesplate.diagnosis.evidence.terms._MOST_NUMBERS", 300)
+    assert len(list(Terms(cells, Fold(base), noise_grid(base.board))._in_parts(5))) > 2
+    for apart, whole in zip(found(), together, strict=True):
+        np.testing.assert_allclose(apart, whole, rtol=1e-12)
+
+
 def test_constants_are_not_seen():
     rng = np.random.default_rng(3)
     base = baseline(rng, resolution=1.0)

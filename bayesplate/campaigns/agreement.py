@@ -1,0 +1,84 @@
+"""Whether a board wants what the others teach: each against the rest, so that a value that one refuses is noticed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesplate.campaigns.together import Together
+
+_NOISE = 0.05
+"""Slopes of a log likelihood below that may come from the draws that gave it."""
+REFUSED = 0.05
+"""p-value, multiplied by the number of boards, below which a board refuses what the others teach."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A board when the others teach it the shared parameters.
+
+    Attributes
+    ----------
+    name : str
+    log_score : float
+        ln of the probability of its readings, the shared parameters learned from the others.
+    p_value : float
+        How often a board that shares the others' parameters would want to leave them at least as much.
+    """
+
+    name: str
+    log_score: float
+    p_value: float
+
+
+def left_out(together: Together) -> tuple[LeftOut, ...]:
+    """Every board left out in turn."""
+    everything = together.log_evidence()
+    return tuple(
+        LeftOut(name, everything - together.log_evidence((i,)), p_value(together, i))
+        for i, name in enumerate(together.names)
+    )
+
+
+def refusing(together: Together) -> tuple[str, ...]:
+    """Names of the boards that refuse what the others teach, as many as were asked being allowed for.
+
+    The one that refuses most is left out before the others are asked again: it had taught them too.
+    """
+    out: list[int] = []
+    n = len(together.names)
+    while len(out) < n - 1:
+        values = {i: p_value(together, i, out) for i in range(n) if i not in out}
+        worst = min(values, key=lambda i: values[i])
+        if values[worst] * len(values) >= REFUSED:
+            break
+        out.append(worst)
+    return tuple(together.names[i] for i in sorted(out))
+
+
+def p_value(together: Together, board: int, without: Collection[int] = ()) -> float:
+    """Of one board against the others, or those of them that are not left out: the score test of its likelihood.
+
+    The board's own posterior, its prior divided out, amounts to a normal likelihood exp(h'z - z'Pz / 2). If the board
+    shares the parameters of the others, whose posterior has the mean m and the covariance C, its slope h - P m there is
+    normal about zero with the covariance P + P C P; directions of which the board says nothing add nothing.
+
+    References
+    ----------
+    E. C. Marshall and D. J. Spiegelhalter, Identifying outliers in Bayesian hierarchical models: a simulation-based
+    approach, Bayesian Analysis 2 (2007). [each unit against the rest]
+    """
+    from scipy.stats import chi2
+
+    mean, covariance = together.moments((board, *without))
+    pull = together.pulls[board]
+    slope = pull.lean - pull.precision @ mean
+    spread = pull.precision + pull.precision @ covariance @ pull.precision
+    sizes, directions = np.linalg.eigh(spread)
+    told = sizes > _NOISE**2 * max(float(sizes.max()), 1.0)
+    if not told.any():
+        return 1.0
+    along = directions[:, told].T @ slope
+    return float(chi2.sf(along @ (along / sizes[told]), int(told.sum())))

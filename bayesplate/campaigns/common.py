@@ -1,0 +1,76 @@
+"""What is left over on all boards alike: residuals of one mode pooled over a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesplate.frequencies.laws import cents
+from bayesplate.results.modes import ModeRow
+from bayesplate.results.summary import Summary
+
+FEWEST = 2
+"""Boards that must have a reading before it says what they have in common."""
+
+
+@dataclass(frozen=True)
+class CommonResidual:
+    """Residuals of one mode, measured over predicted, cents.
+
+    Attributes
+    ----------
+    mean_cents, error_cents : float
+        Their mean, each weighted by its board's noise, and its standard error: of the noise, or of the scatter between
+        the boards where that is larger.
+    scatter_cents : float
+        Standard deviation between the boards.
+    boards : dict of float
+        Each board's own.
+    """
+
+    mean_cents: float
+    error_cents: float
+    scatter_cents: float
+    boards: Mapping[str, float]
+
+
+def common_residuals(summaries: Mapping[str, Summary]) -> dict[str, CommonResidual]:
+    """Every mode that several boards have, in the order in which boards name them first.
+
+    Parameters
+    ----------
+    summaries : dict of Summary
+        By board.
+
+    Returns
+    -------
+    dict of CommonResidual
+        By label; by setup and label where the boards' setups have different names.
+    """
+    setups = {row.setup for summary in summaries.values() for row in summary.modes}
+    found: dict[str, dict[str, tuple[float, float]]] = {}
+    for board, summary in summaries.items():
+        for row in summary.modes:
+            noise = float(cents(np.asarray(summary.noise[row.setup].q50)))
+            found.setdefault(_key(row, len(setups) > 1), {})[board] = (row.residual_cents, noise)
+    return {key: _pooled(each) for key, each in found.items() if len(each) >= FEWEST}
+
+
+def _key(row: ModeRow, has_setups: bool) -> str:
+    return f"{row.setup} {row.label}" if has_setups else row.label
+
+
+def _pooled(each: Mapping[str, tuple[float, float]]) -> CommonResidual:
+    residuals, noise = np.array(list(each.values())).T
+    weights = noise**-2.0
+    total = weights.sum()
+    mean = float(weights @ residuals / total)
+    scatter = float(weights @ (residuals - mean) ** 2 / total / (len(each) - 1))
+    return CommonResidual(
+        mean_cents=mean,
+        error_cents=float(np.sqrt(max(1.0 / total, scatter))),
+        scatter_cents=float(np.std(residuals, ddof=1)),
+        boards={board: residual for board, (residual, _) in each.items()},
+    )

@@ -1,0 +1,178 @@
+"""The distribution that the boards' constants come from: partial pooling, the next board, and a prior card.
+
+ln E_x, ln E_y and ln G_xy of the boards are normal about a mean and with a standard deviation of the population, each
+constant for itself. A board knows its constants to a few per cent, so that its likelihood of their logarithms is normal
+with a mean m and a covariance C once the prior that it was fitted under is divided out. Then all is closed form:
+
+    m of a board ~ N(mean, C + sd^2),        its constants given the population ~ N((C^-1 + sd^-2)^-1 ..).
+
+References
+----------
+A. Gelman, Prior distributions for variance parameters in hierarchical models, Bayesian Analysis 1 (2006). [half-normal]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.cards import PriorCard
+from bayesplate.errors import Fault, InputError
+from bayesplate.plate.material import MODULI
+from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+
+_STEADY = 1e-3
+"""Standard deviation of ln E below which a population has none for all practical purposes."""
+_CONSTANTS = len(MODULI)
+
+
+@dataclass(frozen=True, eq=False)
+class BoardConstants:
+    """What one board says of its constants: a normal likelihood of ln E_x, ln E_y, ln G_xy (Pa).
+
+    Attributes
+    ----------
+    name : str
+    mean : (3,) array
+    covariance : (3, 3) array
+    """
+
+    name: str
+    mean: Floats
+    covariance: Floats
+
+    @classmethod
+    def of(cls, inference: Inference, draws: Draws) -> BoardConstants:
+        """From the posterior of a board, the prior of its constants divided out."""
+        logs = np.column_stack([np.log(draws.moduli[name]).ravel() for name in MODULI])
+        log_prior = inference.problem.posterior.log_prior_constants(draws.flat)
+        weights = np.exp(log_prior.min() - log_prior)
+        mean = np.average(logs, axis=0, weights=weights)
+        return cls(inference.problem.board.name, mean, np.cov(logs.T, aweights=weights))
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """What the boards say of the distribution of their constants.
+
+    Attributes
+    ----------
+    boards : tuple of BoardConstants
+    chains : Chains
+        Of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations.
+    convergence : Convergence
+    """
+
+    boards: tuple[BoardConstants, ...]
+    chains: Chains
+    convergence: Convergence
+
+    @property
+    def means(self) -> Floats:
+        """Draws of the mean of ln E (Pa): (n_draws, 3) array."""
+        return self.chains.pooled[:, :_CONSTANTS]
+
+    @property
+    def sds(self) -> Floats:
+        """Draws of the standard deviation of ln E: (n_draws, 3) array."""
+        return np.exp(self.chains.pooled[:, _CONSTANTS:])
+
+    def next_board(self, rng: np.random.Generator) -> Floats:
+        """Draws of ln E_x, ln E_y, ln G_xy of a board that was not measured yet: (n_draws, 3) array."""
+        return self.means + self.sds * rng.standard_normal(self.means.shape)
+
+    def pooled(self, board: int, rng: np.random.Generator) -> Floats:
+        """Draws of ln E of a board under the population: (n_draws, 3) array."""
+        one = self.boards[board]
+        own = np.linalg.inv(one.covariance)
+        precision = own + _diagonal(self.sds**-2.0)
+        lean = own @ one.mean + self.means * self.sds**-2.0
+        middle = np.linalg.solve(precision, lean[:, :, None])
+        factor = np.swapaxes(np.linalg.cholesky(precision), 1, 2)
+        normal = rng.standard_normal((*lean.shape, 1))
+        return np.asarray((middle + np.linalg.solve(factor, normal))[:, :, 0])
+
+
+def find_population(boards: Sequence[BoardConstants], prior: PriorCard, settings: SamplerSettings) -> Population:
+    """Sample mean and standard deviation of the constants of all boards of such a kind.
+
+    Parameters
+    ----------
+    boards : sequence of BoardConstants
+    prior : PriorCard
+        Of E_x, E_y, G_xy. Its medians and factors are believed of the mean; the standard deviation of ln E is
+        half-normal on the scale of the factor.
+    settings : SamplerSettings
+
+    Returns
+    -------
+    Population
+    """
+    middle, width = _believed(prior)
+    seen = np.array([one.mean for one in boards])
+    covariances = np.array([one.covariance for one in boards])
+    own = np.diagonal(covariances, axis1=1, axis2=2).mean(axis=0)
+    spread = np.sqrt(np.maximum(seen.var(axis=0, ddof=1) - own, 0.0) + (0.1 * width) ** 2)
+
+    def log_posterior(theta: Floats) -> Floats:
+        means, log_sds = theta[:, :_CONSTANTS], theta[:, _CONSTANTS:]
+        sds = np.exp(np.clip(log_sds, np.log(_STEADY), None))
+        total = -0.5 * (((means - middle) / width) ** 2 + (sds / width) ** 2).sum(axis=1) + log_sds.sum(axis=1)
+        factors = np.linalg.cholesky(covariances[None] + _diagonal(sds**2)[:, None])
+        left = np.linalg.solve(factors, (seen[None] - means[:, None])[..., None])[..., 0]
+        total -= 0.5 * (left**2).sum(axis=(1, 2))
+        total -= np.log(np.diagonal(factors, axis1=2, axis2=3)).sum(axis=(1, 2))
+        return np.where((log_sds < np.log(_STEADY)).any(axis=1), -np.inf, total)
+
+    n = len(boards)
+    centre = np.concatenate([seen.mean(axis=0), np.log(spread)])
+    variance = np.concatenate([spread**2 / n, np.full(_CONSTANTS, 0.5 / n)])
+    names = [f"{what} of ln {name}" for what in ("mean", "ln sd") for name in MODULI]
+    chains, convergence = sample(log_posterior, centre, np.diag(variance), settings, names=names)
+    return Population(tuple(boards), chains, convergence)
+
+
+def require_moduli(prior: PriorCard, place: str) -> None:
+    """A population is one of E_x, E_y, G_xy: rigidities go with each board's thickness.
+
+    Raises
+    ------
+    InputError
+        If the prior card states D_x, D_y, D_s.
+    """
+    if set(prior.constants) != set(MODULI):
+        wanted = "a prior card of E_x, E_y, G_xy"
+        raise InputError(Fault(place, wanted, f"{prior.name}, one of D_x, D_y, D_s, which go with the thickness"))
+
+
+def prior_of(population: Population, name: str, source: str, rng: np.random.Generator, title: str = "") -> PriorCard:
+    """What the boards teach of the next one, as a prior card.
+
+    Each constant is log-normal with the mean and standard deviation of the prediction's logarithm.
+    """
+    predicted = population.next_board(rng)
+    constants = {
+        key: Quantity.from_median(float(np.exp(values.mean())), float(np.exp(values.std())))
+        for key, values in zip(MODULI, predicted.T, strict=True)
+    }
+    return PriorCard.from_quantities(name, constants, source=source, title=title)
+
+
+def _believed(prior: PriorCard) -> tuple[Floats, Floats]:
+    constants: Mapping[str, Quantity] = prior.constants
+    middle = np.array([np.log(constants[name].median) for name in MODULI])
+    return middle, np.array([constants[name].log_sd for name in MODULI])
+
+
+def _diagonal(values: Floats) -> Floats:
+    """Diagonal matrices: (n, k, k) array from (n, k)."""
+    return np.asarray(values[:, :, None] * np.eye(values.shape[1]))

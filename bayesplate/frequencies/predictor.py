@@ -1,0 +1,69 @@
+"""ln f of a board's modes as a function of what a fit moves, with its tangent anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.frequencies.laws import LawName
+from bayesplate.frequencies.model import SetupModel
+from bayesplate.plate.board import Values
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """ln f (Hz) of modes, setup after setup, as a function of the parameters of a fit.
+
+    Attributes
+    ----------
+    values : callable
+        From (n, n_free) parameters to constants and sizes by name, SI.
+    models : sequence of SetupModel
+    law : "linear" or "exact"
+    rows : (n_modes,) array of int, optional
+        Which of all modes that the models have; by default all of them.
+    """
+
+    values: Callable[[Floats], Values]
+    models: Sequence[SetupModel]
+    law: LawName
+    rows: NDArray[np.intp] | None = None
+
+    def __call__(self, x: Floats) -> Floats:
+        """From (n, n_free) parameters to (n, n_modes) ln f."""
+        values = self.values(x)
+        every = np.concatenate([model.every_log_frequency(values, self.law) for model in self.models], axis=1)
+        return every if self.rows is None else every[:, self.rows]
+
+    def of(self, rows: NDArray[np.intp]) -> Predictor:
+        """The same for some of the modes, by their places among all."""
+        return replace(self, rows=rows)
+
+    def of_labelled(self) -> Predictor:
+        """The same for the modes that have a label on the board."""
+        starts = np.cumsum([0, *(len(model.every_place) for model in self.models)])[:-1]
+        both = zip(starts, self.models, strict=True)
+        return self.of(np.concatenate([start + np.arange(len(model.places)) for start, model in both]))
+
+    def with_fixed(self, rest: Floats) -> Predictor:
+        """The same as a function of the first parameters only, the (n_rest,) others held where they are."""
+        return replace(self, values=lambda x: self.values(np.concatenate([x, np.tile(rest, (len(x), 1))], axis=1)))
+
+    def tangent(self, at: Floats) -> Predictor:
+        """The linear law of the modes at a point: equal to the exact one there, with the same slopes.
+
+        Energies are stationary at a mode (Rayleigh's principle), so that one solution gives all slopes.
+
+        Parameters
+        ----------
+        at : (n_free,) array
+        """
+        if self.law == "linear":
+            return self
+        values = self.values(at[None, :])
+        return replace(self, models=[model.tangent(values) for model in self.models], law="linear")

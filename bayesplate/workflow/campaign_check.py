@@ -1,0 +1,60 @@
+"""`check` of a campaign: every fault of all its cards, or what each board and all together would tell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesplate.campaigns.checking import CampaignCheck, CheckedShared
+from bayesplate.campaigns.given import GivenShared
+from bayesplate.campaigns.space import Pull
+from bayesplate.posterior.inference import PosedProblem
+from bayesplate.workflow.campaign import Campaign
+from bayesplate.workflow.check import check_board
+
+_N_DRAWS = 4000
+
+
+def check_campaign(campaign: Campaign) -> CampaignCheck:
+    """Check a campaign; `bayesplate.check` says what is raised."""
+    campaign.pose()
+    population = campaign.population
+    return CampaignCheck(
+        name=campaign.name,
+        title=campaign.card.title,
+        shared=_shared(campaign) if campaign.shared else {},
+        population=None if population is None else population.name,
+        boards={problem.board.name: check_board(problem, candidates=False) for problem in campaign.problems},
+    )
+
+
+def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
+    """What normal approximations of the boards' posteriors say of the shared numbers."""
+    pulls = {one.board.name: _pull(one.posed, campaign) for one in campaign.problems}
+    n = len(campaign.shared)
+
+    def sds(*some: Pull) -> list[float]:
+        total = np.eye(n) + np.sum([one.precision for one in some], axis=0)
+        return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(total)))]
+
+    alone = {name: sds(pull) for name, pull in pulls.items()}
+    every = sds(*pulls.values())
+    return {
+        one.name: CheckedShared(
+            unit=one.unit,
+            prior_q05=float(one.prior.quantile(0.05)),
+            prior_q50=float(one.prior.quantile(0.5)),
+            prior_q95=float(one.prior.quantile(0.95)),
+            expected_sd=every[i],
+            boards={name: each[i] for name, each in alone.items()},
+        )
+        for i, one in enumerate(campaign.shared)
+    }
+
+
+def _pull(posed: PosedProblem, campaign: Campaign) -> Pull:
+    theta = np.random.default_rng(0).multivariate_normal(posed.centre, posed.covariance, _N_DRAWS)
+    given = GivenShared(posed.posterior, campaign.shared)
+    z, log_weights = given.z_of(theta), given.log_reweighting(theta)
+    kept = np.isfinite(z).all(axis=1) & np.isfinite(log_weights)
+    weights = np.exp(log_weights[kept] - log_weights[kept].max())
+    return Pull.of_draws(z[kept], weights)

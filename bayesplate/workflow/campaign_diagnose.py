@@ -1,0 +1,253 @@
+"""`diagnose` of a campaign: what its boards lack in common, judged by boards that were left out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from bayesplate.campaigns.boards import Member
+from bayesplate.campaigns.claim import SharedClaim, TaughtBoard, judge, taught_boards
+from bayesplate.campaigns.common import common_residuals
+from bayesplate.campaigns.diagnosis import (
+    FORMAT,
+    IMPROBABLE,
+    CampaignDiagnosis,
+    PooledErrors,
+    named,
+    next_step,
+    pooled_rms,
+)
+from bayesplate.campaigns.search import BoardSearch, Explanation, explanations, shareable
+from bayesplate.campaigns.shared import shared_by
+from bayesplate.campaigns.summary import CampaignSummary
+from bayesplate.cards import SharedSection
+from bayesplate.diagnosis.evidence.peaks import with_own_labels
+from bayesplate.diagnosis.evidence.search import prepare_search
+from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.effects import EFFECTS
+from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import CampaignPlots
+from bayesplate.results.contract import as_json
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
+from bayesplate.workflow.campaign import Campaign
+from bayesplate.workflow.campaign_fit import (
+    fit_boards,
+    fitted_together,
+    open_folder,
+    summed_up,
+    telling_failure,
+)
+from bayesplate.workflow.campaign_result import CampaignFitResult, write_campaign_pages
+from bayesplate.workflow.fit import write_fit
+from bayesplate.workflow.fitting import Fitted
+from bayesplate.workflow.shown import show_diagnosis
+from bayesplate.workflow.stages import Stages
+
+_FIT, _SEARCH, _SHARED = 3.0, 2.0, 1.0
+"""How long the parts take beside each other."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CampaignDiagnoseResult:
+    """What a diagnosis of a campaign leaves.
+
+    Attributes
+    ----------
+    folder : Path or None
+        Where its files are; None if none were asked for.
+    diagnosis : CampaignDiagnosis
+    before : dict of Fitted
+        By board: without what is shared.
+    after : CampaignFitResult
+        With it; boards side by side where nothing is shared.
+    """
+
+    folder: Path | None
+    diagnosis: CampaignDiagnosis
+    before: Mapping[str, Fitted]
+    after: CampaignFitResult
+
+    @property
+    def summary(self) -> CampaignSummary:
+        """The summary of the model that the diagnosis ends with."""
+        return self.after.summary
+
+    @cached_property
+    def plot(self) -> CampaignPlots:
+        """The figures: `found.plot.left_out()`."""
+        return CampaignPlots(self.after.summary, self.diagnosis)
+
+    def to_arviz(self) -> Any:
+        """The draws of what is shared, as of `CampaignFitResult.to_arviz`."""
+        return self.after.to_arviz()
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of diagnosis.json."""
+        content: dict[str, Any] = as_json(self.diagnosis)
+        return content
+
+    def _repr_html_(self) -> str:
+        """The verdict and its tables as a notebook shows them."""
+        return show_diagnosis(self.diagnosis).html(self.diagnosis.name)
+
+    def __repr__(self) -> str:
+        one = self.diagnosis
+        told = ", ".join(one.effects) or "nothing"
+        claim = "claimed" if one.claim else "not claimed"
+        return f"<CampaignDiagnoseResult of {one.name}: {one.verdict}, {told} shared, {claim}>"
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    report: bool = True,
+    seed: int = 1,
+    force: bool = False,
+    resume: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> CampaignDiagnoseResult:
+    """Diagnose a campaign; `bayesplate.diagnose` says what the arguments mean and what is raised.
+
+    Where the card names what is shared, that is judged: each board by what the others teach it, against the same boards
+    without it. Otherwise every effect that boards may have alike is tried, and the one that stands out is judged so.
+    """
+    folder = None if out is None else OutputFolder(Path(out))
+    if folder is not None:
+        folder.require_usable(force=force, resume=resume)
+    alone = _without_shared(campaign)
+    n = len(campaign.problems)
+    stages = Stages(progress, n * (2.0 * _FIT + (0.0 if campaign.shared else _SEARCH)) + _SHARED)
+    alone.pose()
+    campaign.pose()
+    if folder is not None:
+        open_folder(folder, resume=resume)
+    with telling_failure(folder, campaign, seed):
+        found = _diagnosed(campaign, alone, None if folder is None else folder.checkpoint, seed, stages)
+    if folder is not None:
+        found = replace(found, folder=folder.path)
+        for name, one in found.before.items():
+            make_folder(folder.path / BEFORE / name)
+            write_fit(folder.path / BEFORE / name, one)
+        found.after.write(folder.path)
+        write_text(folder.path / DIAGNOSIS, json_text(found.diagnosis))
+        if report:
+            write_campaign_pages(folder.path, found.after, found.diagnosis)
+        folder.close()
+    return found
+
+
+def _diagnosed(
+    campaign: Campaign, alone: Campaign, checkpoints: Path | None, seed: int, stages: Stages
+) -> CampaignDiagnoseResult:
+    """The diagnosis of a campaign whose boards can be fitted, nothing written but checkpoints."""
+    before = fit_boards(alone, seed, None if checkpoints is None else checkpoints / BEFORE, stages)
+    if campaign.shared:
+        verdict, reason = "named", "the card names what the boards share"
+        effects = tuple(dict.fromkeys(one.effect for one in campaign.shared))
+        searched: tuple[Explanation, ...] = ()
+        with_shared = campaign
+    else:
+        searched = _searched(before, stages)
+        verdict, effects, reason = named(searched) if searched else ("none needed", (), "no effect could be shared")
+        with_shared = _sharing(campaign, effects[:1] if verdict != "none needed" else ())
+    if with_shared.shared:
+        after = fitted_together(with_shared, seed, checkpoints, stages)
+    else:
+        after = summed_up(with_shared, before, before, None, (), seed)
+    taught: Mapping[str, TaughtBoard] = {}
+    claim: SharedClaim | None = None
+    if after.learnt is not None:
+        members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
+        taught = taught_boards(after.learnt, members, seed)
+        claim = judge(taught)
+    diagnosis = _diagnosis(campaign, verdict, effects, reason, searched, taught, claim, before, after, seed)
+    return CampaignDiagnoseResult(None, diagnosis, before, after)
+
+
+def _without_shared(campaign: Campaign) -> Campaign:
+    """The same boards side by side, without what they share."""
+    names = {one.effect for one in campaign.shared}
+    if not names:
+        return campaign
+    problems = tuple(
+        replace(one, prepared=one.prepared.with_effects([e for e in one.prepared.board.effects if e not in names]))
+        for one in campaign.problems
+    )
+    return replace(campaign, problems=problems, shared=())
+
+
+def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
+    """The same boards with effects that they share: as ratios where an effect has such a thing."""
+    if not effects:
+        return campaign
+    problems = tuple(
+        replace(one, prepared=one.prepared.with_effects((*one.prepared.board.effects, *effects)))
+        for one in campaign.problems
+    )
+    ways = {name: "ratio" if EFFECTS[name].ratios else "value" for name in effects}
+    sections = tuple(SharedSection.model_validate({"effect": name, "as": way}) for name, way in ways.items())
+    card = campaign.card.model_copy(update={"shared": sections})
+    return replace(campaign, problems=problems, shared=shared_by(card, [one.prepared.board for one in problems]))
+
+
+def _searched(before: Mapping[str, Fitted], stages: Stages) -> tuple[Explanation, ...]:
+    """What every board's tables say together."""
+    tried = {name: tuple(forms(one.inference.problem.board)) for name, one in before.items()}
+    effects = shareable(tuple(before), tried)
+    if not effects:
+        return ()
+    searches = []
+    for name, one in before.items():
+        stages.begin(f"search on board {name}", _SEARCH)
+        ground = prepare_search(baseline_of(one.inference.problem), tried=effects, tell=stages.reached)
+        searches.append(BoardSearch(name, with_own_labels(ground)))
+    return explanations(searches, effects)
+
+
+def _diagnosis(
+    campaign: Campaign,
+    verdict: str,
+    effects: tuple[str, ...],
+    reason: str,
+    searched: tuple[Explanation, ...],
+    taught: Mapping[str, TaughtBoard],
+    claim: SharedClaim | None,
+    before: Mapping[str, Fitted],
+    after: CampaignFitResult,
+    seed: int,
+) -> CampaignDiagnosis:
+    none = next((one.probability for one in searched if one.way == "none"), None)
+    counts = {name: len(one.summary.modes) for name, one in before.items()}
+    errors_before = {name: one.summary.error.in_sample_rms_cents for name, one in before.items()}
+    errors_after = {name: one.error.in_sample_rms_cents for name, one in after.summary.boards.items()}
+    pooled_before, pooled_after = pooled_rms(errors_before, counts), pooled_rms(errors_after, counts)
+    left_before = pooled_rms({n: t.before_rms_cents for n, t in taught.items()}, counts) if taught else pooled_before
+    left_after = pooled_rms({n: t.after_rms_cents for n, t in taught.items()}, counts) if taught else pooled_after
+    holds = claim is not None and claim.holds and verdict == "named" and (none is None or none < IMPROBABLE)
+    return CampaignDiagnosis(
+        format=FORMAT,
+        name=campaign.name,
+        seed=seed,
+        card_sha256=campaign.card.sha256,
+        verdict=verdict,
+        claim=holds,
+        effects=effects,
+        declared=bool(campaign.shared),
+        reason=reason,
+        explanations=searched,
+        probability_of_none=none,
+        conditions=claim,
+        left_out_boards=taught,
+        before=PooledErrors(pooled_before, left_before),
+        after=PooledErrors(pooled_after, left_after),
+        common_residual=after.summary.common_residual,
+        common_residual_before=common_residuals({name: one.summary for name, one in before.items()}),
+        recommendation=next_step(after.summary.common_residual, claim),
+        notes=after.summary.warnings,
+    )

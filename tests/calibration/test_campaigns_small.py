@@ -1,0 +1,54 @@
+"""Simulated campaigns: how they are judged, and one small campaign from its truth to its record."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from calibration.campaigns import CampaignDesign, identity, judge, simulate_one
+from calibration.records import read_done
+
+
+def record(kind, number, claim, q=(1.0, 2.0, 3.0), truth=2.0, **more):
+    ends = dict(zip(("q05", "q50", "q95"), q, strict=True))
+    return {"kind": kind, "campaign": number, "claim": claim, "truth": truth, "refused_by": [], **ends, **more}
+
+
+def test_campaigns_that_are_right_pass():
+    good = [record("all", i, True, truth=2.0 if i % 10 else 5.0) for i in range(100)]
+    good += [record("some", i, False) for i in range(100)] + [record("none", i, i < 4) for i in range(100)]
+    lines, well = judge(good)
+
+    assert well
+    assert lines[0] == "sensor on all boards: 90 % intervals hold 90 of 100 masses, wanted 79 to 98"
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        [record("all", i, True, truth=2.0 if i % 3 else 5.0) for i in range(100)],
+        [record("some", i, i < 20) for i in range(100)],
+        [record("none", i, i < 20) for i in range(100)],
+        [{"kind": "all", "campaign": 0, "error": "it fell over"}],
+    ],
+)
+def test_campaigns_that_are_wrong_do_not(bad):
+    """The negative control."""
+    assert not judge(bad)[1]
+
+
+def test_a_file_of_another_design_is_refused(tmp_path):
+    path = tmp_path / "campaigns.jsonl"
+    assert read_done(path, identity(CampaignDesign())) == []
+    with pytest.raises(SystemExit, match="made with another design"):
+        read_done(path, identity(CampaignDesign(n_boards=3)))
+
+
+@pytest.mark.slow
+def test_a_campaign_of_two_boards_leaves_a_record():
+    found = simulate_one(CampaignDesign(n_boards=2), "all", 0)
+
+    assert "error" not in found
+    assert found["q05"] < found["q50"] < found["q95"]
+    assert found["with"] == ["board-0", "board-1"]
+    assert json.loads(json.dumps(found)) == found

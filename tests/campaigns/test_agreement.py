@@ -1,0 +1,41 @@
+"""Whether a board that is unlike the others is noticed, and boards that are alike are not."""
+
+from __future__ import annotations
+
+import numpy as np
+from linear_boards import exactly_together, linear_boards, log_evidence
+
+from bayesplate.campaigns.agreement import left_out, p_value, refusing
+
+
+def test_p_values_of_boards_that_share_are_uniform():
+    """Their mean and the shares below one half and a tenth, at the tolerance of so many campaigns."""
+    values = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        boards = linear_boards(rng, 5, 2, rng.standard_normal(2))
+        together = exactly_together(boards)
+        values.append([p_value(together, i) for i in range(5)])
+    values = np.array(values)
+    n = values.size / 2  # the boards of one campaign are compared with each other
+
+    assert abs(values.mean() - 0.5) < 4.0 / np.sqrt(12 * n)
+    assert abs((values < 0.5).mean() - 0.5) < 4.0 * 0.5 / np.sqrt(n)
+    assert abs((values < 0.1).mean() - 0.1) < 4.0 * 0.3 / np.sqrt(n)
+
+
+def test_a_board_without_what_the_others_share_is_found():
+    rng = np.random.default_rng(1)
+    boards = linear_boards(rng, 5, 2, [2.0, -2.0], without=(2,))
+
+    assert refusing(exactly_together(boards)) == ("board 2",)
+
+
+def test_the_log_score_is_that_of_the_board_under_what_the_others_teach():
+    rng = np.random.default_rng(2)
+    boards = linear_boards(rng, 4, 2, [0.5, 1.0])
+    found = left_out(exactly_together(boards))
+
+    for i, one in enumerate(found):
+        exact = log_evidence(boards) - log_evidence([b for j, b in enumerate(boards) if j != i])
+        assert abs(one.log_score - exact) < 1e-3

@@ -1,0 +1,208 @@
+"""A campaign from its card to its files, and its shared posterior against a joint run over everything at once."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_campaigns import MASS, write_campaign
+from scipy.linalg import block_diag
+
+import bayesplate
+from bayesplate.campaigns import boards as of_boards
+from bayesplate.campaigns.boards import Member
+from bayesplate.campaigns.learning import learn
+from bayesplate.cards import load_prior
+from bayesplate.errors import InputError
+from bayesplate.posterior.sampling import SamplerSettings, sample
+
+SHARED = "attached_mass.mass"
+
+
+def joint_run(members, is_exact=False):
+    """Draws of every board's own parameters and the shared ones together, and the effective sizes."""
+    given = [
+        replace(one.given, posterior=one.inference.problem.posterior) if is_exact else one.given for one in members
+    ]
+    shared = members[0].shared
+    sizes = [one.own_columns.size for one in given]
+    ends = np.cumsum(sizes)
+
+    def log_posterior(theta):
+        z = theta[:, ends[-1] :]
+        total = np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(shared)], axis=0)
+        for one, own in zip(given, np.split(theta[:, : ends[-1]], ends[:-1], axis=1), strict=True):
+            total = total + one.log_density(own, z)
+        return total
+
+    own = [m.draws.flat[:, g.own_columns] for m, g in zip(members, given, strict=True)]
+    z = np.concatenate([m.z for m in members])
+    centre = np.concatenate([each.mean(axis=0) for each in own] + [z.mean(axis=0)])
+    covariance = block_diag(*[np.cov(each.T) for each in own], np.atleast_2d(np.cov(z.T)) / len(members))
+    chains, convergence = sample(log_posterior, centre, covariance, SamplerSettings(seed=2))
+    assert convergence.passed
+    return chains.pooled, convergence.ess
+
+
+def in_errors(draws, reference, ess):
+    """Difference of means, and of the logarithms of the sds, in standard errors of the reference."""
+    sd = reference.std()
+    return abs(draws.mean() - reference.mean()) / sd * np.sqrt(ess), abs(np.log(draws.std() / sd)) * np.sqrt(2 * ess)
+
+
+def test_the_shared_posterior_is_that_of_a_joint_run(fitted_campaign):
+    members = fitted_campaign.learnt.members
+    reference, ess = joint_run(members)
+    z = fitted_campaign.learnt.chains.pooled[:, 0]
+    both = min(ess[-1], fitted_campaign.learnt.convergence.ess[0])
+
+    assert max(in_errors(z, reference[:, -1], both / 2)) < 4.0
+    ends = np.cumsum([0, *(one.given.own_columns.size for one in members)])
+    for i, member in enumerate(members):
+        own = fitted_campaign.boards[member.name].draws.flat[:, member.given.own_columns]
+        for column in range(3):  # ln D_x, ln D_y, ln D_s
+            few = min(ess[ends[i] + column], fitted_campaign.boards[member.name].inference.convergence.ess_min)
+            assert max(in_errors(own[:, column], reference[:, ends[i] + column], few / 2)) < 4.5
+
+
+@pytest.mark.slow
+def test_the_surrogate_leaves_no_trace_in_the_shared_posterior(fitted_campaign):
+    members = fitted_campaign.learnt.members
+    assert any(one.inference.surrogate is not None for one in members)
+    reference, ess = joint_run(members, is_exact=True)
+    z = fitted_campaign.learnt.chains.pooled[:, 0]
+
+    assert max(in_errors(z, reference[:, -1], min(ess[-1], fitted_campaign.learnt.convergence.ess[0]) / 2)) < 4.0
+
+
+def test_without_a_board_the_shared_posterior_is_another(fitted_campaign):
+    """The negative control."""
+    members = fitted_campaign.learnt.members
+    fewer = learn(members[:2], SamplerSettings(seed=1))
+    z, less = fitted_campaign.learnt.chains.pooled[:, 0], fewer.chains.pooled[:, 0]
+
+    assert max(in_errors(less, z, fitted_campaign.learnt.convergence.ess[0] / 2)) > 4.0
+
+
+def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
+    one = fitted_campaign.summary.shared[SHARED]
+
+    assert abs(one.all_boards.mean - MASS) < 3.0 * one.all_boards.sd
+    for board, own in one.own.items():
+        assert one.all_boards.sd < own.sd
+        alone, under_all = fitted_campaign.alone[board].summary, fitted_campaign.boards[board].summary
+        assert under_all.elastic.E_x.sd < alone.elastic.E_x.sd
+    assert not any(one.refuses for one in fitted_campaign.summary.left_out_boards.values())
+
+
+def test_draws_about_the_nodes_are_those_of_weights(fitted_campaign, monkeypatch):
+    """The way that is taken where few of a board's own draws are left gives the same where many are."""
+    learnt = fitted_campaign.learnt
+    monkeypatch.setattr(of_boards, "FEWEST_WEIGHTED_DRAWS", np.inf)
+    for member, marginal in zip(learnt.members, learnt.marginals, strict=True):
+        _, anew, effective = member.under_all(learnt.together, marginal, np.random.default_rng(0), 1)
+        usual = fitted_campaign.boards[member.name].draws
+        assert effective > 1000
+        for name, values in usual.moduli.items():
+            mean, sd = max(in_errors(np.log(anew.moduli[name]).ravel(), np.log(values).ravel(), effective / 2)), values
+            assert mean < 5.0, (member.name, name, sd.std())
+
+
+def test_the_files_of_a_campaign(fitted_campaign):
+    folder = fitted_campaign.folder
+    summary = json.loads((folder / "summary.json").read_text())
+
+    assert list(summary) == [
+        "format", "name", "seed", "versions", "card_sha256", "converged", "shared", "left_out_boards",
+        "common_residual", "population", "boards", "sampler", "warnings",
+    ]  # fmt: skip
+    for board in ("board-0", "board-1", "board-2"):
+        own = json.loads((folder / "boards" / board / "summary.json").read_text())
+        assert own == summary["boards"][board]
+        assert (folder / "boards" / board / "posterior.nc").exists()
+    assert not (folder / "checkpoint").exists()
+    card = load_prior(folder / "together-population.toml")
+    low, high = (summary["population"]["next_board"]["E_x"][q] for q in ("q05", "q95"))
+    assert low < card.constants["E_x"].median < high
+
+
+def test_a_folder_in_use_is_refused_and_force_clears_it(fitted_campaign, card):
+    with pytest.raises(InputError, match="one that exists"):
+        bayesplate.fit(card, out=fitted_campaign.folder)
+
+
+def test_what_cannot_be_shared_is_refused_board_by_board(tmp_path):
+    path = write_campaign(tmp_path)
+    text = path.read_text()
+    path.write_text(text.replace('"attached_mass"', '"attached_mass"\nas = "ratio"'))
+    with pytest.raises(InputError, match="only transverse_shear has ratios"):
+        bayesplate.Campaign.from_card(path)
+    path.write_text(text)
+    board = tmp_path / "board-1.toml"
+    board.write_text(board.read_text().replace('kind = "accelerometer"', 'kind = "accelerometer"\nmass_g = 3'))
+    with pytest.raises(InputError, match=r"\[\[shared\]\] 1 \"attached_mass\", board board-1: .*mass known for sure"):
+        bayesplate.Campaign.from_card(path)
+    board.write_text(board.read_text().replace("mass_g = 3", "mass_g = { mean = 3, sd = 1 }"))
+    with pytest.raises(InputError, match="one prior, because it is one number, got 2 different ones of mass"):
+        bayesplate.Campaign.from_card(path)
+
+
+def test_faults_of_several_boards_come_at_once(tmp_path):
+    path = write_campaign(tmp_path)
+    for i in (0, 2):
+        board = tmp_path / f"board-{i}.toml"
+        board.write_text(board.read_text().replace("length_x_mm", "lenght_x_mm"))
+    with pytest.raises(InputError) as refused:
+        bayesplate.fit(path)
+
+    places = [fault.place for fault in refused.value.faults]
+    assert sum(place.startswith("together.toml boards 1 -> board-0.toml") for place in places) == 2
+    assert sum(place.startswith("together.toml boards 3 -> board-2.toml") for place in places) == 2
+
+
+def test_a_campaign_takes_nothing_beside_it(campaign):
+    with pytest.raises(InputError, match="nothing beside a Campaign"):
+        bayesplate.fit(campaign, effects=[])
+
+
+def test_check_says_what_the_boards_would_share(campaign):
+    report = bayesplate.check(campaign)
+
+    (one,) = report.shared.values()
+    assert set(report.boards) == set(one.boards) == {"board-0", "board-1", "board-2"}
+    assert one.expected_sd < min(one.boards.values()) < 1.0
+    assert report.population == "spruce"
+
+
+def test_members_of_a_ratio_have_the_campaign_s_prior(fitted_campaign):
+    """Where a value is shared nothing is weighted."""
+    for member in fitted_campaign.learnt.members:
+        assert isinstance(member, Member)
+        assert np.array_equal(member.log_weights, np.zeros(len(member.z)))
+
+
+@pytest.mark.slow
+def test_an_interrupted_campaign_goes_on_to_the_same_bytes(campaign, fitted_campaign, tmp_path):
+    def interrupt(progress):
+        if progress.stage == "board board-1" and progress.n_steps > 50:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bayesplate.fit(campaign, out=tmp_path / "out", progress=interrupt)
+    bayesplate.fit(campaign, out=tmp_path / "out", resume=True)
+
+    for name in ("summary.json", "boards/board-2/summary.json", "posterior.nc"):
+        assert (tmp_path / "out" / name).read_bytes() == (fitted_campaign.folder / name).read_bytes()
+
+
+def test_a_campaign_that_does_not_converge_says_so(campaign, tmp_path, monkeypatch):
+    never = replace(campaign, problems=campaign.problems[1:], shared=())
+    monkeypatch.setattr("bayesplate.workflow.fitting.SamplerSettings", lambda seed: SamplerSettings(seed, max_steps=25))
+    with pytest.raises(bayesplate.NotConvergedError, match="board board-1"):
+        bayesplate.fit(never, out=tmp_path / "out")
+
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["converged"] is False
+    assert "boards" not in summary

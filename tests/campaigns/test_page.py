@@ -1,0 +1,118 @@
+"""The page and the figures of a campaign: what they say, and what a title cannot do to them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+import bayesplate
+from bayesplate.campaigns.claim import SharedClaim, TaughtBoard
+from bayesplate.campaigns.diagnosis import CampaignDiagnosis, PooledErrors, claim_sentence
+from bayesplate.errors import InputError
+from bayesplate.report.campaign_page import write_campaign_report
+from bayesplate.workflow.shown import show_diagnosis, show_fit
+
+
+@pytest.fixture(scope="module")
+def diagnosis(fitted_campaign):
+    """A diagnosis as the boards left out would have it."""
+    summary = fitted_campaign.summary
+    others = summary.shared["attached_mass.mass"].others
+    taught = {
+        name: TaughtBoard(gain, 7.0, 5.0, 0.4, False, {"attached_mass.mass": others[name]})
+        for name, gain in zip(others, (3.0, 2.5, -0.5), strict=True)
+    }
+    return CampaignDiagnosis(
+        format=1,
+        name="together",
+        seed=1,
+        card_sha256="",
+        verdict="named",
+        claim=True,
+        effects=("attached_mass",),
+        declared=True,
+        reason="the card names what the boards share",
+        explanations=(),
+        probability_of_none=None,
+        conditions=SharedClaim(5.0, 1.5, (), 2, True),
+        left_out_boards=taught,
+        before=PooledErrors(7.0, 7.0),
+        after=PooledErrors(5.0, 5.0),
+        common_residual=summary.common_residual,
+        common_residual_before=summary.common_residual,
+        recommendation="",
+        notes=(),
+    )
+
+
+def test_the_page_of_a_fit(fitted_campaign):
+    folder = fitted_campaign.folder
+    page = (folder / "report.html").read_text(encoding="utf-8")
+
+    for board in fitted_campaign.boards:
+        assert f'href="boards/{board}/report.html"' in page
+        assert (folder / "boards" / board / "report.html").exists()
+    assert {path.name for path in (folder / "figures").iterdir()} == {
+        f"{stem}.{ending}" for stem in ("shared-attached-mass-mass", "boards", "common") for ending in ("png", "svg")
+    }
+    assert "90 %" in page
+    assert not re.search(r'(src|href)="(?!data:|boards/)', page)  # nothing is fetched
+
+
+def test_the_page_of_a_diagnosis(fitted_campaign, diagnosis, tmp_path):
+    title = '<script>alert("x")</script>'
+    page = write_campaign_report(tmp_path, title, fitted_campaign.summary, diagnosis).read_text(encoding="utf-8")
+
+    assert "The boards share attached mass: 2 of 3 boards" in page
+    assert (tmp_path / "figures" / "left-out.png").exists()
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):
+    refused = replace(diagnosis, claim=False, conditions=SharedClaim(5.0, 1.5, ("board-1",), 2, False))
+    nothing = replace(diagnosis, claim=False, conditions=None, left_out_boards={}, reason="nothing is lacking")
+
+    assert claim_sentence(diagnosis).startswith("The boards share attached mass: 2 of 3")
+    assert "5.0 ± 1.5 in log score" in claim_sentence(diagnosis)
+    assert claim_sentence(refused).startswith("It is not claimed that the boards share attached mass")
+    assert "board-1 does not want it" in claim_sentence(refused)
+    assert claim_sentence(nothing) == "Nothing is claimed: nothing is lacking."
+
+
+def test_what_the_terminal_shows(fitted_campaign, diagnosis):
+    titles = [table.title for table in show_fit(fitted_campaign.summary).tables]
+
+    assert titles[0] == "Shared by all boards"
+    assert any("each board alone" in title for title in titles)
+    assert any(title.startswith("Population") for title in titles)
+    assert show_diagnosis(diagnosis).closing == claim_sentence(diagnosis)
+
+
+def test_figures_and_draws_of_a_result(fitted_campaign):
+    plot = fitted_campaign.plot
+    for figure in (plot.shared(), plot.shared("attached_mass.mass"), plot.boards(), plot.common()):
+        assert figure.axes
+    with pytest.raises(InputError, match=r"attached_mass\.mass"):
+        plot.shared("mass")
+    with pytest.raises(InputError, match="leaves them out"):
+        plot.left_out()
+    draws = fitted_campaign.to_arviz()["posterior"]["attached_mass.mass"]
+    assert float(draws.mean()) == pytest.approx(
+        fitted_campaign.summary.shared["attached_mass.mass"].all_boards.mean, rel=0.02
+    )
+    assert "<table" in fitted_campaign._repr_html_()
+    assert repr(fitted_campaign) == "<CampaignFitResult of together: 3 boards; attached_mass.mass>"
+
+
+def test_a_campaign_that_shares_nothing_is_boards_side_by_side(card, tmp_path, campaign):
+    alone = replace(campaign, problems=campaign.problems[1:], shared=())
+    found = bayesplate.fit(alone)
+
+    assert found.learnt is None
+    assert found.summary.shared == {}
+    assert set(found.summary.boards) == {"board-1", "board-2"}
+    with pytest.raises(InputError, match="nothing shared"):
+        found.to_arviz()

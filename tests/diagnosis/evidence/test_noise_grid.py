@@ -1,0 +1,66 @@
+"""Levels of the noise: against a fine grid, and no more of them for twenty setups than for three."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from made_searches import baseline, table
+
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.evidence.terms import Fold, Terms
+from bayesplate.diagnosis.shifts.tables import nothing
+
+N_SETS = 40
+
+
+def log_odds(base, grid, residuals):
+    """Of an effect of a few cells against none."""
+    some = table(np.random.default_rng(5), base.n_modes)
+    one, none = (Terms(each, Fold(base), grid).log_evidence(residuals) for each in (some, nothing(base.n_modes)))
+    return one - none
+
+
+def product_grid(base, n_along):
+    """Equidistant levels of each noise with every other's."""
+    t = np.array(list(product(np.linspace(-2.5, 3.5, 2 * n_along + 1)[1::2], repeat=len(base.board.setups))))
+    noise = [setup.noise.median * np.exp(setup.noise.log_sd * t[:, i]) for i, setup in enumerate(base.board.setups)]
+    weights = np.exp(-0.5 * (t**2).sum(axis=1))
+    return NoiseGrid(np.stack(noise, axis=1), weights / weights.sum())
+
+
+@pytest.mark.parametrize("n_setups", [1, 2, 3])
+def test_odds_are_those_of_a_fine_grid(n_setups):
+    """Rms over boards whose noises are drawn from their prior, in nats, against one noise that is taken for known.
+
+    Points among three noises do better than as many in a product.
+    """
+    rng = np.random.default_rng(1)
+    base = baseline(rng, 5 * n_setups, noise=(0.005,) * n_setups)
+    noise = 0.005 * np.exp(0.5 * rng.standard_normal((N_SETS, n_setups)))[:, base.setup_index]
+    residuals = noise * rng.standard_normal(noise.shape)
+    expected = log_odds(base, product_grid(base, 17), residuals)
+
+    def off(grid):
+        return np.sqrt(np.mean((log_odds(base, grid, residuals) - expected) ** 2))
+
+    many, few = (off(noise_grid(base.board, few=few)) for few in (False, True))
+    one = off(NoiseGrid(np.full((1, n_setups), 0.005), np.ones(1)))
+    assert many < 0.3 < one
+    assert many < few < 0.5 * one
+    if n_setups == 3:
+        assert many < off(product_grid(base, 4))
+        assert few < off(product_grid(base, 3))
+
+
+@pytest.mark.parametrize("few", [False, True])
+def test_levels_are_no_more_for_twenty_setups_than_for_three(few):
+    grids = [noise_grid(baseline(np.random.default_rng(0), 60, noise=(0.005,) * n).board, few=few) for n in (3, 20)]
+
+    assert grids[0].weights.size == grids[1].weights.size <= 64
+    for grid in grids:
+        logs = np.log(grid.sd / 0.005) / 0.5
+        assert grid.weights.sum() == pytest.approx(1.0)
+        np.testing.assert_allclose(grid.weights @ logs, 0.0, atol=0.1)  # the middle of the prior and its width
+        np.testing.assert_allclose(grid.weights @ logs**2, 1.0, atol=0.15)

@@ -1,0 +1,60 @@
+"""The predictor: some modes, some parameters, and a tangent with the slopes of the exact law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesplate.estimates.refit import sensitivities
+from bayesplate.frequencies.laws import ExactLaw
+from bayesplate.posterior.laplace import every_predictor, predictor
+from bayesplate.workflow.problem import Problem
+
+EFFECTS = {"thin": (), "shear-flexible": ("transverse_shear",), "on a soft clamp": ("clamp_rotation",)}
+
+
+@pytest.fixture(scope="module", params=EFFECTS)
+def posed(request):
+    return Problem.from_card("finnish-spruce-cantilever", effects=EFFECTS[request.param]).posed
+
+
+def moved(problem, by):
+    columns = problem.parameters.fitted_columns
+    sds = np.sqrt(np.diagonal(problem.covariance))[columns]
+    return problem.centre[columns] + by * sds
+
+
+def of_whole_bases(predict):
+    """The same law with all eigenvalues of its bases: condensed ones err by a tenth of a cent, their slopes by more."""
+    models = []
+    for model in predict.models:
+        blocks = tuple(replace(block, n_kept=0) for block in model.exact.reduced.blocks)
+        models.append(replace(model, exact=ExactLaw(replace(model.exact.reduced, blocks=blocks))))
+    return replace(predict, models=models)
+
+
+@pytest.mark.parametrize("by", [0.3, 1.0])
+def test_tangent_has_the_value_and_the_slopes_of_the_exact_law(posed, by):
+    """Slopes against differences of the exact law; the linear law of another point has others.
+
+    A clamp without any compliance is a bound, where the differences see one side only: not there.
+    """
+    predict = every_predictor(posed.board, posed.posterior.models, "exact", posed.centre)
+    at = moved(posed, by)
+    whole, near, elsewhere = of_whole_bases(predict), predict.tangent(at), predict.tangent(moved(posed, by + 1.0))
+
+    np.testing.assert_allclose(near(at[None, :]), predict(at[None, :]), rtol=0, atol=1e-4)
+    by_differences = sensitivities(lambda x: whole(x), at)
+    np.testing.assert_allclose(sensitivities(predict, at), by_differences, rtol=0, atol=1e-6)
+    assert np.abs(sensitivities(lambda x: elsewhere(x), at) - by_differences).max() > 1e-4
+
+
+def test_some_modes_and_some_parameters(posed):
+    predict = predictor(posed.board, posed.posterior.models, "exact", posed.centre)
+    at = moved(posed, 0.5)
+    whole = predict(at[None, :])
+
+    np.testing.assert_array_equal(predict.of(np.array([2, 0]))(at[None, :]), whole[:, [2, 0]])
+    np.testing.assert_array_equal(predict.with_fixed(at[3:])(at[None, :3]), whole)

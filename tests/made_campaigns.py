@@ -1,0 +1,35 @@
+"""Simulated campaigns: boards with one accelerometer, by the independent generator."""
+
+from __future__ import annotations
+
+import numpy as np
+from generator.boards import plant
+from generator.designs import DESIGNS
+
+MASS = 0.003
+"""kg, of the accelerometer."""
+
+
+def write_campaign(folder, masses=(MASS,) * 3, seed=5, population="spruce", noise_cents=5.0):
+    """Cards of simulated boards that share an accelerometer, and of their campaign; the path of the latter."""
+    rng = np.random.default_rng(seed)
+    design = DESIGNS["free-12"]
+    for i, mass in enumerate(masses):
+        planted = plant(
+            rng,
+            design,
+            ["attached_mass"] if mass else [],
+            1.0,
+            noise_cents,
+            name=f"board-{i}",
+            sensor=(0.9 * design.L_x, 0.9 * design.L_y),
+            fixed={"attached_mass": {"mass": mass, "rotary_radius": 0.0}},
+        )
+        (folder / f"board-{i}.toml").write_text(planted.card_text())
+    boards = ", ".join(f'"./board-{i}.toml"' for i in range(len(masses)))
+    pooled = f'[population]\nprior = "{population}"\n' if population else ""
+    path = folder / "together.toml"
+    path.write_text(
+        f'format = 1\nname = "together"\nboards = [{boards}]\n\n[[shared]]\neffect = "attached_mass"\n\n{pooled}'
+    )
+    return path
