@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.shared import Shared
-from bayesplate.campaigns.space import Pull, Space
 from bayesplate.campaigns.together import Together
 from bayesplate.quantities import Quantity
 
@@ -33,7 +33,7 @@ class LinearBoard:
         """Of the readings where z is given."""
         return self.own @ self.own.T + self.sd**2 * np.eye(self.readings.size)
 
-    def log_likelihood(self, z):
+    def at(self, z):
         """ln p(d | z): the closed form, (n,) array."""
         left = self.readings - z @ self.shared.T
         inverse = np.linalg.inv(self.covariance)
@@ -93,13 +93,11 @@ def standard_shared(n):
 
 
 def exactly_together(boards):
-    """Linear boards with their closed forms at the nodes."""
+    """Linear boards with their closed forms."""
     n = boards[0].shared.shape[1]
     pulls = []
     for one in boards:
         inverse = np.linalg.inv(one.covariance)
         pulls.append(Pull(one.shared.T @ inverse @ one.shared, one.shared.T @ inverse @ one.readings))
-    space = Space.around(pulls)
-    names = tuple(f"board {i}" for i in range(len(boards)))
-    values = np.stack([one.log_likelihood(space.nodes) for one in boards])
-    return Together(standard_shared(n), space, names, values, tuple(pulls))
+    names = [f"board {i}" for i in range(len(boards))]
+    return Together.of(standard_shared(n), names, boards, pulls)

@@ -2,10 +2,12 @@
 
 shared      what is shared, and which columns of each board it sets
 given       the density of a board where what is shared is given
-marginal    that density integrated over everything that is the board's own, at nodes of what is shared
-space       where the nodes stand
-together    the boards' marginal likelihoods multiplied, all of them or all but one
-boards      each board's own posterior under what all teach
+likelihood  what a board says of it, everything of its own integrated out: found from draws
+evidence    the probability of a board's readings
+pulls       what a board says, as a normal likelihood
+together    the boards' likelihoods multiplied, all of them or all but one
+boards      each board's draws, by itself and where the others are
+learning    from boards alone to what they teach together
 agreement   whether a board wants what the others teach
 common      what is left over on all boards alike, mode by mode
 population  the distribution that the boards' constants come from

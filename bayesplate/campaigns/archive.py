@@ -36,8 +36,7 @@ def shared_archive(learnt: Learnt, attributes: Mapping[str, str]) -> Archive:
         for each in (chains.draws, chains.log_prob)
     ]
     z, log_posterior = thinned
-    u = together.space.u(z.reshape(-1, z.shape[-1]))
-    likelihood = together.log_likelihoods(u).T.reshape(*z.shape[:2], -1)
+    likelihood = together.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
     values = values_of(together.shared, z)
     return Archive(
         groups={

@@ -2,32 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.campaigns.evidence import bridge_sampling
 from bayesplate.campaigns.given import GivenShared
-from bayesplate.campaigns.marginal import N_DRAWS, Marginal, marginal_likelihood
+from bayesplate.campaigns.likelihood import LogDensity, SharedLikelihood, moments
+from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.shared import Shared
-from bayesplate.campaigns.space import Pull
-from bayesplate.campaigns.together import Together
+from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS, effective_draws
-from bayesplate.posterior.sampling import Chains
+from bayesplate.posterior.reweighting import effective_draws
+from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
 from bayesplate.posterior.surrogate import with_surrogate
 
 Floats = NDArray[np.float64]
 
-_N_ANEW = 8000
-_FEW_DRAWS = 192
-"""At each node under an exact law that has no surrogate: it is a hundred times as dear."""
-_WORST_CORRECTION = 0.05
-_FAR = 2.5
-"""Standard deviations of the board's own draws beyond which the correction of its surrogate goes on level."""
+_N_ANEW = 2048
+"""Draws of a walk that are held against the law itself."""
+_LINE = 19
+_NOTHING = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Draws of a board under a density r(z) L(z) of the shared parameters, L being the board's likelihood of them.
+
+    Attributes
+    ----------
+    theta : (n, n_dim) array
+        All columns of the board.
+    z : (n, n_shared) array
+        Standard coordinates of what is shared.
+    log_weights : (n,) array
+        That make the draws those of this density.
+    n_independent : float
+        How many independent draws they are worth, the weights aside.
+    log_reference : callable
+        ln r.
+    log_evidence : float
+        ln of the integral of r(z) L(z).
+    every : tuple of (n, n_every) array
+        ln f (Hz) of all modes, setup by setup, under the law of the board.
+    """
+
+    theta: Floats
+    z: Floats
+    log_weights: Floats
+    n_independent: float
+    log_reference: LogDensity
+    log_evidence: float
+    every: tuple[Floats, ...]
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Of the draws: (n,) array that sums to 1."""
+        return normalised(self.log_weights)
+
+    def weights_under(self, log_reference: LogDensity) -> Floats:
+        """Weights under which r is another density: (n,) array that sums to 1."""
+        return normalised(np.log(np.maximum(self.weights, _NOTHING)) + self._change(log_reference))
+
+    def log_evidence_under(self, log_reference: LogDensity) -> float:
+        """ln of the integral of r(z) L(z) where r is another density."""
+        return self.log_evidence + float(
+            log_sum(np.log(np.maximum(self.weights, _NOTHING)) + self._change(log_reference))
+        )
+
+    def effective(self, weights: Floats) -> float:
+        """How many independent draws of equal weight are worth as much."""
+        return effective_draws(weights) * self.n_independent / len(weights)
+
+    def _change(self, log_reference: LogDensity) -> Floats:
+        """ln of another r over this one at the draws: (n,) array."""
+        with np.errstate(invalid="ignore"):
+            change = log_reference(self.z) - self.log_reference(self.z)
+        return np.nan_to_num(change, nan=-np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,116 +106,94 @@ class Member:
 
     @cached_property
     def given(self) -> GivenShared:
-        """Its density given what is shared, by the surrogate of its law where it has one."""
-        posterior, surrogate = self.inference.problem.posterior, self.inference.surrogate
-        return GivenShared(posterior if surrogate is None else with_surrogate(posterior, surrogate), self.shared)
+        """Its density given what is shared."""
+        return GivenShared(self.inference.problem.posterior, self.shared)
 
     @cached_property
-    def z(self) -> Floats:
-        """Standard coordinates of the shared parameters at its own draws: (n, n_shared) array."""
-        return self.given.z_of(self.draws.flat)
+    def _quick(self) -> GivenShared:
+        """The same by the surrogate of its law, where it has one."""
+        surrogate = self.inference.surrogate
+        if surrogate is None:
+            return self.given
+        return replace(self.given, posterior=with_surrogate(self.given.posterior, surrogate))
+
+    def log_prior(self, z: Floats) -> Floats:
+        """ln of the campaign's prior of the shared parameters: (n,) array."""
+        return np.asarray(sum((one.prior.log_prior(z[:, i]) for i, one in enumerate(self.shared)), np.zeros(len(z))))
 
     @cached_property
-    def log_weights(self) -> Floats:
-        """ln of the campaign's prior over the board's own, at its own draws: (n,) array."""
-        return self.given.log_reweighting(self.draws.flat)
+    def alone(self) -> Sample:
+        """Draws of its own posterior, under the campaign's prior of what is shared.
 
-    @cached_property
-    def weights(self) -> Floats:
-        """Weights that make its own draws those under the campaign's prior: (n,) array that sums to 1."""
-        return _normalised(self.log_weights)
+        They are those of its fit; a board each setup of which had a parameter of its own there is walked anew with
+        one for all.
+        """
+        flat, convergence = self.draws.flat, self.inference.convergence
+        every = tuple(each.reshape(len(flat), -1) for each in self.draws.every_log_frequency)
+        n_independent = min(float(convergence.ess_min), float(len(flat)))
+        z, log_weights = self.given.z_of(flat), self.given.log_reweighting(flat)
+        if not self.given.is_one_to_one:
+            fitted = Sample(flat, z, log_weights, n_independent, self.log_prior, np.nan, every)
+            return self.anew(self.log_prior, fitted, moments(z, fitted.weights), 0)
+        log_evidence = self._log_evidence(self.log_prior, flat, z, normalised(log_weights), 0)
+        return Sample(flat, z, log_weights, n_independent, self.log_prior, log_evidence, every)
 
     @property
     def pull(self) -> Pull:
         """What its likelihood of the shared parameters amounts to as a normal one."""
-        return Pull.of_draws(self.z, self.weights)
+        return Pull.of_draws(self.alone.z, self.alone.weights)
 
-    def marginal(self, nodes: Floats, rng: np.random.Generator) -> Marginal:
-        """Its marginal likelihood at nodes of the shared parameters, corrected to the exact law."""
-        own = self.draws.flat[:, self.given.own_columns]
-        is_cheap = self.inference.surrogate is not None or self.inference.problem.posterior.law == "linear"
-        n_draws = N_DRAWS if is_cheap else _FEW_DRAWS
-        found = marginal_likelihood(self.given.log_density, own, self.z, nodes, rng, n_draws)
-        return replace(found, log_likelihood=found.log_likelihood + self._correction(nodes))
+    def likelihood(self, drawn: Sample, log_reference: LogDensity) -> SharedLikelihood:
+        """Its likelihood of the shared parameters, from a sample that is weighted to be where r is another density."""
+        weights = drawn.weights_under(log_reference)
+        log_evidence = drawn.log_evidence_under(log_reference)
+        return SharedLikelihood.found(drawn.z, weights, drawn.effective(weights), log_reference, log_evidence)
 
-    def _correction(self, nodes: Floats) -> Floats:
-        """ln of the exact marginal likelihood over that of the surrogate, at nodes: (n_nodes,) array.
-
-        The mean of exp(-d) over draws of the exact posterior at a node, d the difference of the two log likelihoods,
-        is the ratio of the surrogate's to the exact one. It is regressed on the shared parameters.
-        """
-        if self.inference.surrogate is None:
-            return np.zeros(len(nodes))
-        exact = self.draws.log_likelihood.sum(axis=-1).ravel()
-        less = exact - self.given.posterior.log_likelihood(self.draws.flat).sum(axis=1)
-        usual = float(np.median(less))
-        middle, sd = self.z.mean(axis=0), self.z.std(axis=0)
-        terms = _quadratic((self.z - middle) / sd)
-        found = np.linalg.lstsq(terms, np.exp(np.clip(usual - less, -5.0, 5.0)), rcond=None)[0]
-        there = _quadratic(np.clip((nodes - middle) / sd, -_FAR, _FAR)) @ found
-        return usual - np.log(np.maximum(there, _WORST_CORRECTION))
-
-    def under_all(
-        self,
-        together: Together,
-        marginal: Marginal,
-        rng: np.random.Generator,
-        seed: int,
-        *,
-        is_left_out: bool = False,
-    ) -> tuple[Inference, Draws, float]:
-        """Its posterior under what all boards, or all others, teach of the shared parameters.
-
-        Its own draws, weighted by what the other boards say of theirs; where too few of them are left, or each of its
-        setups had a parameter of its own, importance draws about the nodes.
+    def anew(self, log_reference: LogDensity, before: Sample, aim: tuple[Floats, Floats], seed: int) -> Sample:
+        """Walk where the shared parameters have another density, and weight the draws by the law itself.
 
         Parameters
         ----------
-        together : Together
-        marginal : Marginal
-            Its own.
-        rng : numpy.random.Generator
+        log_reference : callable
+            ln r.
+        before : Sample
+            From which the walkers learn how the board's own parameters go with the shared ones.
+        aim : (n_shared,) and (n_shared, n_shared) arrays
+            Mean and covariance of the shared parameters, nearly.
         seed : int
-            Of the predictive draws.
-        is_left_out : bool
-            Whether the others alone teach the shared parameters; its constants are its own in any case.
-
-        Returns
-        -------
-        inference : Inference
-        draws : Draws
-        effective : float
-            How many draws of equal weight the result rests on.
         """
-        own = together.names.index(self.name)
-        seen = together.log_likelihoods(together.space.u(self.z))
-        log_weights = np.delete(seen, own, axis=0).sum(axis=0)
-        if is_left_out:
-            inside = np.isfinite(log_weights)
-            log_weights[inside] -= seen[own, inside]
-        weights = _normalised(self.log_weights + log_weights)
-        n, effective = len(self.z), effective_draws(weights)
-        if effective >= FEWEST_WEIGHTED_DRAWS and self.given.is_one_to_one:
-            picked = _resampled(weights, n, rng)
-            every = [each.reshape(n, -1)[picked] for each in self.draws.every_log_frequency]
-            return *self._of(self.draws.flat[picked], every, effective, seed), effective
-        z = together.draws(rng, _N_ANEW, (own,) if is_left_out else ())
-        points, log_density = marginal.draw_own(z, rng)
-        there = together.log_likelihoods(together.space.u(z))[own]
-        weights = _normalised(self.given.log_density(points, z) - log_density - there)
-        picked = _resampled(weights, n, rng)
-        theta = self.given.theta(points, z)
-        distinct = np.unique(picked)
-        rows = np.searchsorted(distinct, picked)
-        every = [each[rows] for each in self.given.posterior.every_log_frequency(theta[distinct])]
-        effective = effective_draws(weights)
-        return *self._of(theta[picked], every, effective, seed), effective
+        own, quick = self.given.own_columns, self._quick
+        n_own, log_density = own.size, _joint(quick, log_reference)
+        centre, covariance = _moved(np.column_stack([before.theta[:, own], before.z]), before.weights, aim)
+        names = [f"parameter {i}" for i in range(centre.size)]
+        chains, convergence = sample(log_density, centre, covariance, SamplerSettings(seed), names=names)
+        pooled = chains.pooled
+        x = pooled[np.random.default_rng([seed, _LINE]).choice(len(pooled), _N_ANEW)]
+        theta = self.given.theta(x[:, :n_own], x[:, n_own:])
+        every = tuple(self.given.posterior.every_log_frequency(theta))
+        exact = self.given.posterior.log_likelihood_of(every, theta).sum(axis=1)
+        log_weights = exact - quick.posterior.log_likelihood(theta).sum(axis=1)
+        n_independent = min(float(convergence.ess_min), float(_N_ANEW))
+        log_weights, z = np.nan_to_num(log_weights, nan=-np.inf), x[:, n_own:]
+        log_evidence = self._log_evidence(log_reference, theta, z, normalised(log_weights), seed)
+        return Sample(theta, z, log_weights, n_independent, log_reference, log_evidence, every)
 
-    def _of(self, theta: Floats, every: Sequence[Floats], effective: float, seed: int) -> tuple[Inference, Draws]:
-        """An inference that has these draws and no others, and the draws by name."""
+    def _log_evidence(self, log_reference: LogDensity, theta: Floats, z: Floats, weights: Floats, seed: int) -> float:
+        """ln of the integral of r(z) L(z), from weighted draws of that density."""
+        rng = np.random.default_rng([seed, _LINE, 1])
+        picked = resampled(weights, len(z), rng)
+        draws = np.column_stack([theta[:, self.given.own_columns], z])[picked]
+        return bridge_sampling(_joint(self.given, log_reference), draws, rng)
+
+    def posterior_of(
+        self, drawn: Sample, weights: Floats, rng: np.random.Generator, seed: int
+    ) -> tuple[Inference, Draws]:
+        """An inference that has the weighted draws of a sample and no others, and the draws by name."""
+        picked = resampled(weights, len(self.draws.flat), rng)
+        theta, every = drawn.theta[picked], [each[picked] for each in drawn.every]
         n_chains, before = len(self.draws.theta), self.inference.convergence
         as_chains = theta.reshape(n_chains, -1, 1, theta.shape[-1])
-        problem = self.inference.problem
+        problem, effective = self.inference.problem, drawn.effective(weights)
         log_prob = problem.posterior.log_prior(theta)
         log_prob += problem.posterior.log_likelihood_of(every, theta).sum(axis=1)
         convergence = replace(
@@ -177,19 +209,30 @@ class Member:
         return inference, named_draws(inference, seed, every)
 
 
-def _normalised(log_weights: Floats) -> Floats:
-    shares = np.exp(log_weights - log_weights.max())
-    return np.asarray(shares / shares.sum())
+def _joint(given: GivenShared, log_reference: LogDensity) -> LogDensity:
+    """ln of the density of the own and the shared parameters, side by side, where the latter have the density r."""
+    n_own = given.own_columns.size
+
+    def log_density(x: Floats) -> Floats:
+        total = np.array(log_reference(x[:, n_own:]), dtype=np.float64)
+        inside = np.isfinite(total)
+        total[inside] += given.log_density(x[inside, :n_own], x[inside, n_own:])
+        return total
+
+    return log_density
 
 
-def _resampled(weights: Floats, n: int, rng: np.random.Generator) -> NDArray[np.intp]:
+def resampled(weights: Floats, n: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """Indices drawn by weight with the least scatter (systematic), in random order: (n,) array."""
     places = (np.arange(n) + rng.random()) / n
     picked = np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)
     return np.asarray(rng.permutation(picked), dtype=np.intp)
 
 
-def _quadratic(x: Floats) -> Floats:
-    """1, x_i and x_i x_j: (n, n_terms) array."""
-    first, second = np.triu_indices(x.shape[1])
-    return np.column_stack([np.ones(len(x)), x, x[:, first] * x[:, second]])
+def _moved(x: Floats, weights: Floats, aim: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Mean and covariance of draws whose last columns are brought to others, all being normal."""
+    mean, covariance = moments(x, weights)
+    shared = slice(x.shape[1] - aim[0].size, None)
+    slopes = covariance[:, shared] @ np.linalg.inv(covariance[shared, shared])
+    change = aim[1] - covariance[shared, shared]
+    return mean + slopes @ (aim[0] - mean[shared]), covariance + slopes @ change @ slopes.T

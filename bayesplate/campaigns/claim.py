@@ -103,10 +103,10 @@ def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> di
     for i, one in enumerate(left_out(together)):
         rng = np.random.default_rng([seed, _LINE, i])
         without = before[one.name]
-        _, draws, _ = learnt.members[i].under_all(together, learnt.marginals[i], rng, seed, is_left_out=True)
+        _, draws, _ = learnt.board(i, rng, seed, is_left_out=True)
         taught = values_of(together.shared, together.draws(rng, _N_DRAWS, (i,)))
         found[one.name] = TaughtBoard(
-            log_score_gain=one.log_score - log_evidence(without, rng),
+            log_score_gain=one.log_score - without.alone.log_evidence,
             before_rms_cents=rms_cents(without.inference, without.draws),
             after_rms_cents=rms_cents(learnt.members[i].inference, draws),
             p_value=one.p_value,
@@ -114,11 +114,6 @@ def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> di
             others={number.name: Spread.of(taught[number.name], number.unit) for number in together.shared},
         )
     return found
-
-
-def log_evidence(member: Member, rng: np.random.Generator) -> float:
-    """ln of the probability of a board's readings where nothing is shared: everything is its own."""
-    return float(member.marginal(np.zeros((1, 0)), rng).log_likelihood[0])
 
 
 def rms_cents(inference: Inference, draws: Draws) -> float:

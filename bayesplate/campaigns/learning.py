@@ -8,21 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.campaigns.boards import Member
-from bayesplate.campaigns.marginal import Marginal
-from bayesplate.campaigns.recovered import with_normal
-from bayesplate.campaigns.space import Pull, Space
+from bayesplate.campaigns.boards import Member, Sample
+from bayesplate.campaigns.likelihood import LogDensity, moments
 from bayesplate.campaigns.together import Together, walk
 from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings
 
 Floats = NDArray[np.float64]
 
-RIM = 1e-3
-"""Probability at the rim of the nodes' box above which it is laid out anew, where the posterior then is."""
+ASTRAY = 0.3
+"""Standard deviations of the shared parameters by which a board's draws may be off their likelihood."""
 _ROUNDS = 3
-_N_CHECKS = 12
-_LINE = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,36 +31,72 @@ class Learnt:
     Attributes
     ----------
     members : tuple of Member
-    marginals : tuple of Marginal
-        One per board.
+    samples : tuple of Sample
+        Of each board, where what all boards teach is among them.
     together : Together
     chains : Chains
         Of the standard coordinates of the shared parameters.
     convergence : Convergence
-    checked : (n_boards,) array
-        How far what is interpolated between the nodes is from what is computed, at points of the posterior, ln.
-    as_normal : tuple of str
-        Boards whose likelihood is taken as the normal one of their own draws.
     """
 
     members: tuple[Member, ...]
-    marginals: tuple[Marginal, ...]
+    samples: tuple[Sample, ...]
     together: Together
     chains: Chains
     convergence: Convergence
-    checked: Floats
-    as_normal: tuple[str, ...] = ()
 
     @property
-    def rim(self) -> float:
-        """The largest probability at the rim of the nodes' box, from all boards or all but one."""
-        return _rim(self.together)
+    def astray(self) -> Floats:
+        """How far each board's draws are off the likelihood that they gave: see `_astray`; (n_boards,) array."""
+        return np.array([_astray(self.together, i, one) for i, one in enumerate(self.samples)])
+
+    def board(
+        self, index: int, rng: np.random.Generator, seed: int, *, is_left_out: bool = False
+    ) -> tuple[Inference, Draws, float]:
+        """A board's posterior under what all boards, or all others, teach of the shared parameters.
+
+        Its draws, weighted by what the other boards say of theirs; where too few are left, it is walked anew.
+
+        Parameters
+        ----------
+        index : int
+            Of the board.
+        rng : numpy.random.Generator
+        seed : int
+            Of the predictive draws.
+        is_left_out : bool
+            Whether the others alone teach the shared parameters; its constants are its own in any case.
+
+        Returns
+        -------
+        inference : Inference
+        draws : Draws
+        effective : float
+            How many independent draws the result rests on.
+        """
+        together, member, drawn = self.together, self.members[index], self.samples[index]
+        own = together.likelihoods[index]
+
+        def log_reference(z: Floats) -> Floats:
+            others = together.log_density(z, (index,))
+            return np.asarray(others - own.at(z) if is_left_out else others)
+
+        weights = drawn.weights_under(log_reference)
+        if drawn.effective(weights) < FEWEST_WEIGHTED_DRAWS:
+            aim = together.moments((index,) if is_left_out else ())
+            drawn = member.anew(log_reference, drawn, aim, seed)
+            weights = drawn.weights
+        return *member.posterior_of(drawn, weights, rng, seed), drawn.effective(weights)
 
 
 def learn(
     members: Sequence[Member], settings: SamplerSettings, progress: Callable[[Progress], None] | None = None
 ) -> Learnt:
-    """Multiply the boards' marginal likelihoods and sample what they share.
+    """Multiply the boards' likelihoods of what they share and sample it.
+
+    A likelihood is first found from a board's own draws, then from the same draws weighted to be halfway to where all
+    boards together are: there it matters, and a polynomial of low order follows it the better. A board that has too few
+    draws there is walked anew.
 
     Parameters
     ----------
@@ -74,47 +109,33 @@ def learn(
     Learnt
         Its convergence is that of the shared parameters.
     """
-    pulls = tuple(member.pull for member in members)
-    space = Space.around(pulls)
+    samples = [member.alone for member in members]
+    found = [one.likelihood(drawn, one.log_prior) for one, drawn in zip(members, samples, strict=True)]
+    names, pulls = [one.name for one in members], [one.pull for one in members]
+    together = Together.of(members[0].shared, names, found, pulls)
     for _ in range(_ROUNDS):
-        marginals, together, as_normal = _at_nodes(members, pulls, space, settings.seed)
-        if _rim(together) < RIM:
-            break
-        every = [together.moments(without) for without in _leaving(together)]
-        space = Space.of_moments(*(list(part) for part in zip(*every, strict=True)))
-    chains, convergence = walk(together, settings, progress)
-    checked = _checked(members, together, chains, settings.seed)
-    checked[[one.name in as_normal for one in members]] = 0.0
-    return Learnt(tuple(members), marginals, together, chains, convergence, checked, as_normal)
+        for i, member in enumerate(members):
+            near = _halfway(together, i)
+            if samples[i].effective(samples[i].weights_under(near)) < FEWEST_WEIGHTED_DRAWS:
+                samples[i] = member.anew(near, samples[i], together.moments(), settings.seed)
+            found[i] = member.likelihood(samples[i], near)
+        together = Together.of(together.shared, names, found, pulls)
+    return Learnt(tuple(members), tuple(samples), together, *walk(together, settings, progress))
 
 
-def _at_nodes(
-    members: Sequence[Member], pulls: tuple[Pull, ...], space: Space, seed: int
-) -> tuple[tuple[Marginal, ...], Together, tuple[str, ...]]:
-    marginals = tuple(member.marginal(space.nodes, _random(seed, i)) for i, member in enumerate(members))
-    values = np.stack([one.log_likelihood for one in marginals])
-    together = Together(members[0].shared, space, tuple(one.name for one in members), values, pulls)
-    return marginals, *with_normal(together, members)
+def _halfway(together: Together, board: int) -> LogDensity:
+    """ln of a density between the prior and what all boards but one teach of the shared parameters."""
+    return lambda z: 0.5 * (together.log_prior(z) + together.log_density(z, (board,)))
 
 
-def _checked(members: Sequence[Member], together: Together, chains: Chains, seed: int) -> Floats:
-    """Root mean square of interpolated less computed, the constant that random numbers leave taken off: (n_boards,)."""
-    rng = np.random.default_rng([seed, _LINE, len(members)])
-    z = chains.pooled[rng.choice(len(chains.pooled), _N_CHECKS)]
-    interpolated = together.log_likelihoods(together.space.u(z))
-    computed = np.stack([one.marginal(z, _random(seed, i)).log_likelihood for i, one in enumerate(members)])
-    return np.asarray(np.std(interpolated - computed, axis=1))
+def _astray(together: Together, board: int, drawn: Sample) -> float:
+    """How far the draws of a board under what all teach are off what all teach.
 
-
-def _leaving(together: Together) -> list[tuple[int, ...]]:
-    """Nobody left out, then each board."""
-    return [(), *((i,) for i in range(len(together.names)))]
-
-
-def _rim(together: Together) -> float:
-    return max(together.rim(without) for without in _leaving(together))
-
-
-def _random(seed: int, member: int) -> np.random.Generator:
-    """A board's random numbers: the same for all nodes and every time."""
-    return np.random.default_rng([seed, _LINE, member])
+    The two are the same but for the polynomial that stands for the board's likelihood: the largest difference of a
+    mean, in standard deviations, less two of its standard errors.
+    """
+    mean, covariance = together.moments()
+    weights = drawn.weights_under(lambda z: together.log_density(z, (board,)))
+    own, _ = moments(drawn.z, weights)
+    off = np.abs(own - mean) / np.sqrt(np.diagonal(covariance))
+    return float(off.max() - 2.0 * drawn.effective(weights) ** -0.5)

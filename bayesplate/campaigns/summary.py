@@ -10,9 +10,9 @@ import numpy as np
 from bayesplate.campaigns.agreement import left_out, refusing
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.common import CommonResidual
-from bayesplate.campaigns.learning import RIM, Learnt
+from bayesplate.campaigns.learning import ASTRAY, Learnt
 from bayesplate.campaigns.population import Population
-from bayesplate.campaigns.together import values_of
+from bayesplate.campaigns.together import FEWEST_POINTS, values_of
 from bayesplate.effects.words import joined
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
@@ -20,8 +20,6 @@ from bayesplate.results.contract import Elastic, Spread
 from bayesplate.results.summary import SamplerHealth, Summary
 
 FORMAT = 1
-FAR_OFF = 0.1
-"""Standard deviation of interpolated less computed log likelihoods above which a summary warns."""
 _LINE = 16
 _N_DRAWS = 4000
 
@@ -171,8 +169,8 @@ def shared_numbers(learnt: Learnt, seed: int) -> dict[str, SharedNumber]:
 
 def _own(member: Member, rng: np.random.Generator) -> Mapping[str, np.ndarray]:
     """The shared numbers at draws of a board's own posterior, the campaign's prior in place of the board's."""
-    picked = rng.choice(len(member.z), size=_N_DRAWS, p=member.weights)
-    return values_of(member.shared, member.z[picked])
+    picked = rng.choice(len(member.alone.z), size=_N_DRAWS, p=member.alone.weights)
+    return values_of(member.shared, member.alone.z[picked])
 
 
 def left_out_boards(learnt: Learnt) -> dict[str, LeftOutBoard]:
@@ -219,21 +217,16 @@ def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[s
             f"{boards} {joined(refused)} {'does' if len(refused) == 1 else 'do'} not want what the others teach: "
             "one value for all is not what these boards say"
         )
-    if learnt.rim > RIM:
+    if learnt.together.fewest_points < FEWEST_POINTS:
         told.append(
-            f"{100.0 * learnt.rim:.1f} % of what some of the boards find likely lies at the rim of the nodes at which "
-            "the boards were asked: the shared intervals may be too short"
+            f"what all boards, or all but one, find likely rests on {learnt.together.fewest_points:.0f} points only: "
+            "the shared intervals are rough"
         )
-    if learnt.as_normal:
+    astray = [name for name, off in zip(learnt.together.names, learnt.astray, strict=True) if off > ASTRAY]
+    if astray:
         told.append(
-            f"the likelihood of the shared numbers is taken as normal for {joined(learnt.as_normal)}: draws about the "
-            "nodes did not give back the board's own posterior"
-        )
-    worst = int(np.argmax(learnt.checked))
-    if learnt.checked[worst] > FAR_OFF:
-        told.append(
-            f"between the nodes the log likelihood of board {learnt.together.names[worst]} is off by "
-            f"{learnt.checked[worst]:.2f}"
+            f"what {joined(astray)} {'says' if len(astray) == 1 else 'say'} of the shared numbers is no polynomial of "
+            f"low order in them: the shared means may be off by {max(learnt.astray):.1f} standard deviations"
         )
     poor = [name for name, one in effective.items() if one < FEWEST_WEIGHTED_DRAWS]
     if poor:

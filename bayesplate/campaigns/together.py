@@ -1,27 +1,30 @@
-"""The boards' marginal likelihoods multiplied: what all of them, or all but one, say of the shared parameters."""
+"""The boards' likelihoods multiplied: what all of them, or all but some, say of the shared parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.campaigns.likelihood import SharedLikelihood, moments, spread_points
+from bayesplate.campaigns.pulls import Pull, normal_posterior
 from bayesplate.campaigns.shared import Shared
-from bayesplate.campaigns.space import Pull, Space
-from bayesplate.diagnosis.evidence.terms import log_sum
+from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.reweighting import effective_draws
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 
 Floats = NDArray[np.float64]
 
-_EXCLUDED = 60.0
-"""How far below a board's lowest finite node an excluded one is taken to be, so that it can be interpolated."""
-_DEEPEST = 2000.0
-"""Log likelihoods that far below a board's highest are all the same: nothing comes from there, and splines ring."""
+FEWEST_POINTS = 500
+"""Points of equal weight that what all boards, or all but one, find likely has to rest on."""
+_N_POINTS = {1: 2**12, 2: 2**14, 3: 2**15}
+_WIDER = 1.6
+"""Than the posteriors from all boards and from all but each: the points at which densities are summed."""
+_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,88 +34,91 @@ class Together:
     Attributes
     ----------
     shared : tuple of Shared
-    space : Space
     names : tuple of str
         Of the boards.
-    at_nodes : (n_boards, n_nodes) array
-        ln of each board's marginal likelihood.
+    likelihoods : tuple of SharedLikelihood
+        One per board.
     pulls : tuple of Pull
         What each board says by itself, as a normal likelihood.
+    points : (n_points, n_shared) array
+        Standard coordinates at which densities are summed.
+    log_spread : (n_points,) array
+        ln of the density of these points.
     """
 
     shared: tuple[Shared, ...]
-    space: Space
     names: tuple[str, ...]
-    at_nodes: Floats
+    likelihoods: tuple[SharedLikelihood, ...]
     pulls: tuple[Pull, ...]
+    points: Floats
+    log_spread: Floats
 
-    @cached_property
-    def _splines(self) -> list[Any]:
-        from scipy.interpolate import RegularGridInterpolator
-
-        axes = (self.space.axis,) * self.space.n_shared
-        shape = tuple(axis.size for axis in axes)
-        return [
-            RegularGridInterpolator(axes, _finite(values).reshape(shape), method="cubic", bounds_error=False)
-            for values in self.at_nodes
-        ]
-
-    def log_likelihoods(self, u: Floats) -> Floats:
-        """ln of each board's marginal likelihood at places of the box: (n_boards, n) array; -inf outside the box."""
-        found = np.stack([spline(u) for spline in self._splines])
-        found[:, ~self.space.is_inside(u)] = -np.inf
+    @classmethod
+    def of(
+        cls,
+        shared: Sequence[Shared],
+        names: Sequence[str],
+        likelihoods: Sequence[SharedLikelihood],
+        pulls: Sequence[Pull],
+    ) -> Together:
+        """Boards together, their points around all that they, or all but one of them, find likely."""
+        spread = _around([normal_posterior([pulls[i] for i in kept]) for kept in _leaving_one(len(pulls))])
+        found = cls(tuple(shared), tuple(names), tuple(likelihoods), tuple(pulls), *spread)
+        for _ in range(_ROUNDS):
+            if found.fewest_points >= FEWEST_POINTS:
+                break
+            points, log_spread = _around([found.moments(without) for without in found.left_out])
+            found = replace(found, points=points, log_spread=log_spread)
         return found
 
-    def log_prior(self, u: Floats) -> Floats:
+    @property
+    def left_out(self) -> list[tuple[int, ...]]:
+        """No board, then each of them."""
+        return [(), *((i,) for i in range(len(self.names)))]
+
+    def log_likelihoods(self, z: Floats) -> Floats:
+        """ln of each board's likelihood at standard coordinates: (n_boards, n) array."""
+        return np.stack([one.at(z) for one in self.likelihoods])
+
+    def log_prior(self, z: Floats) -> Floats:
         """ln of the prior density of the standard coordinates: (n,) array."""
-        z = self.space.z(u)
         return np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(self.shared)], axis=0)
 
-    @cached_property
-    def _fine(self) -> tuple[Floats, Floats]:
-        """ln likelihood of each board, and ln prior, at the fine places."""
-        return self.log_likelihoods(self.space.fine), self.log_prior(self.space.fine)
+    def log_density(self, z: Floats, without: Collection[int] = ()) -> Floats:
+        """ln of the posterior density from all boards but some, not normalised: (n,) array."""
+        kept = [one for i, one in enumerate(self.likelihoods) if i not in without]
+        return np.asarray(self.log_prior(z) + np.sum([one.at(z) for one in kept], axis=0))
 
     def log_evidence(self, without: Collection[int] = ()) -> float:
         """ln of the probability of the readings of all boards but some."""
-        return float(log_sum(self._log_density(without)) + self.space.log_cell)
+        return float(log_sum(self._log_weights(without)) - np.log(len(self.points)))
 
     def weights(self, without: Collection[int] = ()) -> Floats:
-        """Posterior probability of each fine place from all boards but some: (n_fine,) array that sums to 1."""
-        log_density = self._log_density(without)
-        shares = np.exp(log_density - log_density.max())
-        return np.asarray(shares / shares.sum())
+        """Posterior weight of each point from all boards but some: (n_points,) array that sums to 1."""
+        return normalised(self._log_weights(without))
 
     def moments(self, without: Collection[int] = ()) -> tuple[Floats, Floats]:
         """Mean and covariance of the standard coordinates from all boards but some."""
-        z, weights = self.space.z(self.space.fine), self.weights(without)
-        mean = weights @ z
-        return mean, (weights[:, None] * (z - mean)).T @ (z - mean)
+        return moments(self.points, self.weights(without))
 
-    def rim(self, without: Collection[int] = ()) -> float:
-        """Posterior probability of the outermost shell of the box: what lies beyond it is left out."""
-        outer = np.abs(self.space.fine).max(axis=1) > 0.97 * self.space.axis[-1]
-        return float(self.weights(without)[outer].sum())
+    @cached_property
+    def fewest_points(self) -> float:
+        """Points of equal weight that the sums rest on, from all boards or all but one."""
+        return min(effective_draws(self.weights(without)) for without in self.left_out)
 
     def draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
         """Standard coordinates drawn from the posterior of all boards but some: (n, n_shared) array."""
-        picked = rng.choice(len(self.space.fine), size=n, p=self.weights(without))
-        step = 2.0 * self.space.axis[-1] / (round(len(self.space.fine) ** (1.0 / self.space.n_shared)) - 1)
-        within = rng.uniform(-0.5 * step, 0.5 * step, (n, self.space.n_shared))
-        return self.space.z(np.clip(self.space.fine[picked] + within, -self.space.axis[-1], self.space.axis[-1]))
+        return self.points[rng.choice(len(self.points), size=n, p=self.weights(without))]
 
-    def _log_density(self, without: Collection[int]) -> Floats:
-        boards, prior = self._fine
+    @cached_property
+    def _at_points(self) -> tuple[Floats, Floats]:
+        """ln likelihood of each board, and ln of the prior over the points' own density."""
+        return self.log_likelihoods(self.points), self.log_prior(self.points) - self.log_spread
+
+    def _log_weights(self, without: Collection[int]) -> Floats:
+        boards, prior = self._at_points
         kept = [i for i in range(len(boards)) if i not in without]
         return np.asarray(boards[kept].sum(axis=0) + prior)
-
-    def log_posterior(self, u: Floats) -> Floats:
-        """ln of the posterior density from all boards, but for a constant: (n,) array."""
-        inside = self.space.is_inside(u)
-        total = np.full(len(u), -np.inf)
-        if inside.any():
-            total[inside] = self.log_likelihoods(u[inside]).sum(axis=0) + self.log_prior(u[inside])
-        return total
 
 
 def walk(
@@ -126,20 +132,8 @@ def walk(
         Of standard coordinates.
     convergence : Convergence
     """
-    space = together.space
-    mean, covariance = together.moments()
-    inverse = np.linalg.inv(space.factor)
-    chains, convergence = sample(
-        together.log_posterior,
-        space.u(mean[None, :])[0],
-        inverse @ covariance @ inverse.T,
-        settings,
-        names=[one.name for one in together.shared],
-        progress=progress,
-    )
-    shape = chains.draws.shape
-    z = space.z(chains.draws.reshape(-1, shape[-1])).reshape(shape)
-    return Chains(z, chains.log_prob, chains.burn_in), convergence
+    names = [one.name for one in together.shared]
+    return sample(together.log_density, *together.moments(), settings, names=names, progress=progress)
 
 
 def values_of(shared: Sequence[Shared], z: Floats) -> dict[str, Floats]:
@@ -147,9 +141,23 @@ def values_of(shared: Sequence[Shared], z: Floats) -> dict[str, Floats]:
     return {one.name: np.asarray(one.prior.value(z[..., i])) for i, one in enumerate(shared)}
 
 
-def _finite(values: Floats) -> Floats:
-    finite = np.isfinite(values)
-    if not finite.any():
-        return np.zeros_like(values)
-    lowest, highest = values[finite].min(), values[finite].max()
-    return np.maximum(np.where(finite, values, lowest - _EXCLUDED), highest - _DEEPEST)
+def _leaving_one(n: int) -> Iterator[list[int]]:
+    """All of n boards, then all but each; a single board is left in."""
+    yield list(range(n))
+    for left in range(n if n > 1 else 0):
+        yield [i for i in range(n) if i != left]
+
+
+def _around(every: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    """Points around several normal distributions, and ln of their density.
+
+    One that stands apart from many is not averaged away: each direction is as wide as the widest of them.
+    """
+    means, covariances = [np.array(part) for part in zip(*every, strict=True)]
+    middle = means.mean(axis=0)
+    apart = (means - middle)[:, :, None] * (means - middle)[:, None, :]
+    spread = (covariances + apart).mean(axis=0)
+    widest = np.diagonal(covariances + apart, axis1=1, axis2=2).max(axis=0)
+    grow = np.clip(np.sqrt(widest / np.diagonal(spread)), 1.0, 2.0)
+    factor = np.asarray(_WIDER * np.linalg.cholesky(spread * np.outer(grow, grow)))
+    return spread_points(middle, factor, _N_POINTS[middle.size])

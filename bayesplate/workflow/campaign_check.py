@@ -6,7 +6,8 @@ import numpy as np
 
 from bayesplate.campaigns.checking import CampaignCheck, CheckedShared
 from bayesplate.campaigns.given import GivenShared
-from bayesplate.campaigns.space import Pull
+from bayesplate.campaigns.pulls import Pull
+from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.workflow.campaign import Campaign
 from bayesplate.workflow.check import check_board
@@ -56,5 +57,4 @@ def _pull(posed: PosedProblem, campaign: Campaign) -> Pull:
     given = GivenShared(posed.posterior, campaign.shared)
     z, log_weights = given.z_of(theta), given.log_reweighting(theta)
     kept = np.isfinite(z).all(axis=1) & np.isfinite(log_weights)
-    weights = np.exp(log_weights[kept] - log_weights[kept].max())
-    return Pull.of_draws(z[kept], weights)
+    return Pull.of_draws(z[kept], normalised(log_weights[kept]))

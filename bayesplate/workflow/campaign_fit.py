@@ -158,9 +158,9 @@ def _together(
     if not learnt.convergence.passed:
         _refuse("what the boards share", learnt.convergence)
     boards, effective = {}, {}
-    for i, (member, marginal) in enumerate(zip(learnt.members, learnt.marginals, strict=True)):
+    for i, member in enumerate(learnt.members):
         rng = np.random.default_rng([seed, _BOARD_LINE, i])
-        inference, draws, effective[member.name] = member.under_all(learnt.together, marginal, rng, seed)
+        inference, draws, effective[member.name] = learnt.board(i, rng, seed)
         before = alone[member.name]
         assessment = assess(inference, draws)
         sha256 = before.problem.prepared.card.sha256

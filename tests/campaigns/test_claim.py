@@ -30,7 +30,7 @@ def claimed(seed, size, without=()):
     refused = refusing(together)
     taught = {}
     for one, each in zip(left_out(together), boards, strict=True):
-        alone = float(each.log_likelihood(np.zeros((1, 1)))[0])
+        alone = float(each.at(np.zeros((1, 1)))[0])
         taught[one.name] = TaughtBoard(one.log_score - alone, 0.0, 0.0, one.p_value, one.name in refused, {})
     return judge(taught).holds
 

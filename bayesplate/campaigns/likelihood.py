@@ -1,0 +1,184 @@
+"""A board's likelihood of what is shared, everything of its own integrated out, from draws of its own posterior.
+
+Draws of the shared parameters z from a density proportional to r(z) L(z), r being known, tell L without any integral:
+its logarithm is a polynomial, and the one of greatest likelihood is that under which z has the moments of the draws.
+The polynomial is written in products of Hermite polynomials of the whitened z, which are nearly orthonormal where the
+draws are, and the few terms of higher order are drawn towards zero.
+
+References
+----------
+A. R. Barron and C.-H. Sheu, Approximation of density functions by sequences of exponential families, Annals of
+Statistics 19 (1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.evidence.terms import log_sum
+
+Floats = NDArray[np.float64]
+LogDensity = Callable[[Floats], Floats]
+"""From (n, n_shared) standard coordinates to (n,) logarithms of a density."""
+
+_HIGHEST = 4
+_DRAWS_PER_TERM = 20
+"""Effective draws for each term of an order that is to be used."""
+_REACH = 3.5
+"""Standard deviations of the draws beyond which terms of third and fourth order go on level."""
+_SIZE = 0.3
+"""Standard deviation of the coefficients of terms of third and fourth order, before any draw."""
+_N_POINTS = 8192
+_WIDER = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class SharedLikelihood:
+    """ln L of one board as a function of the shared parameters.
+
+    Attributes
+    ----------
+    centre : (n_shared,) array
+        Mean of the standard coordinates of the draws that it was found from.
+    whitening : (n_shared, n_shared) array
+        Takes coordinates less the centre to coordinates of unit spread.
+    coefficients : (n_terms,) array
+        Of the terms of first, second, ... order.
+    level : float
+    """
+
+    centre: Floats
+    whitening: Floats
+    coefficients: Floats
+    level: float = 0.0
+
+    @classmethod
+    def found(
+        cls, z: Floats, weights: Floats, n_effective: float, log_reference: LogDensity, log_evidence: float
+    ) -> SharedLikelihood:
+        """From draws of a density proportional to r(z) L(z).
+
+        Parameters
+        ----------
+        z : (n, n_shared) array
+            Standard coordinates of the draws.
+        weights : (n,) array
+            Of the draws; they sum to 1.
+        n_effective : float
+            How many independent draws of equal weight they are worth.
+        log_reference : callable
+            ln r, -inf where it is zero.
+        log_evidence : float
+            ln of the integral of r(z) L(z).
+        """
+        centre, covariance = moments(z, weights)
+        factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+        whitening = np.asarray(np.linalg.inv(factor).T, dtype=np.float64)
+        bare = cls(centre, whitening, np.zeros(0))
+        degree = _degree(z.shape[1], n_effective)
+        points, log_density = spread_points(centre, _WIDER * factor, _N_POINTS)
+        log_weights = log_reference(points) - log_density - np.log(len(points))
+        there, wanted = bare._terms(points, degree), weights @ bare._terms(z, degree)
+        firmness = np.where(_orders(z.shape[1], degree) > 2, _SIZE**-2.0 / n_effective, 0.0)
+        coefficients = _with_moments(there, log_weights, wanted, firmness)
+        level = log_evidence - float(log_sum(log_weights + there @ coefficients))
+        return replace(bare, coefficients=coefficients, level=level)
+
+    @property
+    def degree(self) -> int:
+        """Highest order of its terms."""
+        n = self.centre.size
+        return next(d for d in range(2, _HIGHEST + 1) if _orders(n, d).size == self.coefficients.size)
+
+    def at(self, z: Floats) -> Floats:
+        """ln L at standard coordinates: (n,) array from (n, n_shared)."""
+        return np.asarray(self.level + self._terms(z, self.degree) @ self.coefficients)
+
+    def _terms(self, z: Floats, degree: int) -> Floats:
+        """Products of normalised Hermite polynomials by order: (n, n_terms) array."""
+        u = (z - self.centre) @ self.whitening
+        near, n = np.clip(u, -_REACH, _REACH), u.shape[1]
+        columns = [np.prod(_hermite(u if order <= 2 else near, powers), axis=1) for order, powers in _powers(n, degree)]
+        return np.column_stack(columns)
+
+
+def moments(z: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Mean and covariance of weighted draws: (k,) and (k, k) arrays."""
+    mean = weights @ z
+    away = z - mean
+    return mean, (weights[:, None] * away).T @ away
+
+
+def spread_points(centre: Floats, factor: Floats, n_points: int) -> tuple[Floats, Floats]:
+    """Evenly spread points of a normal distribution, by Sobol's sequence, and ln of its density there.
+
+    Parameters
+    ----------
+    centre : (k,) array
+    factor : (k, k) array
+        Of its covariance.
+    n_points : int
+        A power of two.
+    """
+    from scipy.special import ndtri
+    from scipy.stats.qmc import Sobol
+
+    k = centre.size
+    normal = ndtri(np.clip(Sobol(k, seed=0).random(n_points), 1e-9, 1.0 - 1e-9))
+    log_density = -0.5 * (normal**2).sum(axis=1) - 0.5 * k * np.log(2.0 * np.pi) - np.linalg.slogdet(factor)[1]
+    return centre + normal @ factor.T, log_density
+
+
+def _with_moments(terms: Floats, log_weights: Floats, wanted: Floats, firmness: Floats) -> Floats:
+    """Coefficients of the exponential family that has wanted means of its terms: a convex problem."""
+    from scipy.optimize import minimize
+
+    def shares(c: Floats) -> Floats:
+        log_shares = log_weights + terms @ c
+        return np.asarray(np.exp(log_shares - log_sum(log_shares)))
+
+    def lack(c: Floats) -> tuple[float, Floats]:
+        value = float(log_sum(log_weights + terms @ c) - wanted @ c + 0.5 * firmness @ c**2)
+        return value, shares(c) @ terms - wanted + firmness * c
+
+    def curvature(c: Floats) -> Floats:
+        _, covariance = moments(terms, shares(c))
+        return covariance + np.diag(firmness)
+
+    found = minimize(lack, np.zeros(wanted.size), jac=True, hess=curvature, method="trust-exact")
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def _degree(n_shared: int, n_effective: float) -> int:
+    able = [d for d in range(2, _HIGHEST + 1) if _DRAWS_PER_TERM * _orders(n_shared, d).size <= n_effective]
+    return max(able, default=2)
+
+
+def _powers(n_shared: int, degree: int) -> list[tuple[int, tuple[int, ...]]]:
+    """Order of each term, and the power of each coordinate in it."""
+    found = []
+    for order in range(1, degree + 1):
+        for factors in combinations_with_replacement(range(n_shared), order):
+            found.append((order, tuple(factors.count(i) for i in range(n_shared))))
+    return found
+
+
+def _orders(n_shared: int, degree: int) -> NDArray[np.intp]:
+    return np.array([order for order, _ in _powers(n_shared, degree)], dtype=np.intp)
+
+
+def _hermite(u: Floats, powers: tuple[int, ...]) -> Floats:
+    """Normalised Hermite polynomials, one per coordinate: (n, k) array."""
+    polynomials = (
+        np.ones_like,
+        lambda x: x,
+        lambda x: (x**2 - 1.0) / np.sqrt(2.0),
+        lambda x: (x**3 - 3.0 * x) / np.sqrt(6.0),
+        lambda x: (x**4 - 6.0 * x**2 + 3.0) / np.sqrt(24.0),
+    )
+    return np.column_stack([polynomials[power](u[:, i]) for i, power in enumerate(powers)])

@@ -1,0 +1,53 @@
+"""What a board says of the shared parameters by itself, as a normal likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.campaigns.likelihood import moments
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """What a board's likelihood of the shared parameters amounts to as a normal one: exp(h'z - z'Pz / 2).
+
+    Attributes
+    ----------
+    precision : (n_shared, n_shared) array
+        P, positive semi-definite.
+    lean : (n_shared,) array
+        h = P times where it is highest.
+    """
+
+    precision: Floats
+    lean: Floats
+
+    @classmethod
+    def of_draws(cls, z: Floats, weights: Floats) -> Pull:
+        """From draws of the board's own posterior, whose prior of z is standard normal.
+
+        A posterior that is wider than the prior in a direction says nothing there.
+
+        Parameters
+        ----------
+        z : (n, n_shared) array
+        weights : (n,) array
+            They sum to 1.
+        """
+        mean, covariance = moments(z, weights)
+        after = np.linalg.inv(covariance)
+        gained, directions = np.linalg.eigh(after - np.eye(mean.size))
+        told = (directions * np.maximum(gained, 0.0)) @ directions.T
+        return cls(told, (directions * (gained > 0.0)) @ directions.T @ after @ mean)
+
+
+def normal_posterior(pulls: Sequence[Pull]) -> tuple[Floats, Floats]:
+    """Mean and covariance of z from several boards, its prior being standard normal."""
+    covariance = np.linalg.inv(np.eye(pulls[0].lean.size) + np.sum([one.precision for one in pulls], axis=0))
+    return covariance @ np.sum([one.lean for one in pulls], axis=0), covariance

@@ -1,0 +1,88 @@
+"""Likelihoods of what is shared from nothing but draws, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_boards import linear_boards
+from scipy import stats
+
+from bayesplate.campaigns.evidence import bridge_sampling
+from bayesplate.campaigns.likelihood import SharedLikelihood
+
+N = 6000
+Z_TRUE = [1.2, -0.7, 0.4]
+
+
+def log_standard_normal(z):
+    return stats.norm.logpdf(z).sum(axis=1)
+
+
+def found_from(board, rng, n_shared):
+    _, z = board.draws(rng, N)
+    return SharedLikelihood.found(z, np.full(N, 1 / N), N, log_standard_normal, 0.0), z
+
+
+@pytest.mark.parametrize("n_shared", [1, 2, 3])
+def test_the_likelihood_of_a_linear_board_is_the_closed_form(n_shared):
+    """Up to a level, where its draws are: each coefficient errs by the root of one over the number of draws."""
+    rng = np.random.default_rng(n_shared)
+    (board,) = linear_boards(rng, 1, n_shared, Z_TRUE[:n_shared])
+    found, z = found_from(board, rng, n_shared)
+
+    off = found.at(z) - board.at(z)
+    assert found.degree == 4
+    assert off.std() < 2.0 * np.sqrt(found.coefficients.size / N)
+
+
+def test_the_tolerance_tells_two_boards_apart():
+    """The negative control."""
+    rng = np.random.default_rng(3)
+    one, other = linear_boards(rng, 2, 3, Z_TRUE)
+    found, z = found_from(one, rng, 3)
+
+    assert (found.at(z) - other.at(z)).std() > 2.0 * np.sqrt(found.coefficients.size / N)
+
+
+def test_a_prior_with_an_edge_and_a_likelihood_that_leans():
+    """A mass cannot be negative: half-normal prior, and a likelihood that falls faster on one side."""
+    rng = np.random.default_rng(5)
+    grid = np.linspace(0.0, 6.0, 6001)
+
+    def log_likelihood(z):
+        return -0.5 * ((z - 0.6) / 0.7) ** 2 - 0.15 * (z - 0.6) ** 3
+
+    def log_reference(z):
+        return np.where(z[:, 0] >= 0.0, stats.halfnorm.logpdf(z[:, 0]), -np.inf)
+
+    shares = np.exp(log_reference(grid[:, None]) + log_likelihood(grid))
+    z = np.interp(rng.random(20_000), np.cumsum(shares) / shares.sum(), grid)[:, None]
+    exact = np.log(np.trapezoid(shares, grid))
+    found = SharedLikelihood.found(z, np.full(len(z), 1 / len(z)), len(z), log_reference, exact)
+
+    where = np.linspace(0.0, np.quantile(z, 0.999), 26)
+    assert np.abs(found.at(where[:, None]) - log_likelihood(where)).max() < 0.1
+
+
+@pytest.mark.parametrize("n_effective", [30, 300, 3000])
+def test_few_draws_give_few_terms(n_effective):
+    rng = np.random.default_rng(6)
+    z = rng.standard_normal((n_effective, 3))
+    found = SharedLikelihood.found(z, np.full(len(z), 1 / len(z)), n_effective, log_standard_normal, 0.0)
+
+    assert found.degree == {30: 2, 300: 2, 3000: 4}[n_effective]
+
+
+def test_the_evidence_of_a_linear_board_is_the_closed_form():
+    rng = np.random.default_rng(7)
+    (board,) = linear_boards(rng, 1, 2, Z_TRUE[:2])
+    own, z = board.draws(rng, N)
+
+    def log_density(x):
+        return board.log_density(x[:, :-2], x[:, -2:]) + log_standard_normal(x[:, -2:])
+
+    exact = stats.multivariate_normal(cov=board.covariance + board.shared @ board.shared.T).logpdf(board.readings)
+    assert bridge_sampling(log_density, np.column_stack([own, z]), rng) == pytest.approx(exact, abs=0.05)
+    assert (
+        abs(bridge_sampling(log_density, np.column_stack([own, z + 0.5]), rng) - exact) > 0.05
+    )  # draws from elsewhere
