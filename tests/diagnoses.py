@@ -14,6 +14,7 @@ from bayesplate.diagnosis.wording.diagnosis import (
     Errors,
     Explanation,
     Finalist,
+    Histogram,
     NullControlSummary,
     PValues,
 )
@@ -21,6 +22,8 @@ from bayesplate.diagnosis.wording.known import KnownModel
 from bayesplate.effects import EFFECTS
 from bayesplate.results.contract import Spread
 
+NULL_ODDS = Histogram(edges=(-6.0, -3.0, 0.0, 3.0, 6.0), counts=(200, 250, 40, 10))
+NULL_RATIOS = Histogram(edges=(0.5, 0.75, 1.0, 1.25), counts=(25, 300, 175))
 BEFORE = Errors(
     in_sample_rms_cents=21.25,
     leave_one_out_rms_cents=46.5,
@@ -154,7 +157,15 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         after=after or BEFORE,
         gain_null_percentile=99.0 if after else 40.0,
         null_control=NullControlSummary(
-            n_sets=500, flagged_percent=2.0, nested_ratio=0.25, nested_ratio_to_beat=0.75, nested_ratio_percentile=99.0
+            n_sets=500,
+            flagged_percent=2.0,
+            log_odds=None if word == "undetectable" else 4.5 if after else -1.0,
+            log_odds_needed=3.0,
+            log_odds_of_sets=NULL_ODDS,
+            nested_ratio=None if word == "undetectable" else 0.25,
+            nested_ratio_to_beat=0.75,
+            nested_ratio_percentile=99.0,
+            nested_ratio_of_sets=NULL_RATIOS,
         ),
         elastic_shift=SHIFT if after else still,
         finalists=(finalist,) if after else (),

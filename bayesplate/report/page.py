@@ -28,6 +28,7 @@ from bayesplate.report.board import board_picture
 from bayesplate.report.constants import constants_picture
 from bayesplate.report.fitted_modes import fitted_modes_picture
 from bayesplate.report.health import health_picture
+from bayesplate.report.null_control import null_picture
 from bayesplate.report.pairs import pairs_picture
 from bayesplate.report.percentiles import percentiles_picture
 from bayesplate.report.priors import priors_picture
@@ -155,8 +156,8 @@ def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Pict
     if diagnosis is None:
         return [], []
     before_after = before_after_picture(diagnosis)
-    signatures = signatures_picture(diagnosis)
-    return [before_after] if before_after else [], [signatures] if signatures else []
+    more = [null_picture(diagnosis), signatures_picture(diagnosis)]
+    return [before_after] if before_after else [], [one for one in more if one]
 
 
 def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:

@@ -139,6 +139,15 @@ class DiagnosePlots(FitPlots):
             raise InputError(Fault("plot.signatures", "a diagnosis with candidates", "one without"))
         return found.figure
 
+    def null_control(self) -> Figure:
+        """Where the board stands among simulated boards that lack nothing."""
+        from bayesplate.report.null_control import null_picture
+
+        found = null_picture(self.diagnosis)
+        if found is None:
+            raise InputError(Fault("plot.null_control", "readings by which something can be judged", "too few"))
+        return found.figure
+
     def before_after(self) -> Figure:
         """The error before and after, and what the effect does to the constants."""
         from bayesplate.report.signatures import before_after_picture

@@ -126,6 +126,15 @@ def test_before_and_after_are_the_diagnosis_own(drawn):
     np.testing.assert_array_equal(shifts.lines[0].get_xdata(), [2.5, -1.25, 0.0])
 
 
+def test_the_board_stands_among_simulated_ones(drawn):
+    odds, ratios = drawn["null-control"].figure.axes
+
+    assert [line.get_xdata()[0] for line in odds.lines] == [4.5, 3.0]
+    assert [line.get_xdata()[0] for line in ratios.lines] == [0.25, 0.75]
+    assert {text.get_text() for text in odds.texts} == {"needed beyond"}
+    assert [text.get_text() for text in odds.get_xticklabels()] == ["1 : 100", "1 : 10", "1 : 1", "10 : 1", "100 : 1"]
+
+
 def test_the_expected_readings_have_a_bar_where_all_round_to_one(clamped):
     """A model that always expects the reading itself: both bars reach as far as rounding hides, by the summary."""
     modes = clamped.summary.modes

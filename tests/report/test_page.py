@@ -309,8 +309,9 @@ def test_a_diagnosis_brings_its_figures_and_tables(clamped, tmp_path, request):
     added = {name: {path.stem for path in (tmp_path / name / "figures").iterdir()} - set(FIGURES)
              for name in ("named", "none", "hidden")}  # fmt: skip
 
-    assert added == {"named": {"before-after", "signatures"}, "none": {"signatures"}, "hidden": set()}
-    assert len(named.all("img")) == len(FIGURES) + 2
+    always = {"null-control", "signatures"}
+    assert added == {"named": {"before-after", *always}, "none": always, "hidden": set()}
+    assert len(named.all("img")) == len(FIGURES) + 3
     assert (tmp_path / "named" / "before-after.csv").exists()
     assert (tmp_path / "named" / "known-effects.csv").exists()
     assert not (tmp_path / "none" / "known-effects.csv").exists()

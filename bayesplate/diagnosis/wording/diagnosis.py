@@ -49,6 +49,20 @@ class PValues:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Histogram:
+    """Numbers of simulated sets by a value.
+
+    Attributes
+    ----------
+    edges : (n_bins + 1,) tuple of float
+    counts : (n_bins,) tuple of int
+    """
+
+    edges: tuple[float, ...]
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class NullControlSummary:
     """What the same search makes of simulated readings without any effect.
 
@@ -57,18 +71,27 @@ class NullControlSummary:
     n_sets : int
     flagged_percent : float
         Share of the sets in which an effect would be called needed.
+    log_odds, log_odds_needed : float or None
+        ln odds of these readings that something is lacking, and those above which an effect is needed.
+    log_odds_of_sets : Histogram or None
+        None where nothing could be lacking.
     nested_ratio, nested_ratio_to_beat : float or None
         Nested error after over before of these readings, and what 95 of 100 sets stay above that are made to choose
         their most probable effect.
     nested_ratio_percentile : float or None
         Share of the sets with a larger ratio than these readings, percent.
+    nested_ratio_of_sets : Histogram or None
     """
 
     n_sets: int
     flagged_percent: float
+    log_odds: float | None
+    log_odds_needed: float
+    log_odds_of_sets: Histogram | None
     nested_ratio: float | None
     nested_ratio_to_beat: float | None
     nested_ratio_percentile: float | None
+    nested_ratio_of_sets: Histogram | None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,6 +24,7 @@ from bayesplate.diagnosis.wording.diagnosis import (
     Errors,
     Explanation,
     Finalist,
+    Histogram,
     NullControlSummary,
     PValues,
 )
@@ -42,6 +43,7 @@ Floats = NDArray[np.float64]
 
 _AVERAGE_LINE = 11
 _N_AVERAGED = 8000
+_N_BINS = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,13 +169,26 @@ def _errors(case: Case, side: Side) -> Errors:
 
 def _null_control(case: Case) -> NullControlSummary:
     ratio = None if case.folded is None else float(case.folded.ratio[0])
+    control, found = case.control, case.found
     return NullControlSummary(
-        n_sets=int(case.control.against.size),
-        flagged_percent=100.0 * case.control.flagged,
+        n_sets=int(control.against.size),
+        flagged_percent=100.0 * control.flagged,
+        log_odds=found.against_none if found.ground.n_directions else None,
+        log_odds_needed=control.needed_from,
+        log_odds_of_sets=_histogram(control.against),
         nested_ratio=ratio,
-        nested_ratio_to_beat=case.control.ratio_to_beat,
-        nested_ratio_percentile=None if ratio is None else case.control.place_of(ratio),
+        nested_ratio_to_beat=control.ratio_to_beat,
+        nested_ratio_percentile=None if ratio is None else control.place_of(ratio),
+        nested_ratio_of_sets=_histogram(np.array([np.nan]) if control.ratio is None else control.ratio),
     )
+
+
+def _histogram(values: Floats) -> Histogram | None:
+    """None where there is nothing to count: without hypotheses no set has odds."""
+    if not np.isfinite(values).all():
+        return None
+    counts, edges = np.histogram(values, bins=_N_BINS)
+    return Histogram(edges=tuple(float(edge) for edge in edges), counts=tuple(int(count) for count in counts))
 
 
 def _elastic_shift(case: Case) -> dict[str, ElasticShift]:

@@ -75,9 +75,13 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert list(content["null_control"]) == [
         "n_sets",
         "flagged_percent",
+        "log_odds",
+        "log_odds_needed",
+        "log_odds_of_sets",
         "nested_ratio",
         "nested_ratio_to_beat",
         "nested_ratio_percentile",
+        "nested_ratio_of_sets",
     ]
     assert list(content["elastic_shift"]["E_x"]) == ["before", "after", "shift_in_sd"]
     spread = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]

@@ -1,0 +1,84 @@
+"""The figure of the null control: where the board stands among simulated boards that lack nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Histogram, NullControlSummary
+from bayesplate.report.style import BLUE, DARK, LIGHT, SMALL, VERMILLION, Picture, legend_below, stacked
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_HEIGHT = 1.15
+
+
+@dataclass(frozen=True)
+class _Row:
+    """What simulated boards gave, what this one gives, and the limit between."""
+
+    sets: Histogram
+    board: float
+    limit: float
+    words: str
+    axis: str
+
+
+def null_picture(diagnosis: Diagnosis) -> Picture | None:
+    """The odds that something is lacking and the error with what is chosen, on simulated boards and on this one."""
+    rows = _rows(diagnosis.null_control)
+    if not rows:
+        return None
+    figure, panels = stacked([_HEIGHT] * len(rows), bottom=0.85)
+    for panel, row in zip(panels, rows, strict=True):
+        _draw(panel, row)
+    _as_odds(panels[0])
+    legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
+    caption = (
+        f"{diagnosis.null_control.n_sets} boards like this one that lack nothing were simulated, and searched as this "
+        "one was. Grey: what came out of them. Above, the odds that something is lacking: beyond the dashed line, "
+        "where few of them lie, an effect is needed. Below, by how much an effect that each of them was made to "
+        "choose changes the error of modes that are left out: a claim needs a smaller ratio than nearly all of them "
+        "have by chance."
+    )
+    alt = "; ".join(f"{row.axis}: this board {row.board:.3g}, limit {row.limit:.3g}" for row in rows)
+    return Picture("null-control", "This board among boards that lack nothing", alt, caption, figure)
+
+
+def _rows(null: NullControlSummary) -> list[_Row]:
+    found = []
+    if null.log_odds_of_sets is not None and null.log_odds is not None:
+        words, axis = "needed beyond", "odds that something is lacking"
+        found.append(_Row(null.log_odds_of_sets, null.log_odds, null.log_odds_needed, words, axis))
+    if null.nested_ratio_of_sets and null.nested_ratio is not None and null.nested_ratio_to_beat is not None:
+        words, axis = "claimed below", "left-out error with the chosen effect over that without"
+        found.append(_Row(null.nested_ratio_of_sets, null.nested_ratio, null.nested_ratio_to_beat, words, axis))
+    return found
+
+
+def _draw(panel: Axes, row: _Row) -> None:
+    counts, edges = row.sets.counts, np.array(row.sets.edges)
+    panel.stairs(counts, edges, fill=True, color=LIGHT, label="simulated boards that lack nothing")
+    panel.stairs(counts, edges, color=DARK, lw=0.6)
+    panel.axvline(row.board, color=BLUE, lw=2.0, label="this board")
+    panel.axvline(row.limit, color=VERMILLION, lw=1.2, ls="--")
+    side = "left" if row.words == "needed beyond" else "right"
+    panel.annotate(
+        row.words, (row.limit, 1.0), xycoords=("data", "axes fraction"), xytext=(3 if side == "left" else -3, -2),
+        textcoords="offset points", fontsize=SMALL, color=VERMILLION, va="top", ha=side,
+    )  # fmt: skip
+    panel.set_ylabel("boards", fontsize=SMALL)
+    panel.set_xlabel(row.axis, fontsize=SMALL)
+    panel.set_ylim(0.0, 1.25 * max(counts))
+
+
+def _as_odds(panel: Axes) -> None:
+    """Natural logarithms as people read odds."""
+    low, high = panel.get_xlim()
+    steps = np.arange(np.ceil(low / np.log(10.0)), np.floor(high / np.log(10.0)) + 1.0)
+    steps = steps[:: max(1, len(steps) // 6)]
+    labels = [f"{10.0**step:.0f} : 1" if step >= 0 else f"1 : {10.0**-step:.0f}" for step in steps]
+    panel.set_xticks(steps * np.log(10.0), labels)
