@@ -17,6 +17,7 @@ from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
 from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answer_words, answers, decide
+from bayesplate.diagnosis.evidence.joint import with_joint_pairs
 from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
 from bayesplate.diagnosis.evidence.peaks import with_own_labels
@@ -173,6 +174,9 @@ def diagnose(
     stages.begin("search for effects", _SEARCH)
     ground = prepare_search(baseline_of(before.inference.problem), tell=stages.reached)
     found = search(with_own_labels(ground))
+    together = with_joint_pairs(found, ground)
+    if together is not ground:
+        ground, found = together, search(with_own_labels(together))
     stages.begin("effects that are known", _KNOWN)
     solved = {name: one.laws[0] for name, one in ground.candidates.items()}
     known = known_fits(before.inference.problem, solved, stages.reached)

@@ -159,6 +159,25 @@ def sizes_of(
             yield law, rows, values
 
 
+def joint_sizes_of(found: Found, drawn: TermDraws) -> Iterator[tuple[FormLaw, NDArray[np.intp], dict[str, Floats]]]:
+    """The same of both effects of a pair at once, of those of its draws for which there is a law of both."""
+    laws = found.ground.joint.get(found.ground.hypotheses[drawn.index].members, {})
+    if not laws:
+        return
+    one, other = members_of(found, drawn.index)
+    for first, rows_first, values_first in sizes_of(found, drawn, 0):
+        for second, rows_second, values_second in sizes_of(found, drawn, 1):
+            law = laws.get((_place(first, one), _place(second, other)))
+            rows, in_first, in_second = np.intersect1d(rows_first, rows_second, return_indices=True)
+            if law is not None and rows.size:
+                values = {name: value[in_first] for name, value in values_first.items()}
+                yield law.law, rows, values | {name: value[in_second] for name, value in values_second.items()}
+
+
+def _place(law: FormLaw, candidate: Candidate) -> int:
+    return next(i for i, one in enumerate(candidate.laws) if one is law)
+
+
 def _of_members(found: Found, index: int, cells: NDArray[np.intp]) -> NDArray[np.intp]:
     """Cells of each member: the table of two runs over those of the second fastest."""
     members = members_of(found, index)

@@ -6,7 +6,7 @@ law bends within their uncertainty, that is not exact: a draw x then counts by t
     w(x) = L_exact(x) / L_linear(x),
 
 the mean of which over the draws is the evidence's correction. Exact in the constants and in the size of each effect;
-of two effects the shifts at a draw's constants add, and uncertain inputs stay linear.
+of two effects that were not solved together the shifts at a draw's constants add, and uncertain inputs stay linear.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.draws import TermDraws, draw_terms, members_of, sizes_of
+from bayesplate.diagnosis.evidence.draws import TermDraws, draw_terms, joint_sizes_of, members_of, sizes_of
 from bayesplate.diagnosis.evidence.hypotheses import probabilities
 from bayesplate.diagnosis.evidence.peaks import log_mean, log_of_terms, log_summed
 from bayesplate.diagnosis.evidence.search import Found
@@ -89,7 +89,9 @@ def exact_log_frequencies(found: Found, drawn: TermDraws) -> Floats:
     every = found.ground.baseline.every
     parts = [_with_effect(found, drawn, member) for member in range(len(members_of(found, drawn.index)))]
     n_bare = 1 - len(parts)
-    total = sum(parts) + (n_bare * _bare(found, drawn.log_rigidities) if n_bare else 0.0)
+    total = np.asarray(sum(parts) + (n_bare * _bare(found, drawn.log_rigidities) if n_bare else 0.0))
+    for law, rows, values in joint_sizes_of(found, drawn):
+        total[rows] = law.every_log_frequency(found.ground.baseline, drawn.log_rigidities[rows], values)
     return np.asarray(total + (drawn.inputs - every.inputs) @ every.input_slopes.T)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -13,13 +13,12 @@ from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, hypotheses, log
 from bayesplate.diagnosis.evidence.predictive import predictive_p_value
 from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.forms import Form, forms
+from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
+from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve
 from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate, traced_shift
 
 Floats = NDArray[np.float64]
-Solve = Callable[[Baseline, Form], FormLaw]
-"""Makes the law of a form around a baseline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,11 +62,14 @@ class Ground:
     baseline : Baseline
     candidates : dict of Candidate
     hypotheses : tuple of Hypothesis
+    joint : dict of JointLaws
+        By the members of a pair whose table is not that of shifts that add.
     """
 
     baseline: Baseline
     candidates: Mapping[str, Candidate]
     hypotheses: tuple[Hypothesis, ...]
+    joint: Mapping[tuple[str, ...], JointLaws] = field(default_factory=dict)
 
     @cached_property
     def whole(self) -> Fold:

@@ -1,0 +1,82 @@
+"""Pairs of effects that are plausible after a first search, solved together: their shifts need not add."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.evidence.draws import members_of
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.search import Found, Ground
+from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve, joint_law, joint_table
+
+PLAUSIBLE = 0.05
+"""Probability from which a pair is solved together: each costs as much as a candidate of its own."""
+_MOST_PAIRS = 3
+_WORTH = 0.05
+"""Share of a pair's probability below which two of its forms keep the sum of their shifts."""
+
+
+def with_joint_pairs(found: Found, ground: Ground, solve: Solve = form_law) -> Ground:
+    """A ground on which the pairs that a search finds plausible are solved together.
+
+    Parameters
+    ----------
+    found : Found
+        Of a search on it, with or without labels of its own under each hypothesis.
+    ground : Ground
+    solve : callable, optional
+        By default full solves around the baseline.
+
+    Returns
+    -------
+    Ground
+        The same one where no pair is plausible.
+    """
+    pairs = [i for i in _plausible(found) if found.ground.hypotheses[i].members not in ground.joint]
+    if not pairs:
+        return ground
+    every, joint = list(ground.hypotheses), dict(ground.joint)
+    for index in pairs:
+        one, other = members_of(found, index)
+        forms = [(one.laws[i].form, other.laws[j].form, (i, j)) for i, j in _forms_worth(found, index)]
+        laws: JointLaws = {place: joint_law(ground.baseline, first, second, solve) for first, second, place in forms}
+        wide = joint_table(ground.baseline, one.coarse, other.coarse, laws)
+        every[index] = replace(every[index], table=wide.of(ground.baseline.rows), wide=wide)
+        joint[every[index].members] = laws
+    return replace(ground, hypotheses=tuple(every), joint=joint)
+
+
+def _plausible(found: Found) -> list[int]:
+    """Indices of the most probable pairs whose effects have laws."""
+    pairs = [
+        i
+        for i in np.argsort(-found.probability)
+        if found.probability[i] >= PLAUSIBLE
+        and len(members_of(found, int(i))) == 2
+        and all(law.models for one in members_of(found, int(i)) for law in one.laws)
+    ]
+    return [int(i) for i in pairs[:_MOST_PAIRS]]
+
+
+def _forms_worth(found: Found, index: int) -> list[tuple[int, int]]:
+    """Pairs of forms that have a share in the probability of a pair of effects."""
+    hypothesis = found.ground.hypotheses[index]
+    one, other = members_of(found, index)
+    shares = _of_cells(found, hypothesis)
+    first, second = np.divmod(np.arange(shares.size), other.coarse.n_cells)
+    by_forms = np.zeros((len(one.laws), len(other.laws)))
+    np.add.at(by_forms, (one.coarse.form[first], other.coarse.form[second]), shares)
+    return [(int(i), int(j)) for i, j in np.argwhere(by_forms > _WORTH)]
+
+
+def _of_cells(found: Found, hypothesis: Hypothesis) -> NDArray[np.float64]:
+    """Posterior probability of each cell of a hypothesis' table."""
+    terms = hypothesis.terms(found.ground.whole)
+    seen = hypothesis.seen(found.ground.baseline, found.residual[None, :])
+    shares = normalised(terms.log_densities(seen)[:, 0])
+    return np.asarray(shares.reshape(-1, hypothesis.table.n_cells).sum(axis=0))

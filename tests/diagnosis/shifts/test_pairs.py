@@ -1,0 +1,98 @@
+"""Two effects at once against boards that are solved in full with both; sums of their shifts do not hold there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from full_refits import full_refit
+
+from bayesplate.diagnosis.evidence import joint
+from bayesplate.diagnosis.evidence.draws import draw_terms
+from bayesplate.diagnosis.evidence.exact import exact_log_frequencies
+from bayesplate.diagnosis.evidence.joint import with_joint_pairs
+from bayesplate.diagnosis.evidence.search import prepare_search, search
+from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.shifts.pairs import joint_table
+from bayesplate.diagnosis.shifts.tables import together
+from bayesplate.frequencies.laws import cents
+from bayesplate.workflow.problem import Problem
+
+PAIR = ("membrane_tension", "air_loading")
+CENT = 1.0
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """The search of the paper's simulated clamped board, and its ground with the pair solved together."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(joint, "PLAUSIBLE", 0.0)
+    patch.setattr(joint, "_MOST_PAIRS", 1)
+    patch.setattr(joint, "_WORTH", 0.3)  # one form of the tension is enough here
+    baseline = baseline_of(Problem.from_card("paper-clamped-fe").posed)
+    found = search(prepare_search(baseline, tried=PAIR))
+    index = next(i for i, one in enumerate(found.ground.hypotheses) if set(one.members) == set(PAIR))
+    found.probability[:] = np.where(np.arange(found.probability.size) == index, 1.0, 0.0)
+    ground = with_joint_pairs(found, found.ground)
+    patch.undo()
+    return found, ground, index
+
+
+def test_both_at_once_are_a_full_solve_of_both(solved):
+    """At a place that is in the middle of no cell: the tables' tangents have to hold as well."""
+    _, ground, index = solved
+    members = ground.hypotheses[index].members
+    place, law = next(iter(ground.joint[members].items()))
+    base = ground.baseline
+    one, other = (ground.candidates[name] for name in members)
+    table, added = joint_table(base, one.coarse, other.coarse, {place: law}), together(one.coarse, other.coarse)
+    first, second = np.divmod(np.arange(table.n_cells), other.coarse.n_cells)
+    at = np.hstack([one.coarse.z[first], other.coarse.z[second]])
+    width = np.hstack([one.coarse.z_slopes[first], other.coarse.z_slopes[second]])
+    wanted = np.full(at.shape[1], 1.0)
+    away = ((at - wanted) ** 2).sum(axis=1)
+    away[(one.coarse.form[first] != place[0]) | (other.coarse.form[second] != place[1])] = np.inf
+    cell = int(np.argmin(away))
+    step = 0.5 * np.ones(at.shape[1])
+    z = at[cell] + step * width[cell]
+    values = {free.name: float(free.prior.value(z[i])) for i, free in enumerate(law.law.form.free)}
+    exact, moved = full_refit(base, law.law.form.board, values, 1 / base.scales)
+
+    assert np.abs(cents(table.shift[cell] + table.slopes[cell] @ step - exact)).max() < CENT
+    assert np.abs(table.moved[cell] + table.moved_slopes[cell] @ step - moved).max() < 0.01
+    assert np.abs(cents(added.shift[cell] + added.slopes[cell] @ step - exact)).max() > CENT  # the negative control
+
+
+def test_draws_of_a_pair_that_was_solved_have_its_law(solved):
+    found, ground, index = solved
+    drawn = draw_terms(search(ground), index, np.random.default_rng(1), 8)
+    exact = exact_log_frequencies(search(ground), drawn)
+    apart = exact_log_frequencies(found, drawn)
+    (laws,) = ground.joint.values()
+    law = next(iter(laws.values())).law
+    base, one = ground.baseline, ground.candidates[ground.hypotheses[index].members[0]]
+    first, other = one.coarse, ground.candidates[ground.hypotheses[index].members[1]].coarse
+    z = np.hstack(
+        [
+            first.z[drawn.cells[:, 0]] + first.z_slopes[drawn.cells[:, 0]] * drawn.within[:, : first.z.shape[1]],
+            other.z[drawn.cells[:, 1]] + other.z_slopes[drawn.cells[:, 1]] * drawn.within[:, first.z.shape[1] :],
+        ]
+    )
+    values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
+    values = {
+        n: np.clip(v, free.prior.lower, free.prior.upper)
+        for (n, v), free in zip(values.items(), law.form.free, strict=True)
+    }
+    direct = law.every_log_frequency(base, drawn.log_rigidities, values)
+
+    assert np.abs(exact - (direct + (drawn.inputs - base.every.inputs) @ base.every.input_slopes.T)).max() < 1e-9
+    assert np.abs(cents(apart - exact)).max() > CENT
+
+
+def test_only_plausible_pairs_are_solved_together(solved):
+    found, ground, index = solved
+    assert [
+        i for i, (a, b) in enumerate(zip(ground.hypotheses, found.ground.hypotheses, strict=True)) if a is not b
+    ] == [index]
+    assert with_joint_pairs(found, ground) is ground  # once is enough
+    found.probability[:] = np.where(np.arange(found.probability.size) == 0, 1.0, joint.PLAUSIBLE / 2)
+    assert with_joint_pairs(found, found.ground) is found.ground
