@@ -17,6 +17,7 @@ LINEAR_BOARD, EXACT_BOARD = "fiemme-spruce-clamped", "finnish-spruce-cantilever"
 WITH_EFFECTS = ("spruce-free-2R", ("transverse_shear", "attached_mass"))
 SEEDS = (1, 2, 3)
 BATCH = 4096
+FEW_BOARDS, MANY_BOARDS = 5, 100
 
 HEAD = """# Benchmarks
 
@@ -78,6 +79,12 @@ def ratios(repeats: int) -> Iterator[Ratio]:
         yield Ratio(f"cold process in units, `{shown}`", cold / unit, limit, at_least=False)
     cold = timing.whole_fit(EXACT_BOARD, *options, repeats=repeats, what="diagnose")
     yield Ratio(f"cold process in units, `diagnose {EXACT_BOARD} --no-report`", cold / unit, 8.0, at_least=False)
+
+    (alone, few), (_, many) = timing.boards(FEW_BOARDS), timing.boards(MANY_BOARDS)
+    what = f"campaign of {FEW_BOARDS} simulated boards, in fits of one"
+    yield Ratio(what, few / (alone / FEW_BOARDS), 8.0, at_least=False)
+    what = f"cost of a board in a campaign of {MANY_BOARDS}, beside one of {FEW_BOARDS}"
+    yield Ratio(what, (many / MANY_BOARDS) / (few / FEW_BOARDS), 1.2, at_least=False)
 
 
 def publish(rows: list[Ratio], about: dict[str, object], folder: Path) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from made_campaigns import MASS, write_campaign
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import LawName
@@ -158,6 +159,23 @@ fitting.infer = timed
 fit(sys.argv[1], out=sys.argv[2])
 print(time.perf_counter() - ended)
 """
+
+
+def boards(n_boards: int) -> tuple[float, float]:
+    """Time of fits of so many simulated boards with one accelerometer, s: each by itself, and all as a campaign."""
+    import bayesplate
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_campaign(Path(folder), (MASS,) * n_boards, population="")
+        cards = [str(path.parent / f"board-{i}.toml") for i in range(n_boards)]
+        alone = _processor_time(lambda: [bayesplate.fit(card, effects=["attached_mass"]) for card in cards])
+        return alone, _processor_time(lambda: bayesplate.fit(str(path)))
+
+
+def _processor_time(run: Callable[[], object]) -> float:
+    start = time.process_time()
+    run()
+    return time.process_time() - start
 
 
 def after_sampling(board: str, repeats: int = 1) -> float:
