@@ -1,4 +1,7 @@
-"""Pairs of effects that are plausible after a first search, solved together: their shifts need not add."""
+"""Pairs of effects that are plausible after a first search, solved together: their shifts need not add.
+
+Pairs with transverse shear are left to the sampler, which fits whatever is named again: solving them takes minutes.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from bayesplate.diagnosis.evidence.draws import members_of
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import Found, Ground
 from bayesplate.diagnosis.evidence.terms import normalised
-from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve, joint_law, joint_table
 
 PLAUSIBLE = 0.05
@@ -52,15 +55,20 @@ def with_joint_pairs(found: Found, ground: Ground, solve: Solve = form_law) -> G
 
 
 def _plausible(found: Found) -> list[int]:
-    """Indices of the most probable pairs whose effects have laws."""
+    """Indices of the most probable pairs whose effects have laws and leave the plate thin."""
     pairs = [
         i
         for i in np.argsort(-found.probability)
         if found.probability[i] >= PLAUSIBLE
         and len(members_of(found, int(i))) == 2
-        and all(law.models for one in members_of(found, int(i)) for law in one.laws)
+        and all(_is_cheap(law) for one in members_of(found, int(i)) for law in one.laws)
     ]
     return [int(i) for i in pairs[:_MOST_PAIRS]]
+
+
+def _is_cheap(law: FormLaw) -> bool:
+    """Whether an effect leaves the plate thin: a shear-flexible one with a further effect takes minutes to solve."""
+    return bool(law.models) and all(model.system.theory == "thin" for model in law.models)
 
 
 def _forms_worth(found: Found, index: int) -> list[tuple[int, int]]:

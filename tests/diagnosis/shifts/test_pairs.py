@@ -96,3 +96,11 @@ def test_only_plausible_pairs_are_solved_together(solved):
     assert with_joint_pairs(found, ground) is ground  # once is enough
     found.probability[:] = np.where(np.arange(found.probability.size) == 0, 1.0, joint.PLAUSIBLE / 2)
     assert with_joint_pairs(found, found.ground) is found.ground
+
+
+def test_pairs_with_shear_are_left_to_the_sampler(finnish_few):
+    """Each takes minutes to solve on a board with many peaks."""
+    laws = {name: one.laws[0] for name, one in finnish_few.ground.candidates.items()}
+
+    assert not joint._is_cheap(laws["transverse_shear"])
+    assert joint._is_cheap(laws["clamp_rotation"])
