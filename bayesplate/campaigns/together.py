@@ -24,7 +24,8 @@ FEWEST_POINTS = 500
 _N_POINTS = {1: 2**12, 2: 2**14, 3: 2**15}
 _WIDER = 1.6
 """Than the posteriors from all boards and from all but each: the points at which densities are summed."""
-_ROUNDS = 4
+_ROUNDS = 12
+_HALVINGS = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class Together:
         for _ in range(_ROUNDS):
             if found.fewest_points >= FEWEST_POINTS:
                 break
-            points, log_spread = _around([found.moments(without) for without in found.left_out])
+            points, log_spread = _around([found._towards(without) for without in found.left_out])
             found = replace(found, points=points, log_spread=log_spread)
         return found
 
@@ -114,6 +115,18 @@ class Together:
     def _at_points(self) -> tuple[Floats, Floats]:
         """ln likelihood of each board, and ln of the prior over the points' own density."""
         return self.log_likelihoods(self.points), self.log_prior(self.points) - self.log_spread
+
+    def _towards(self, without: Collection[int]) -> tuple[Floats, Floats]:
+        """Moments of the posterior, tempered until enough of the points have a share in them."""
+        log_weights = self._log_weights(without)
+        low, high = 0.0, 1.0
+        if effective_draws(normalised(log_weights)) < FEWEST_POINTS:
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                is_enough = effective_draws(normalised(middle * log_weights)) >= FEWEST_POINTS
+                low, high = (middle, high) if is_enough else (low, middle)
+            high = low
+        return moments(self.points, normalised(high * log_weights))
 
     def _log_weights(self, without: Collection[int]) -> Floats:
         boards, prior = self._at_points

@@ -85,3 +85,18 @@ def test_one_board_that_stands_apart_has_points():
     together = together_of(boards, rng)
 
     assert together.fewest_points >= FEWEST_POINTS
+
+
+def test_points_find_their_way_to_where_the_boards_are():
+    """The boards are sharp, and the normal likelihoods that the points are laid out by say nothing of them."""
+    rng = np.random.default_rng(6)
+    boards = linear_boards(rng, 4, 2, [2.5, -2.0], sd=0.01)
+    nothing = Pull(np.zeros((2, 2)), np.zeros(2))
+    together = Together.of(standard_shared(2), [f"board {i}" for i in range(4)], boards, [nothing] * 4)
+    mean, covariance = joint_posterior(boards)
+    found_mean, found_covariance = together.moments()
+    sd = np.sqrt(np.diagonal(covariance))
+
+    assert together.fewest_points >= FEWEST_POINTS
+    assert np.abs((found_mean - mean) / sd).max() < 0.05
+    assert np.abs(np.sqrt(np.diagonal(found_covariance)) / sd - 1.0).max() < 0.05
