@@ -3,7 +3,8 @@
 Draws of the shared parameters z from a density proportional to r(z) L(z), r being known, tell L without any integral:
 its logarithm is a polynomial, and the one of greatest likelihood is that under which z has the moments of the draws.
 The polynomial is written in products of Hermite polynomials of the whitened z, which are nearly orthonormal where the
-draws are, and the few terms of higher order are drawn towards zero.
+draws are, and the few terms of higher order are drawn towards zero. Where there are no draws it goes on as it falls at
+their rim, with the curvature of a normal likelihood: a polynomial itself may rise there without bound.
 
 References
 ----------
@@ -14,13 +15,13 @@ Statistics 19 (1991).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.terms import log_sum
+from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 
 Floats = NDArray[np.float64]
 LogDensity = Callable[[Floats], Floats]
@@ -30,7 +31,9 @@ _HIGHEST = 4
 _DRAWS_PER_TERM = 20
 """Effective draws for each term of an order that is to be used."""
 _REACH = 3.5
-"""Standard deviations of the draws beyond which terms of third and fourth order go on level."""
+"""Standard deviations of the draws up to which the polynomial is taken at its word."""
+_BACK = 0.05
+"""Step back from the rim, standard deviations, by which the slope there is found."""
 _SIZE = 0.3
 """Standard deviation of the coefficients of terms of third and fourth order, before any draw."""
 _N_POINTS = 8192
@@ -47,6 +50,8 @@ class SharedLikelihood:
         Mean of the standard coordinates of the draws that it was found from.
     whitening : (n_shared, n_shared) array
         Takes coordinates less the centre to coordinates of unit spread.
+    curvature : (n_shared, n_shared) array
+        Minus that of ln L beyond the draws, in coordinates of unit spread.
     coefficients : (n_terms,) array
         Of the terms of first, second, ... order.
     level : float
@@ -54,6 +59,7 @@ class SharedLikelihood:
 
     centre: Floats
     whitening: Floats
+    curvature: Floats
     coefficients: Floats
     level: float = 0.0
 
@@ -79,15 +85,19 @@ class SharedLikelihood:
         centre, covariance = moments(z, weights)
         factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         whitening = np.asarray(np.linalg.inv(factor).T, dtype=np.float64)
-        bare = cls(centre, whitening, np.zeros(0))
         degree = _degree(z.shape[1], n_effective)
         points, log_density = spread_points(centre, _WIDER * factor, _N_POINTS)
         log_weights = log_reference(points) - log_density - np.log(len(points))
-        there, wanted = bare._terms(points, degree), weights @ bare._terms(z, degree)
+        u, drawn = (points - centre) @ whitening, (z - centre) @ whitening
+        _, reference = moments(u, normalised(log_weights))
+        near, near_drawn = (u == _near(u)).all(axis=1), (drawn == _near(drawn)).all(axis=1)
+        share = weights[near_drawn].sum()
+        wanted = weights[near_drawn] @ _terms(drawn[near_drawn], degree) / share
+        there, log_weights = _terms(u[near], degree), log_weights[near]
         firmness = np.where(_orders(z.shape[1], degree) > 2, _SIZE**-2.0 / n_effective, 0.0)
         coefficients = _with_moments(there, log_weights, wanted, firmness)
-        level = log_evidence - float(log_sum(log_weights + there @ coefficients))
-        return replace(bare, coefficients=coefficients, level=level)
+        level = log_evidence + np.log(share) - float(log_sum(log_weights + there @ coefficients))
+        return cls(centre, whitening, _told(reference), coefficients, level)
 
     @property
     def degree(self) -> int:
@@ -97,14 +107,35 @@ class SharedLikelihood:
 
     def at(self, z: Floats) -> Floats:
         """ln L at standard coordinates: (n,) array from (n, n_shared)."""
-        return np.asarray(self.level + self._terms(z, self.degree) @ self.coefficients)
-
-    def _terms(self, z: Floats, degree: int) -> Floats:
-        """Products of normalised Hermite polynomials by order: (n, n_terms) array."""
         u = (z - self.centre) @ self.whitening
-        near, n = np.clip(u, -_REACH, _REACH), u.shape[1]
-        columns = [np.prod(_hermite(u if order <= 2 else near, powers), axis=1) for order, powers in _powers(n, degree)]
-        return np.column_stack(columns)
+        near = _near(u)
+        found = self.level + self._polynomial(near)
+        beyond = np.flatnonzero((u != near).any(axis=1))
+        if beyond.size:
+            away = u[beyond] - near[beyond]
+            step = _BACK * away / np.linalg.norm(away, axis=1)[:, None]
+            rise = self._polynomial(near[beyond]) - self._polynomial(near[beyond] - step)
+            found[beyond] += np.minimum(rise, 0.0) * np.linalg.norm(away, axis=1) / _BACK
+            found[beyond] -= 0.5 * np.einsum("ni,ij,nj->n", away, self.curvature, away)
+        return np.asarray(found)
+
+    def _polynomial(self, u: Floats) -> Floats:
+        return np.asarray(_terms(u, self.degree) @ self.coefficients)
+
+
+def _terms(u: Floats, degree: int) -> Floats:
+    """Products of normalised Hermite polynomials by order: (n, n_terms) array."""
+    return np.column_stack([np.prod(_hermite(u, powers), axis=1) for _, powers in _powers(u.shape[1], degree)])
+
+
+def _near(u: Floats) -> Floats:
+    return np.clip(u, -_REACH, _REACH)
+
+
+def _told(reference: Floats) -> Floats:
+    """What draws of unit spread say beyond a reference of some covariance: a precision, nowhere negative."""
+    sizes, directions = np.linalg.eigh(np.eye(len(reference)) - np.linalg.inv(reference))
+    return np.asarray((directions * np.maximum(sizes, 0.0)) @ directions.T)
 
 
 def moments(z: Floats, weights: Floats) -> tuple[Floats, Floats]:

@@ -60,8 +60,33 @@ def test_a_prior_with_an_edge_and_a_likelihood_that_leans():
     exact = np.log(np.trapezoid(shares, grid))
     found = SharedLikelihood.found(z, np.full(len(z), 1 / len(z)), len(z), log_reference, exact)
 
-    where = np.linspace(0.0, np.quantile(z, 0.999), 26)
-    assert np.abs(found.at(where[:, None]) - log_likelihood(where)).max() < 0.1
+    off = found.at(z) - log_likelihood(z[:, 0])
+    assert np.sqrt(np.mean(off**2)) < 2.0 * np.sqrt(found.coefficients.size / len(z))
+
+
+def test_far_from_the_draws_it_falls_like_a_normal_one():
+    """At ten standard deviations, where there are no draws: within a tenth of the closed form, and never upwards."""
+    rng = np.random.default_rng(8)
+    (board,) = linear_boards(rng, 1, 1, [0.5], sd=0.1)
+    found, z = found_from(board, rng, 1)
+    far = z.mean() + z.std() * np.array([[-10.0], [10.0]])
+
+    fall = found.at(far) - found.at(z.mean(axis=0)[None])
+    exact = board.at(far) - board.at(z.mean(axis=0)[None])
+    assert fall == pytest.approx(exact, rel=0.1)
+
+
+def test_what_a_board_does_not_say_does_not_rise_beyond_its_draws():
+    """A board without a mass: a polynomial that suits the flat end must not turn up at the other one."""
+    rng = np.random.default_rng(9)
+    grid = np.linspace(-8.0, 8.0, 16_001)
+    log_likelihood = -np.exp(2.0 * grid)
+    shares = np.exp(stats.norm.logpdf(grid) + log_likelihood)
+    z = np.interp(rng.random(8000), np.cumsum(shares) / shares.sum(), grid)[:, None]
+    found = SharedLikelihood.found(z, np.full(len(z), 1 / len(z)), len(z), log_standard_normal, 0.0)
+    top = found.at(np.quantile(z, 0.5, axis=0)[None])[0]
+
+    assert (found.at(np.linspace(2.0, 8.0, 13)[:, None]) < top - 3.0).all()
 
 
 @pytest.mark.parametrize("n_effective", [30, 300, 3000])

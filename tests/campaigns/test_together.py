@@ -33,8 +33,12 @@ def together_of(boards, rng):
 
 
 def tolerance(together):
-    """Root mean square by which the log density of so many terms from so many draws errs."""
-    return np.sqrt(together.likelihoods[0].coefficients.size / N)
+    """Four standard errors of a mean of all boards, in its own standard deviations.
+
+    The slope of a board's log likelihood errs by sqrt((1 + q) / N) in units of that board's own spread, q being the
+    squared distance from its middle: one for each shared number, on average.
+    """
+    return 4.0 * np.sqrt((1.0 + len(together.shared)) / N)
 
 
 @pytest.mark.parametrize("n_shared", [1, 2, 3])
