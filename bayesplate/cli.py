@@ -53,6 +53,9 @@ def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None
             callback=_names,
             help="Declared effects, comma separated, in place of the card's; or none.",
         ),
+        "setup": click.option(
+            "--setup", type=click.Path(), help="File with a [setup] that completes the card: what pick writes."
+        ),
         "linear": click.option("--linear", is_flag=True, help="Force the linear frequency law."),
         "exact": click.option("--exact", is_flag=True, help="Force the exact frequency law."),
         "robust": click.option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say."),
@@ -94,14 +97,16 @@ def main() -> None:
 
 @main.command()
 @click.argument("card")
-@_options("effects", "json", "quiet", "debug")
-def check(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug: bool) -> None:
+@_options("effects", "setup", "json", "quiet", "debug")
+def check(
+    card: str, effects: list[str] | None, setup: str | None, as_json: bool, quiet: bool, debug: bool
+) -> None:
     """Every fault of CARD, or what would be fitted and what it can identify."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.check import check as run
         from bayesplate.workflow.shown import show_check
 
-        report = run(card, effects=effects)
+        report = run(card, effects=effects, setup=setup)
         if as_json:
             print_json(report)
         elif not quiet:
@@ -110,12 +115,13 @@ def check(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debu
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "setup", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
 def fit(
     card: str,
     out: str | None,
     seed: int,
     effects: list[str] | None,
+    setup: str | None,
     linear: bool,
     exact: bool,
     robust: bool,
@@ -139,6 +145,7 @@ def fit(
                 out=default_folder(card) if out is None else out,
                 seed=seed,
                 effects=effects,
+                setup=setup,
                 law="linear" if linear else "exact" if exact else None,
                 robust=robust,
                 report=report,
@@ -157,12 +164,13 @@ def fit(
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "force", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "setup", "force", "json", "quiet", "debug")
 def modes(
     card: str,
     out: str | None,
     seed: int,
     effects: list[str] | None,
+    setup: str | None,
     force: bool,
     as_json: bool,
     quiet: bool,
@@ -174,7 +182,8 @@ def modes(
         from bayesplate.workflow.prepare import default_folder
         from bayesplate.workflow.shown import show_modes
 
-        result = run(card, out=default_folder(card) if out is None else out, seed=seed, effects=effects, force=force)
+        folder = default_folder(card) if out is None else out
+        result = run(card, out=folder, seed=seed, effects=effects, setup=setup, force=force)
         if as_json:
             print_json(result.summary)
         elif not quiet:
@@ -219,12 +228,13 @@ def compare(
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "report", "force", "resume", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "setup", "report", "force", "resume", "json", "quiet", "debug")
 def diagnose(
     card: str,
     out: str | None,
     seed: int,
     effects: list[str] | None,
+    setup: str | None,
     report: bool,
     force: bool,
     resume: bool,
@@ -241,7 +251,15 @@ def diagnose(
 
             folder = default_folder(card) if out is None else out
             result = run(
-                card, out=folder, report=report, seed=seed, effects=effects, force=force, resume=resume, progress=tell
+                card,
+                out=folder,
+                report=report,
+                seed=seed,
+                effects=effects,
+                setup=setup,
+                force=force,
+                resume=resume,
+                progress=tell,
             )
         if as_json:
             print_json(result.to_json())

@@ -27,7 +27,7 @@ def require_arguments(**given: object) -> None:
     Parameters
     ----------
     **given
-        Any of card, prior, out, seed, effects, law, robust, coefficients, report, force, resume, n_null, progress.
+        Any of card, prior, setup, out, seed, effects, law, robust, coefficients, report, force, resume, n_null, progress.
 
     Raises
     ------
@@ -120,6 +120,7 @@ _CHECKS: dict[str, Check] = {
     "card": _card,
     "prior": _prior,
     "out": _path_or_none,
+    "setup": _path_or_none,
     "seed": _whole(0),
     "n_null": _whole(1),
     "effects": _effects,
