@@ -1,4 +1,4 @@
-"""Modes of a window found one by one: where the rest of a fit looks most like a mode, one is added, and all refitted."""
+"""Modes of a window found one by one: where what a fit leaves looks most like a mode, one is added and all refitted."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ class Fitted:
     @property
     def power(self) -> Floats:
         """Mean square of what is left of each record: (n_records,) array."""
-        return np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free
+        return np.asarray(np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free)
 
     @property
     def variance(self) -> Floats:
@@ -120,9 +120,9 @@ class Fitted:
         return np.maximum(self.power, max(self.window.least_variance, 1e-300))
 
     def information(self) -> tuple[Floats, Floats]:
-        """What each record says of the parameters: scores (n_records, n) and information (n_records, n, n), n = 2 modes.
+        """What each record says of the parameters: scores (n_records, n) and information (n_records, n, n).
 
-        The parameters are all frequencies, then all decay rates; each record is weighed by what is left of it.
+        The n parameters are all frequencies, then all decay rates; each record is weighed by what is left of it.
         """
         both = np.concatenate([self.residues, self.residues])
         power = self.variance
@@ -135,7 +135,7 @@ class Fitted:
 
 def shapes(frequency: Floats, poles: Floats) -> Complex:
     """1 / (i (f - f_m) + d_m) of each mode: (n_lines, n_modes) array."""
-    return 1.0 / (1j * (frequency[:, None] - poles[:, 0]) + poles[:, 1])
+    return np.asarray(1.0 / (1j * (frequency[:, None] - poles[:, 0]) + poles[:, 1]))
 
 
 def fitted(window: Window, poles: Floats) -> Fitted:
@@ -145,7 +145,8 @@ def fitted(window: Window, poles: Floats) -> Fitted:
     change = np.concatenate([1j * basis[:, :n] ** 2, -(basis[:, :n] ** 2)], axis=1) * weights
     basis = basis * weights
     scale = np.linalg.norm(basis, axis=0)
-    orthogonal, triangle = np.linalg.qr(basis / scale)
+    both: tuple[Complex, Complex] = np.linalg.qr(basis / scale)
+    orthogonal, triangle = both
     values = window.values * weights
     inner = orthogonal.conj().T @ values
     residues = (solve_triangular(triangle, inner) / scale[:, None])[:n]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,7 +168,7 @@ def _windows(
     n = max(1, round((highest - lowest) / max(width, _LEAST_LINES * spacing)))
     ends = np.linspace(lowest, highest, n + 1)
     margin = max(_MARGIN, 0.5 * _LEAST_LINES * spacing)
-    for low, high in zip(ends[:-1], ends[1:], strict=True):
+    for low, high in pairwise(ends):
         kept = (spectra.frequency >= max(low - margin, 0.3 * lowest, 3.0 * spacing)) & (
             spectra.frequency <= high + margin
         )

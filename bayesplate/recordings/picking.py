@@ -183,7 +183,7 @@ def _excess(spectra: Spectra, mode: Mode, which: int) -> float:
     n_places = len(spectra.between)
     steps = np.bincount(spectra.places, mode.steps[:, which], n_places)
     variances = np.bincount(spectra.places, mode.variances[:, which], n_places)
-    return max(by_hit, _ratio(steps, variances))
+    return max(by_hit, _ratio(np.asarray(steps, dtype=float), np.asarray(variances, dtype=float)))
 
 
 def _ratio(steps: Floats, variances: Floats) -> float:

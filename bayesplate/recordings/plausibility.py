@@ -46,7 +46,8 @@ class Verdict:
     spurious : float
         Probability that it is none.
     kind : str
-        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint"; empty where nothing speaks of it.
+        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint"; empty where nothing speaks of
+        it.
     part_of : int
         Number of the mode of which it is likeliest a part; -1 if of none.
     """

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.recordings.hits import Hit
-from bayesplate.recordings.signals import Recording
 from bayesplate.recordings.taking import Heard
 
 Floats = NDArray[np.float64]
@@ -67,7 +66,7 @@ def averaged(heard: Heard) -> tuple[Averaged, ...]:
 
 
 def _whole(heard: Heard) -> tuple[NDArray[np.complex128], NDArray[np.complex128] | None]:
-    """Spectra of force and response from before each hit on, where the decays alone would lack what happens under it."""
+    """Spectra of force and response from before each hit on: decays alone would lack what happens under it."""
     from scipy.fft import rfft
 
     spectra = heard.spectra

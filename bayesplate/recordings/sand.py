@@ -1,8 +1,8 @@
 """Sand on a ringing board: a picture of the lines on which it gathers, scored against the shapes of modes.
 
 The picture is cropped to the board by hand, so that it may be turned by a few degrees, seen from the side, lit unevenly
-and strewn in part. It is compared as it is, and straightened in many ways; what counts is how well its best straightened
-form agrees with where a shape stands still.
+and strewn in part. It is compared as it is, and straightened in many ways; what counts is how well its best
+straightened form agrees with where a shape stands still.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ def read_picture(path: str | os.PathLike[str]) -> Floats:
     path = Path(path)
     shown = "".join(c if c.isprintable() else "?" for c in path.name)
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
-        raise InputError(Fault(shown, "a PNG or JPEG picture", f'"{path.suffix}"', "crop it to the board and save it as PNG"))
+        raise InputError(
+            Fault(shown, "a PNG or JPEG picture", f'"{path.suffix}"', "crop it to the board and save it as PNG")
+        )
     try:
         if path.stat().st_size > LARGEST_PICTURE:
             got = f"{path.stat().st_size / 1e6:,.0f} MB"
@@ -65,7 +67,9 @@ def read_picture(path: str | os.PathLike[str]) -> Floats:
     except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as error:
         raise InputError(Fault(shown, "a PNG or JPEG picture", str(error)[:100])) from None
     if min(values.shape) < 24 or np.ptp(values) < 0.02:
-        raise InputError(Fault(shown, "a picture with lines on it", f"{values.shape[1]} x {values.shape[0]} of one shade"))
+        raise InputError(
+            Fault(shown, "a picture with lines on it", f"{values.shape[1]} x {values.shape[0]} of one shade")
+        )
     return values
 
 

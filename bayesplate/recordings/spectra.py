@@ -130,11 +130,8 @@ def _force_spectrum(recording: Recording, hit: Hit, frequency: Floats) -> Comple
     first = max(hit.onset - round(_BEFORE_PULSE * recording.rate), 0)
     pulse = recording.force[first : hit.start] - np.median(recording.force)
     at = (np.arange(first, hit.start) - hit.start) / recording.rate
-    # Few samples and many lines: the powers of one line's phase, by multiplication, are faster than a transform.
-    spectrum = np.zeros(frequency.size, dtype=complex)
-    for sample, time in zip(pulse, at, strict=True):
-        spectrum += sample * np.exp(-2j * np.pi * frequency * time)
-    return spectrum / recording.rate
+    # few samples and many lines: a product is faster than a transform
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, at)) @ pulse / recording.rate)
 
 
 def _grouped(

@@ -1,8 +1,8 @@
 """Exponential sine sweeps to impulse responses: the response is turned back by the sweep's inverse filter.
 
-An exponential sweep x(t) = sin(K (exp(t / L) - 1)) with L = T / ln(f2 / f1), K = 2 pi f1 L passes each octave in the same
-time. Reversed in time, with a level that falls by 6 dB an octave, it is its own inverse; what the loudspeaker adds in
-harmonics comes out before the impulse response and is cut away.
+An exponential sweep x(t) = sin(K (exp(t / L) - 1)) with L = T / ln(f2 / f1) and K = 2 pi f1 L passes each octave in
+the same time. Reversed in time, with a level that falls by 6 dB an octave, it is its own inverse; what the loudspeaker
+adds in harmonics comes out before the impulse response and is cut away.
 
 References
 ----------

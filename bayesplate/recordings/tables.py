@@ -16,7 +16,7 @@ _TIME, _HERTZ = ("time", "time_s", "t"), ("f_hz", "hz", "frequency", "frequency_
 _REAL, _IMAGINARY, _COHERENCE = ("re", "real"), ("im", "imag", "imaginary"), ("coherence",)
 _FORCE, _RESPONSE = ("force",), ("response", "sound", *MOTIONS)
 KNOWN = (*_TIME, *_FORCE, *_RESPONSE, *_HERTZ, *_REAL, *_IMAGINARY, *_COHERENCE)
-WANTED = "named columns: force (if it was measured), acceleration, velocity, displacement or sound, and time; or f_hz, re, im"
+WANTED = "named columns: force if it was measured, acceleration, velocity, displacement or sound, time; or f_hz, re, im"
 _JITTER = 1e-3
 """Share of a step by which the times of samples, or the lines of a spectrum, may be unevenly spaced."""
 _LONGEST_HEADER = 10_000

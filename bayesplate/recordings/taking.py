@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.hits import Hit, find_hits, usable
+from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, usable
 from bayesplate.recordings.reading import Read
 from bayesplate.recordings.signals import FrequencyResponse, Recording
 from bayesplate.recordings.spectra import Spectra, decay_spectra, response_spectra
@@ -77,12 +77,28 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
         elif 2 * len(good) < len(hits) or not good:
             faults += [_hit_fault(one, number, hit) for number, hit in bad]
         else:
-            remarks += [f"{one.name}: hit {number} at {hit.onset / one.rate:.2f} s left out, {hit.fault}" for number, hit in bad]
+            remarks += [
+                f"{one.name}: hit {number} at {hit.onset / one.rate:.2f} s left out, {hit.fault}" for number, hit in bad
+            ]
             heard.append((one, good))
     if faults:
         raise InputError(faults)
     kept, short = _without_short(heard)
     return Heard(decay_spectra(kept, highest), tuple((one, tuple(hits)) for one, hits in kept), (*remarks, *short))
+
+
+def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> Heard:
+    """Spectra of impulse responses that were made from sweeps; parameters and faults as of `take`."""
+    faults = _recording_faults([one for one, _ in impulses], highest)
+    faults += [
+        Fault(one.name, f"{LEAST_DURATION:g} s after the end of the sweep", "less", "record on until it is silent")
+        for one, hit in impulses
+        if hit.stop - hit.start < LEAST_DURATION * one.rate
+    ]
+    if faults:
+        raise InputError(faults)
+    hits = tuple((one, (hit,)) for one, hit in impulses)
+    return Heard(decay_spectra(hits, highest), hits, ())
 
 
 def _hit_fault(one: Recording, number: int, hit: Hit) -> Fault:

@@ -117,7 +117,8 @@ def problem_or_campaign(
     ----------
     given : Problem, str, path, Board or Campaign
     effects, law, robust, setup
-        As of `Problem.from_card`, setup for a board only; of a problem or a campaign that is there already they may not be given.
+        As of `Problem.from_card`, setup for a board only; of a problem or a campaign that is there already they may
+        not be given.
 
     Raises
     ------

@@ -128,8 +128,8 @@ def fit(
     Raises
     ------
     InputError
-        If the card or the folder cannot be used, or effects, law, robust or setup are given beside a problem, which states
-        them itself; then nothing is written.
+        If the card or the folder cannot be used, or effects, law, robust or setup are given beside a problem, which
+        states them itself; then nothing is written.
     NotIdentifiableError
         If the data leave a constant open; then nothing is written.
     NotConvergedError

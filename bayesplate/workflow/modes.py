@@ -129,9 +129,7 @@ def modes(
     return ModesResult(report, sheets, files)
 
 
-def _prepared(
-    card: Problem | Card, effects: Sequence[str] | None, setup: str | os.PathLike[str] | None
-) -> Prepared:
+def _prepared(card: Problem | Card, effects: Sequence[str] | None, setup: str | os.PathLike[str] | None) -> Prepared:
     """As for a fit, but a board that was not measured yet will do."""
     if isinstance(card, Problem):
         return as_problem(card, effects=effects, setup=setup).prepared
