@@ -59,7 +59,7 @@ def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]
     setups = [dict(one) for one in (stated if isinstance(stated, list) else [stated]) if isinstance(one, dict)]
     at = _which(setups, own, named, file)
     if at is None:
-        setups.append(dict(own))
+        setups = [{"name": DEFAULT_SETUP_NAME, **one} for one in setups] + [dict(own)]
     else:
         dropped = _READINGS if any(key in own for key in _READINGS) else ()
         kept = {key: value for key, value in setups[at].items() if key not in dropped}

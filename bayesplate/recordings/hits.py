@@ -25,7 +25,7 @@ BOUNCE = 0.1
 """s after a hit within which another one is a bounce of the hammer."""
 _BLOCK = 0.002
 """s over which a sound's power is taken."""
-_RISE = 15.0
+_RISE = 10.0
 """dB by which a hit stands above what was heard just before."""
 _ABOVE_FLOOR = 20.0
 """dB by which a hit stands above the quiet of the recording."""
@@ -70,7 +70,7 @@ def find_hits(recording: Recording) -> list[Hit]:
         onsets = _onsets(recording.response, recording.rate)
         lag = round(_AFTER_SOUND * recording.rate)
         pulses = [(onset, onset) for onset in onsets]
-    ends = [begin for begin, _ in pulses[1:]] + [recording.response.size]
+    ends = [*(begin for begin, _ in pulses[1:]), recording.response.size][: len(pulses)]
     hits = []
     after_bounce = False
     for i, ((begin, end), stop) in enumerate(zip(pulses, ends, strict=True)):
@@ -123,8 +123,8 @@ def _onsets(response: Floats, rate: float) -> list[int]:
     n = response.size // block
     if n < 2 * _LOOK_BACK:
         return []
-    # What changes from sample to sample: a hit is all clicks, the ringing of a board and the hum of a room are not.
-    change = np.diff(response[: n * block], prepend=response[0])
+    # How the slope changes from sample to sample: a hit is a click, the ringing of a board and hum are not.
+    change = np.diff(response[: n * block], n=2, prepend=response[[0, 0]])
     power = np.mean(change.reshape(n, block) ** 2, axis=1)
     floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
     level = 10.0 * np.log10(np.maximum(power, 1e-300) / floor)

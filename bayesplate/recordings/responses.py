@@ -21,7 +21,7 @@ class Averaged:
     Attributes
     ----------
     name : str
-        Of its first record.
+        Of its first file.
     frequency : (n_lines,) array, Hz
     level : (n_lines,) array
         Magnitude: of H1 with a force, else root mean square of the hits' spectra, each over its own strength.
@@ -60,7 +60,7 @@ def averaged(heard: Heard) -> tuple[Averaged, ...]:
             level = np.abs(cross) / power
             if own.sum() > 1 and heard.hits:
                 coherence = np.abs(cross) ** 2 / power / np.maximum(np.sum(np.abs(y) ** 2, axis=1), 1e-300)
-        name = spectra.names[int(np.flatnonzero(own)[0])]
+        name = spectra.names[int(np.flatnonzero(own)[0])].rpartition(" hit ")[0] or spectra.names[0]
         found.append(Averaged(name, spectra.frequency, level, coherence, int(own.sum())))
     return tuple(found)
 

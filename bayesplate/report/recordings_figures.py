@@ -66,8 +66,8 @@ def spectra_picture(report: PickReport, averaged: Sequence[Averaged]) -> Picture
         level = 20.0 * np.log10(np.maximum(one.level[inside] / one.level[inside].max(), 1e-12))
         panel.plot(one.frequency[inside], np.maximum(level, _LEAST_DB) - _STEP * i, color=BLUE, lw=0.6)
         if len(shown) > 1:
-            panel.text(report.highest_hz, -_STEP * i - 2.0, short(drawable(one.name), 18), fontsize=SMALL - 1.5,
-                       ha="right", va="top", color=DARK)  # fmt: skip
+            at = level[0] - _STEP * i - 1.0
+            panel.text(report.lowest_hz, at, short(drawable(one.name), 24), fontsize=SMALL - 1.5, va="top", color=DARK)
     low, high = panel.get_ylim()
     for peak in report.peaks:
         panel.axvline(
@@ -156,9 +156,9 @@ def stability_picture(report: PickReport, paths: Sequence[Path]) -> Picture:
     ]
     legend_below(figure, [*names, _line(ORANGE, "mode")], 3)
     caption = (
-        "Each row of marks is a fit with one mode more, in windows of two widths. A mode stands in one upright line: it "
-        "is found again whatever else is fitted. Marks that wander, or that one width of window alone shows, are "
-        "of noise or of a peak that is not simple."
+        "Each row of marks is a fit with one mode more, in windows of two widths. A mode stands in one upright line: "
+        "it is found again whatever else is fitted. Marks that wander, or that one width of window alone shows, "
+        "are of noise or of a peak that is not simple."
     )
     return Picture(
         "stability", "Whether the modes stay where they are", f"{len(report.peaks)} peaks examined.", caption, figure

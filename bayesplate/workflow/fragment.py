@@ -35,8 +35,7 @@ def fragment_text(
     peaks : sequence of PickedRow
         All that were picked.
     labelled : mapping
-        Number of a peak to the label that sand or residues between places give it, and the confidence in it. Labels
-        that follow from the frequencies alone are left to the fit, which would otherwise use them twice.
+        Number of a peak to the label that is stated, and the confidence in it.
     spectra : Spectra
         With the places of hammer and sensor.
     files : sequence of str

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from bayesplate.workflow.pick_labels import Labels
 
 FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
-_LEAST_SURE = 0.5
-"""Confidence from which on sand and residues give a label to a peak of the fragment."""
 _RATE_OFF = 1e-6
 _SAND_OFF = 0.03
 """Relative distance up to which a picture of sand belongs to a peak."""
@@ -198,7 +196,7 @@ def _summary(
     flips = flips if labels is None else labels.flips
     by_mode = {} if labels is None else {number: labels.of(i) for i, number in enumerate(numbers)}
     peaks = rows(picked, flips, by_mode)
-    sure = {} if labels is None else {number: labels.sure(i, _LEAST_SURE) for i, number in enumerate(numbers)}
+    sure = {} if labels is None else {number: labels.stated(i) for i, number in enumerate(numbers)}
     named = _each_once({number: one for number, one in sure.items() if one is not None})
     text = fragment_text(
         peaks,

@@ -30,6 +30,8 @@ MOST_PROPOSING = 12
 """Lowest peaks whose labels are proposed: higher ones lie where a thin plate is less and less like a real one."""
 _LEAST_SHARE, _MOST_WAYS = 0.01, 3
 _POLARITY_SURE = float(np.log(20.0))
+_STATED, _BEYOND_DOUBT = 0.5, 0.99
+"""Probability from which on a label is stated: by sand and residues alone, and by all together."""
 _GRID = np.linspace(0.0, 1.0, 61)
 _NEAR = 0.15
 """Relative distance within which sand and residues choose among the modes."""
@@ -57,10 +59,17 @@ class Labels:
         """Labels of one likely peak, the most probable first."""
         return [*self.probabilities[peak].items()]
 
-    def sure(self, peak: int, least: float) -> tuple[str, float] | None:
-        """The label that sand and residues alone give with at least a probability."""
-        found = [(name, share) for name, share in self.by_evidence[peak].items() if name.startswith("(")]
-        return found[0] if found and found[0][1] >= least else None
+    def stated(self, peak: int) -> tuple[str, float] | None:
+        """The label that a card may state, and the confidence in it; None where it is left to the fit.
+
+        Sand and residues are not known to the fit. What the frequencies alone say it finds out by itself, and would
+        use twice, unless it is beyond doubt: then it is where the fit can begin.
+        """
+        for found, least in ((self.by_evidence[peak], _STATED), (self.probabilities[peak], _BEYOND_DOUBT)):
+            name, share = next(iter(found.items()), ("", 0.0))
+            if name.startswith("(") and share >= least:
+                return name, share
+        return None
 
 
 def label_peaks(
