@@ -153,7 +153,8 @@ def _picked(
     noise = float(np.sqrt(mode.covariance[0, 0]))
     scatter = noise * np.sqrt(max(_excess(spectra, mode, 0) - 1.0, 0.0))
     damping_sd = float(np.sqrt(mode.covariance[1, 1] * max(_excess(spectra, mode, 1), 1.0))) / mode.frequency
-    window = float(np.hypot(mode.shift, split))
+    # two choices of lines are two estimates, each with an error of its own: their difference has twice its variance
+    window = float(np.hypot(mode.shift / np.sqrt(2.0), split))
     turned = answer.mobility
     return PickedMode(
         frequency=frequency,

@@ -4,8 +4,9 @@
     :exit: 3
     ```
 
-It runs in a folder that holds copies of `docs/cards`, the cards of `designs.py` and the recordings of `taps.py`. What is
-shown was printed by this very version; a command that ends with another exit code than the one given stops the build.
+It runs in a folder that holds copies of `docs/cards`, the cards of `designs.py` and the recordings of `taps.py`. What
+is shown was printed by this very version; a command that ends with another exit code than the one given stops the
+build.
 """
 
 from __future__ import annotations

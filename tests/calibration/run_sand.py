@@ -2,8 +2,8 @@
 
 So many pictures of each of the lowest modes of the paper's two boards, uneven, noisy, partial, turned by up to 5
 degrees and seen from the side, made from the generator's shapes and scored against the package's among the modes within
-15 % of the frequency, and among all. Exit code 0: top-1 is right in 95 of 100 outside the veering pair, top-2 in 99; 1: not; 2:
-usage. A run that was interrupted goes on where it stopped if it is given the same file.
+15 % of the frequency, and among all. Exit code 0: top-1 is right in 95 of 100 outside the veering pair, top-2 in 99;
+1: not; 2: usage. A run that was interrupted goes on where it stopped if it is given the same file.
 """
 
 from __future__ import annotations
