@@ -111,7 +111,7 @@ def test_a_frequency_response_is_picked_as_it_is():
 @pytest.mark.parametrize("by", ["parameters", "itself"])
 def test_a_sweep_gives_the_frequencies_of_the_board(by):
     """The response to a sweep, by convolution with the modal impulse response; harmonics of the loudspeaker added."""
-    rate, sweep = 4000.0, Sweep(20.0, 1500.0, 4.0)
+    rate, sweep = 2000.0, Sweep(20.0, 800.0, 3.0)
     times = np.arange(round(2.0 * rate)) / rate
     omega = 2.0 * np.pi * board().damped
     decay = 2.0 * np.pi * board().hertz * board().damping
@@ -120,12 +120,12 @@ def test_a_sweep_gives_the_frequencies_of_the_board(by):
     played = sweep.signal(rate)
     response = fftconvolve(played + 0.05 * played**2, impulse)
     response = response + 1e-3 * np.abs(response).max() * np.random.default_rng(3).standard_normal(response.size)
-    known = read_sweep("20,1500,4") if by == "parameters" else played
+    known = read_sweep("20,800,3") if by == "parameters" else played
 
     one = impulse_response(Recording("sweep", rate, response), known)
-    found = pick_modes(take_impulses([one], HIGHEST).spectra, LOWEST, HIGHEST).likely
+    found = pick_modes(take_impulses([one], 300.0).spectra, LOWEST, 300.0).likely
 
     truth = board().damped
-    assert len(found) >= 7
+    assert len(found) >= 6
     for mode in found:
         assert np.abs(truth / mode.frequency - 1.0).min() < max(1e-3, 4.0 * mode.sd / mode.frequency)
