@@ -165,6 +165,18 @@ def test_a_fragment_of_another_name_with_edges_is_one_more_setup(tmp_path):
     assert [str(reading.label) for reading in first.readings] == ["(1,1)"]
 
 
+def test_readings_of_a_fragment_stand_in_place_of_all_that_the_card_has(tmp_path):
+    """Its edges and noise stay; of two sets of readings of one setup nobody could tell which is meant."""
+    (tmp_path / "planted.toml").write_text(CARD + 'unlabelled_hz = [404]\n[setup.frequencies_hz]\n"(1,1)" = 51\n')
+    (tmp_path / "fragment.toml").write_text('[setup.frequencies_hz]\n"(2,0)" = 76.2\n')
+
+    (setup,) = prepare(tmp_path / "planted.toml", setup=tmp_path / "fragment.toml").stated.setups
+
+    assert [(str(reading.label), reading.frequency.mean) for reading in setup.readings] == [("(2,0)", 76.2)]
+    assert setup.peaks == ()
+    assert setup.noise.median == pytest.approx(1e-3)
+
+
 def test_a_campaign_takes_no_fragment(tmp_path):
     with pytest.raises(InputError, match="setup: wanted a board, whose setup it completes, got a campaign"):
         bayesplate.check("spruce-half-tops", setup=tmp_path / "fragment.toml")
