@@ -198,16 +198,21 @@ def test_flac_is_read(tmp_path):
     np.testing.assert_allclose(one.response, 0.5 * RING, atol=2.0**-22)
 
 
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_uff_is_read_in_time_and_frequency(tmp_path):
+    """Binary data sets, 58b; the library leaves the files open that it writes."""
     pyuff = pytest.importorskip("pyuff", reason="the extra bayesplate[recordings] is not installed")
     hertz = np.arange(200) * 0.5
     common = {"rsp_node": 1, "rsp_dir": 3, "ref_node": 1, "ref_dir": 3, "binary": 1, "return_full_dict": True}
-    of_time = pyuff.prepare_58(**common, func_type=1, data=RING, x=TIMES, ordinate_spec_data_type=12)
-    of_frequency = pyuff.prepare_58(
-        **common, func_type=4, data=hertz + 1j, x=hertz, ordinate_spec_data_type=12, abscissa_spec_data_type=18
-    )
-    for name, content in (("time", of_time), ("frequency", of_frequency)):
-        pyuff.UFF(str(tmp_path / f"{name}.uff")).write_sets(content, "add")
+    common |= {"abscissa_spacing": 1, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13}
+    sets = {
+        "time": pyuff.prepare_58(**common, func_type=1, data=RING, x=TIMES, abscissa_spec_data_type=17),
+        "frequency": pyuff.prepare_58(**common, func_type=4, data=hertz + 1j, x=hertz, abscissa_spec_data_type=18),
+    }
+    for name, content in sets.items():
+        texts = {key for key in content if key.startswith("id") or key.endswith(("_name", "_lab"))}
+        whole = {key: ("" if key in texts else 0) if value is None else value for key, value in content.items()}
+        pyuff.UFF(str(tmp_path / f"{name}.uff")).write_sets(whole, "add")
 
     heard, response = only(tmp_path / "time.uff"), only(tmp_path / "frequency.uff")
 
