@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs calibration spectra campaigns coverage trial benchmarks
+.PHONY: fit test slow docs calibration spectra campaigns recordings sand measured coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -33,6 +33,15 @@ spectra: $(VENV)/tested-with
 
 campaigns: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_campaigns.py --campaigns 100 --workers 2 --out results/campaigns.jsonl --publish docs/validation
+
+recordings: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_recordings.py --recordings 200 --workers 2 --out results/recordings.jsonl --publish docs/validation
+
+sand: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_sand.py --pictures 20 --workers 2 --out results/sand.jsonl --publish docs/validation
+
+measured: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_measured.py --folder ../shared/data
 
 trial: $(VENV)/tested-with
 	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl

@@ -6,6 +6,7 @@
     check(card)      what a card can identify, without sampling
     modes(card)      the lowest modes and their Chladni figures
     cite(card)       references of exactly what a fit uses
+    pick(files)      recordings of hits, taps or sweeps to frequencies
     new(path)        a first card, to be completed
 
 `card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from bayesplate.plate.measured import Peak, Reading
     from bayesplate.plate.setup import AttachedItem, DeclaredAir, Setup
     from bayesplate.quantities import Quantity
+    from bayesplate.recordings.contract import PickReport
     from bayesplate.results.checking import CheckReport
     from bayesplate.results.comparison import Comparison
     from bayesplate.results.sheets import ModesReport
@@ -68,6 +70,7 @@ if TYPE_CHECKING:
     from bayesplate.workflow.fit import FitResult, fit
     from bayesplate.workflow.modes import ModesResult, modes
     from bayesplate.workflow.new import new
+    from bayesplate.workflow.pick import PickResult, pick
     from bayesplate.workflow.problem import Problem
 
 __all__ = [
@@ -98,6 +101,8 @@ __all__ = [
     "NotConvergedError",
     "NotIdentifiableError",
     "Peak",
+    "PickReport",
+    "PickResult",
     "PriorCard",
     "Problem",
     "Quantity",
@@ -111,6 +116,7 @@ __all__ = [
     "fit",
     "modes",
     "new",
+    "pick",
 ]
 
 _HOMES = {
@@ -141,6 +147,8 @@ _HOMES = {
     "NotConvergedError": "bayesplate.errors",
     "NotIdentifiableError": "bayesplate.errors",
     "Peak": "bayesplate.plate.measured",
+    "PickReport": "bayesplate.recordings.contract",
+    "PickResult": "bayesplate.workflow.pick",
     "PriorCard": "bayesplate.cards.prior",
     "Problem": "bayesplate.workflow.problem",
     "Quantity": "bayesplate.quantities",
@@ -153,6 +161,7 @@ _HOMES = {
     "diagnose": "bayesplate.workflow.diagnose",
     "fit": "bayesplate.workflow.fit",
     "new": "bayesplate.workflow.new",
+    "pick": "bayesplate.workflow.pick",
 }
 """Where each name is defined. `modes` is the folder of that name, which can be called: see `bayesplate.modes`."""
 

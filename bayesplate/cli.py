@@ -53,6 +53,9 @@ def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None
             callback=_names,
             help="Declared effects, comma separated, in place of the card's; or none.",
         ),
+        "setup": click.option(
+            "--setup", type=click.Path(), help="File with a [setup] that completes the card: what pick writes."
+        ),
         "linear": click.option("--linear", is_flag=True, help="Force the linear frequency law."),
         "exact": click.option("--exact", is_flag=True, help="Force the exact frequency law."),
         "robust": click.option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say."),
@@ -94,14 +97,14 @@ def main() -> None:
 
 @main.command()
 @click.argument("card")
-@_options("effects", "json", "quiet", "debug")
-def check(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug: bool) -> None:
+@_options("effects", "setup", "json", "quiet", "debug")
+def check(card: str, effects: list[str] | None, setup: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
     """Every fault of CARD, or what would be fitted and what it can identify."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.check import check as run
         from bayesplate.workflow.shown import show_check
 
-        report = run(card, effects=effects)
+        report = run(card, effects=effects, setup=setup)
         if as_json:
             print_json(report)
         elif not quiet:
@@ -110,12 +113,27 @@ def check(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debu
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
+@_options(
+    "out",
+    "seed",
+    "effects",
+    "setup",
+    "linear",
+    "exact",
+    "robust",
+    "report",
+    "force",
+    "resume",
+    "json",
+    "quiet",
+    "debug",
+)
 def fit(
     card: str,
     out: str | None,
     seed: int,
     effects: list[str] | None,
+    setup: str | None,
     linear: bool,
     exact: bool,
     robust: bool,
@@ -139,6 +157,7 @@ def fit(
                 out=default_folder(card) if out is None else out,
                 seed=seed,
                 effects=effects,
+                setup=setup,
                 law="linear" if linear else "exact" if exact else None,
                 robust=robust,
                 report=report,
@@ -157,12 +176,13 @@ def fit(
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "force", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "setup", "force", "json", "quiet", "debug")
 def modes(
     card: str,
     out: str | None,
     seed: int,
     effects: list[str] | None,
+    setup: str | None,
     force: bool,
     as_json: bool,
     quiet: bool,
@@ -174,7 +194,8 @@ def modes(
         from bayesplate.workflow.prepare import default_folder
         from bayesplate.workflow.shown import show_modes
 
-        result = run(card, out=default_folder(card) if out is None else out, seed=seed, effects=effects, force=force)
+        folder = default_folder(card) if out is None else out
+        result = run(card, out=folder, seed=seed, effects=effects, setup=setup, force=force)
         if as_json:
             print_json(result.summary)
         elif not quiet:
@@ -219,12 +240,13 @@ def compare(
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "report", "force", "resume", "json", "quiet", "debug")
+@_options("out", "seed", "effects", "setup", "report", "force", "resume", "json", "quiet", "debug")
 def diagnose(
     card: str,
     out: str | None,
     seed: int,
     effects: list[str] | None,
+    setup: str | None,
     report: bool,
     force: bool,
     resume: bool,
@@ -241,7 +263,15 @@ def diagnose(
 
             folder = default_folder(card) if out is None else out
             result = run(
-                card, out=folder, report=report, seed=seed, effects=effects, force=force, resume=resume, progress=tell
+                card,
+                out=folder,
+                report=report,
+                seed=seed,
+                effects=effects,
+                setup=setup,
+                force=force,
+                resume=resume,
+                progress=tell,
             )
         if as_json:
             print_json(result.to_json())
@@ -277,6 +307,76 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
             print_json({"path": str(card)})
         elif not quiet:
             say(f"written to {card}. Next: bayesplate modes {card}, which shows where to tap, and bayesplate check")
+
+
+def _place(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> list[tuple[float, float]]:
+    """Places "X,Y" in mm as m."""
+    found = []
+    for text in given:
+        try:
+            x, y = (1e-3 * float(part) for part in text.split(","))
+        except ValueError:
+            raise click.BadParameter(f"wanted X,Y in mm, got {text!r}: {option.opts[0]} 20,20") from None
+        found.append((x, y))
+    return found
+
+
+def _mass(context: click.Context, option: click.Parameter, given: str | None) -> tuple[float, float] | None:
+    """A mass "G" or "G,SD" in g as kg."""
+    if given is None:
+        return None
+    try:
+        mass, sd = (*(1e-3 * float(part) for part in given.split(",")), 0.0)[:2]
+    except ValueError:
+        raise click.BadParameter(
+            f"wanted a mass in g, or mass and standard deviation, got {given!r}: 0.6,0.1"
+        ) from None
+    return mass, sd
+
+
+def _sand(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[float, str]:
+    """Pictures "HZ=FILE" by their frequency."""
+    found = {}
+    for text in given:
+        hertz, _, path = text.partition("=")
+        try:
+            found[float(hertz)] = path
+        except ValueError:
+            raise click.BadParameter(f"wanted HZ=FILE, got {text!r}: --sand 210=sand-210.png") from None
+    return found
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path())
+@click.option("--card", metavar="CARD", help="Board card with sizes and edges: labels are computed for it.")
+@click.option("--rate", type=float, metavar="HZ", help="Samples a second, where a file does not say it.")
+@click.option(
+    "--hammer", multiple=True, callback=_place, metavar="X,Y", help="Where it was hit, mm; once, or per file."
+)
+@click.option("--sensor", multiple=True, callback=_place, metavar="X,Y", help="Where the sensor was, mm; likewise.")
+@click.option("--sensor-mass", callback=_mass, metavar="G", help="Of the accelerometer in g, or G,SD.")
+@click.option("--channels", default="force,response", show_default=True, help="Of a file with two channels.")
+@click.option("--motion", default="acceleration", show_default=True, help="What a response is; pressure: a microphone.")
+@click.option("--polarity", help="same or opposite, of force and response (default: found by the labels).")
+@click.option("--sweep", metavar="F1,F2,S", help="For recordings of an exponential sweep: its parameters, or its file.")
+@click.option("--sand", multiple=True, callback=_sand, metavar="HZ=FILE", help="Picture of sand, cropped to the board.")
+@click.option("--lowest", type=float, default=20.0, show_default=True, metavar="HZ")
+@click.option("--highest", type=float, default=1000.0, show_default=True, metavar="HZ")
+@click.option("--out", type=click.Path(), default="results/recordings", show_default=True, help="Output folder.")
+@_options("force", "json", "quiet", "debug")
+def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bool, debug: bool, **given: Any) -> None:
+    """Frequencies of the modes in recordings FILES, and the [setup] that a card takes."""
+    with reporting(as_json=as_json, debug=debug):
+        from bayesplate.workflow.pick import FRAGMENT, PAGE
+        from bayesplate.workflow.pick import pick as run
+        from bayesplate.workflow.pick_words import show_pick
+
+        result = run(files, out=out, force=force, **given)
+        if as_json:
+            print_json(result.summary)
+        elif not quiet:
+            print_shown(show_pick(result.summary))
+            say(f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit CARD --setup {out}/{FRAGMENT}")
 
 
 @main.command()

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, PrivateAttr
 
+from bayesplate.cards.fragment import merged
 from bayesplate.cards.measures import DENSITY, QuantityReader
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.repeated import CALIPER, FURTHEST_SIZES, RULE, SCALES
@@ -133,7 +134,12 @@ class BoardCard(Section):
         return next(setup for setup in self.setups if setup.name == name)
 
 
-def load_board(name_or_path: str | os.PathLike[str], *, may_lack_frequencies: bool = False) -> BoardCard:
+def load_board(
+    name_or_path: str | os.PathLike[str],
+    *,
+    may_lack_frequencies: bool = False,
+    setup: str | os.PathLike[str] | None = None,
+) -> BoardCard:
     """Read a board card.
 
     Parameters
@@ -142,6 +148,8 @@ def load_board(name_or_path: str | os.PathLike[str], *, may_lack_frequencies: bo
         Name of a shipped card, or a path: it contains a separator or ends in .toml.
     may_lack_frequencies : bool
         Whether a board that was not measured yet will do.
+    setup : str or path, optional
+        A file with a table [setup] that takes the place of the card's, key by key.
 
     Returns
     -------
@@ -153,18 +161,31 @@ def load_board(name_or_path: str | os.PathLike[str], *, may_lack_frequencies: bo
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
     path = find("boards", name_or_path)
-    return _read_board(read_file(path), plain(path.name), path.stem, path, may_lack_frequencies)
+    return _read_board(read_file(path), plain(path.name), path.stem, path, may_lack_frequencies, setup)
 
 
-def read_board_text(text: str, name: str, *, may_lack_frequencies: bool = False) -> BoardCard:
+def read_board_text(
+    text: str, name: str, *, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
+) -> BoardCard:
     """Read a board card from a text, as if it stood in NAME.toml; raises InputError like `load_board`."""
     stem = name.removesuffix(".toml")
     data = text.encode("utf-8", "surrogatepass")
-    return _read_board(data, f"{plain(stem)}.toml", stem, None, may_lack_frequencies)
+    return _read_board(data, f"{plain(stem)}.toml", stem, None, may_lack_frequencies, setup)
 
 
-def _read_board(data: bytes, file: str, stem: str, path: Path | None, may_lack_frequencies: bool = False) -> BoardCard:
+def _read_board(
+    data: bytes,
+    file: str,
+    stem: str,
+    path: Path | None,
+    may_lack_frequencies: bool = False,
+    setup: str | os.PathLike[str] | None = None,
+) -> BoardCard:
     table = read_table(data, file)
+    if setup is not None:
+        together, file = merged(table, file, setup)
+        data = together.encode("utf-8", "surrogatepass")
+        table = read_table(data, file)
     faults = [*name_faults(table, file, stem), *_mass_faults(table, file), *_setup_name_faults(table, file)]
     context = {
         "written": table,

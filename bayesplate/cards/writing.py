@@ -155,3 +155,46 @@ def write_card(path: Any, name: str, content: str, *, force: bool) -> None:
         raise InputError(Fault(shown, "a new file", "one that exists", "force=True replaces it")) from None
     except OSError as error:
         raise InputError(Fault(shown, "a place for the card", error.strerror or str(error))) from None
+
+
+def table_text(content: Mapping[str, Any]) -> str:
+    """A whole table as TOML, as the reader of TOML would return it again; tables within lists stand on one line.
+
+    Parameters
+    ----------
+    content : mapping
+        Of texts, numbers, truth values, dates, lists and tables.
+
+    Returns
+    -------
+    str
+    """
+    return "\n".join(_lines(content, ())) + "\n"
+
+
+def _lines(content: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[str]:
+    tables = {key: value for key, value in content.items() if isinstance(value, Mapping) and len(above) < 2}
+    for key, value in content.items():
+        if key not in tables:
+            yield f"{_key(key)} = {_value(value)}"
+    for key, value in tables.items():
+        names = (*above, _key(key))
+        yield ""
+        yield f"[{'.'.join(names)}]"
+        yield from _lines(value, names)
+
+
+def _key(key: str) -> str:
+    return key if key.isascii() and key.replace("_", "").replace("-", "").isalnum() else text(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return table({_key(key): _value(one) for key, one in value.items()})
+    if isinstance(value, list | tuple):
+        return array(_value(one) for one in value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return text(value)
+    return value.isoformat() if hasattr(value, "isoformat") else repr(value)

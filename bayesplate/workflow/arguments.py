@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from numbers import Integral
-from typing import get_args
+from numbers import Integral, Real
+from typing import TypeGuard, get_args
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
+from bayesplate.recordings.reading import CHANNELS
+from bayesplate.recordings.signals import MOTIONS
 from bayesplate.workflow.prepare import Prepared
 
 Check = Callable[[str, object], Iterator[Fault]]
@@ -27,7 +29,9 @@ def require_arguments(**given: object) -> None:
     Parameters
     ----------
     **given
-        Any of card, prior, out, seed, effects, law, robust, coefficients, report, force, resume, n_null, progress.
+        Any of card, prior, setup, out, seed, effects, law, robust, coefficients, report, force, resume, n_null,
+        progress; for recordings files, card_or_none, rate, places (hammer, sensor and the number of files),
+        sensor_mass, channels, motion, polarity, band (lowest and highest), sand.
 
     Raises
     ------
@@ -112,6 +116,69 @@ def _effects(name: str, value: object) -> Iterator[Fault]:
             yield Fault(f"{name} {number}", "each name once", f"{quoted(effect)} again")
 
 
+def _files(name: str, value: object) -> Iterator[Fault]:
+    if isinstance(value, str | os.PathLike) or not isinstance(value, list | tuple) or not value:
+        yield Fault(name, "a list of one path or more", _shown(value), "files=[path]")
+        return
+    for number, one in enumerate(value, start=1):
+        yield from _path(f"{name} {number}", one)
+
+
+def _rate(name: str, value: object) -> Iterator[Fault]:
+    if value is not None and not _is_positive(value):
+        yield Fault(name, "samples a second, a positive number", _shown(value))
+
+
+def _band(name: str, value: object) -> Iterator[Fault]:
+    assert isinstance(value, tuple)
+    if not (_is_positive(value[0]) and _is_positive(value[1]) and 2.0 * value[0] <= value[1] <= 20_000.0):
+        wanted = "two frequencies in Hz, the second twice the first or more and at most 20000"
+        yield Fault("lowest and highest", wanted, f"{_shown(value[0])} and {_shown(value[1])}")
+
+
+def _given_places(name: str, value: object) -> Iterator[Fault]:
+    assert isinstance(value, tuple)
+    *both, count = value
+    for which, given in zip(("hammer", "sensor"), both, strict=True):
+        if not isinstance(given, list | tuple) or len(given) not in (0, 1, count):
+            wanted = f"no place, one for all files, or one for each of {count}"
+            yield Fault(which, wanted, str(len(given)) if isinstance(given, list | tuple) else _shown(given))
+            continue
+        for number, place in enumerate(given, start=1):
+            is_pair = isinstance(place, list | tuple) and len(place) == 2
+            if not is_pair or not all(_is_number(one) for one in place):
+                yield Fault(f"{which} {number}", "a place (x, y) in m", _shown(place), "hammer=[(0.02, 0.02)]")
+
+
+def _sensor_mass(name: str, value: object) -> Iterator[Fault]:
+    if value is None:
+        return
+    is_pair = isinstance(value, list | tuple) and len(value) == 2 and all(_is_number(one) for one in value)
+    if not is_pair or not (value[0] > 0.0 and value[1] >= 0.0):  # type: ignore[index]
+        yield Fault(name, "mass and standard deviation in kg, (0.0006, 0.0001)", _shown(value))
+
+
+def _sand(name: str, value: object) -> Iterator[Fault]:
+    if value is None:
+        return
+    if not isinstance(value, dict):
+        yield Fault(name, "a dict of frequencies in Hz and pictures", _shown(value), 'sand={210: "210.png"}')
+        return
+    for hertz, picture in value.items():
+        if not _is_positive(hertz):
+            yield Fault(f"{name} {_shown(hertz)}", "a frequency in Hz", _shown(hertz))
+        yield from _path(f"{name} {_shown(hertz)}", picture)
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    is_truth = isinstance(value, bool | np.bool_)
+    return not is_truth and isinstance(value, Real) and bool(np.isfinite(float(value)))
+
+
+def _is_positive(value: object) -> TypeGuard[float]:
+    return _is_number(value) and value > 0.0
+
+
 def _shown(value: object) -> str:
     return repr(value) if value is None or isinstance(value, bool) else shown(value)
 
@@ -120,6 +187,7 @@ _CHECKS: dict[str, Check] = {
     "card": _card,
     "prior": _prior,
     "out": _path_or_none,
+    "setup": _path_or_none,
     "seed": _whole(0),
     "n_null": _whole(1),
     "effects": _effects,
@@ -127,4 +195,14 @@ _CHECKS: dict[str, Check] = {
     "coefficients": _word(get_args(CoefficientSource)),
     **dict.fromkeys(("robust", "report", "force", "resume"), _switch),
     "progress": _callable,
+    "files": _files,
+    "card_or_none": _path_or_none,
+    "rate": _rate,
+    "places": _given_places,
+    "sensor_mass": _sensor_mass,
+    "channels": _word(CHANNELS),
+    "motion": _word(MOTIONS),
+    "polarity": _word(("same", "opposite")),
+    "band": _band,
+    "sand": _sand,
 }

@@ -109,28 +109,33 @@ def problem_or_campaign(
     effects: Sequence[str] | None = None,
     law: LawName | None = None,
     robust: bool = False,
+    setup: str | os.PathLike[str] | None = None,
 ) -> Problem | Campaign:
     """What a command was given, as a problem or as a campaign.
 
     Parameters
     ----------
     given : Problem, str, path, Board or Campaign
-    effects, law, robust
-        As of `Problem.from_card`; of a problem or a campaign that is there already they may not be given.
+    effects, law, robust, setup
+        As of `Problem.from_card`, setup for a board only; of a problem or a campaign that is there already they may
+        not be given.
 
     Raises
     ------
     InputError
         As `Problem.from_card` and `Campaign.from_card`; also if a campaign is given beside what it states itself.
     """
+    is_card = isinstance(given, str | os.PathLike) and is_campaign(given)
+    if setup is not None and (is_card or isinstance(given, Campaign)):
+        raise InputError(Fault("setup", "a board, whose setup it completes", "a campaign", "give it to each board"))
     if isinstance(given, Campaign):
         if effects is not None or law is not None or robust:
             wanted, remedy = "nothing beside a Campaign", "Campaign.from_card takes it"
             raise InputError(Fault("effects, law, robust", wanted, "a value", remedy))
         return given
-    if isinstance(given, str | os.PathLike) and is_campaign(given):
+    if is_card and isinstance(given, str | os.PathLike):
         return Campaign.from_card(given, effects, law, robust)
-    return as_problem(given, effects=effects, law=law, robust=robust)
+    return as_problem(given, effects=effects, law=law, robust=robust, setup=setup)
 
 
 def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[Prepared], PriorCard | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -55,7 +56,12 @@ class CheckResult(CheckReport):
         return show_check(self).html(self.title or self.name)
 
 
-def check(card: Problem | Card | Campaign, *, effects: Sequence[str] | None = None) -> CheckResult | CampaignCheck:
+def check(
+    card: Problem | Card | Campaign,
+    *,
+    effects: Sequence[str] | None = None,
+    setup: str | os.PathLike[str] | None = None,
+) -> CheckResult | CampaignCheck:
     """Say what would be fitted, and what it can identify; nothing is sampled or written.
 
     Parameters
@@ -63,6 +69,8 @@ def check(card: Problem | Card | Campaign, *, effects: Sequence[str] | None = No
     card : Problem, str, path, Board or Campaign
         A problem, the name of a shipped board or campaign card, the path of a card, or a board made in Python.
     effects : sequence of str, optional
+    setup : path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
 
     Returns
     -------
@@ -74,8 +82,8 @@ def check(card: Problem | Card | Campaign, *, effects: Sequence[str] | None = No
     InputError, NotIdentifiableError
         As `fit` would.
     """
-    require_arguments(card=card, effects=effects)
-    given = problem_or_campaign(card, effects=effects)
+    require_arguments(card=card, effects=effects, setup=setup)
+    given = problem_or_campaign(card, effects=effects, setup=setup)
     if isinstance(given, Campaign):
         from bayesplate.workflow.campaign_check import check_campaign  # which checks boards in turn
 

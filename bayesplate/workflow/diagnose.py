@@ -106,6 +106,7 @@ def diagnose(
     report: bool = True,
     seed: int = 1,
     effects: Sequence[str] | None = None,
+    setup: str | os.PathLike[str] | None = None,
     force: bool = False,
     resume: bool = False,
     n_null: int = N_SETS,
@@ -127,6 +128,8 @@ def diagnose(
         Everything random follows from it.
     effects : sequence of str, optional
         Declared effects in place of the card's; they are part of the model before the search.
+    setup : path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
     n_null : int
@@ -145,10 +148,10 @@ def diagnose(
         As `bayesplate.fit`, of the fit without further effects; also if a problem asks for robust noise.
     """
     require_arguments(
-        card=card, out=out, report=report, seed=seed, effects=effects, force=force, resume=resume, n_null=n_null,
-        progress=progress,
+        card=card, out=out, report=report, seed=seed, effects=effects, setup=setup, force=force, resume=resume,
+        n_null=n_null, progress=progress,
     )  # fmt: skip
-    problem = problem_or_campaign(card, effects=effects)
+    problem = problem_or_campaign(card, effects=effects, setup=setup)
     if isinstance(problem, Campaign):
         from bayesplate.workflow.campaign_diagnose import diagnose_campaign
 

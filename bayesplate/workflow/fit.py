@@ -89,6 +89,7 @@ def fit(
     effects: Sequence[str] | None = None,
     law: LawName | None = None,
     robust: bool = False,
+    setup: str | os.PathLike[str] | None = None,
     force: bool = False,
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
@@ -112,6 +113,8 @@ def fit(
         By default the linear law where it is good enough.
     robust : bool
         Student's distribution for the noise.
+    setup : path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
     progress : callable, optional
@@ -125,8 +128,8 @@ def fit(
     Raises
     ------
     InputError
-        If the card or the folder cannot be used, or effects, law or robust are given beside a problem, which states
-        them itself; then nothing is written.
+        If the card or the folder cannot be used, or effects, law, robust or setup are given beside a problem, which
+        states them itself; then nothing is written.
     NotIdentifiableError
         If the data leave a constant open; then nothing is written.
     NotConvergedError
@@ -136,9 +139,9 @@ def fit(
     """
     require_arguments(
         card=card, out=out, report=report, seed=seed, effects=effects, law=law, robust=robust,
-        force=force, resume=resume, progress=progress,
+        setup=setup, force=force, resume=resume, progress=progress,
     )  # fmt: skip
-    problem = problem_or_campaign(card, effects=effects, law=law, robust=robust)
+    problem = problem_or_campaign(card, effects=effects, law=law, robust=robust, setup=setup)
     if isinstance(problem, Campaign):
         from bayesplate.workflow.campaign_fit import fit_campaign  # which writes boards as this file does
 

@@ -68,6 +68,7 @@ def modes(
     *,
     out: str | os.PathLike[str] | None = None,
     effects: Sequence[str] | None = None,
+    setup: str | os.PathLike[str] | None = None,
     seed: int = 1,
     force: bool = False,
 ) -> ModesResult:
@@ -85,6 +86,8 @@ def modes(
         it.
     effects : sequence of str, optional
         Declared effects in place of the card's.
+    setup : path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
     seed : int
         Of the draws from the prior.
     force : bool
@@ -99,8 +102,8 @@ def modes(
     InputError
         If the card or the folder cannot be used; then nothing is written.
     """
-    require_arguments(card=card, out=out, effects=effects, seed=seed, force=force)
-    prepared = _prepared(card, effects)
+    require_arguments(card=card, out=out, effects=effects, setup=setup, seed=seed, force=force)
+    prepared = _prepared(card, effects, setup)
     board = prepared.board
     stems = ["modes"] if len(board.setups) == 1 else [f"modes-{setup.name}" for setup in board.setups]
     names = [f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")]
@@ -126,11 +129,11 @@ def modes(
     return ModesResult(report, sheets, files)
 
 
-def _prepared(card: Problem | Card, effects: Sequence[str] | None) -> Prepared:
+def _prepared(card: Problem | Card, effects: Sequence[str] | None, setup: str | os.PathLike[str] | None) -> Prepared:
     """As for a fit, but a board that was not measured yet will do."""
     if isinstance(card, Problem):
-        return as_problem(card, effects=effects).prepared
-    return prepare(card, effects, may_lack_frequencies=True)
+        return as_problem(card, effects=effects, setup=setup).prepared
+    return prepare(card, effects, may_lack_frequencies=True, setup=setup)
 
 
 def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]:

@@ -88,6 +88,7 @@ def prepare(
     *,
     prior: str | os.PathLike[str] | PriorCard | None = None,
     may_lack_frequencies: bool = False,
+    setup: str | os.PathLike[str] | None = None,
 ) -> Prepared:
     """Read a board card and everything it names.
 
@@ -102,6 +103,8 @@ def prepare(
         In place of the prior that the card names.
     may_lack_frequencies : bool
         Whether a board that was not measured yet will do.
+    setup : str or path, optional
+        A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
 
     Returns
     -------
@@ -117,12 +120,12 @@ def prepare(
     """
     given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
     if not isinstance(card, Board):
-        read = load_board(card, may_lack_frequencies=may_lack_frequencies)
+        read = load_board(card, may_lack_frequencies=may_lack_frequencies, setup=setup)
         return _prepared(read, load_named(read, given), effects)
-    read = read_board_text(card_text(card), card.name, may_lack_frequencies=may_lack_frequencies)
+    read = read_board_text(card_text(card), card.name, may_lack_frequencies=may_lack_frequencies, setup=setup)
     found = ((setup.name, setup.published_coefficients) for setup in card.setups)
     prepared = _prepared(read, load_named(read, given, {name: one for name, one in found if one is not None}), effects)
-    lost = list(_lost(card, prepared.board))
+    lost = list(_lost(card, prepared.board)) if setup is None else []
     if lost:
         raise InputError(lost)
     return prepared

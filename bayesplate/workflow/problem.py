@@ -63,6 +63,7 @@ class Problem:
         prior: str | os.PathLike[str] | PriorCard | None = None,
         law: LawName | None = None,
         robust: bool = False,
+        setup: str | os.PathLike[str] | None = None,
     ) -> Problem:
         """The problem of a card, or of a board made in Python.
 
@@ -78,6 +79,8 @@ class Problem:
             By default the linear law where it is good enough.
         robust : bool
             Student's distribution for the noise.
+        setup : str or path, optional
+            A file with a table [setup] that takes the place of the card's, key by key: what `pick` writes.
 
         Returns
         -------
@@ -88,8 +91,8 @@ class Problem:
         InputError
             With every fault of the card, or of the card that the board would have.
         """
-        require_arguments(card=card, effects=effects, prior=prior, law=law, robust=robust)
-        return cls(prepare(card, effects, prior=prior), law, robust)
+        require_arguments(card=card, effects=effects, prior=prior, law=law, robust=robust, setup=setup)
+        return cls(prepare(card, effects, prior=prior, setup=setup), law, robust)
 
     @property
     def board(self) -> Board:
@@ -261,13 +264,14 @@ def as_problem(
     effects: Sequence[str] | None = None,
     law: LawName | None = None,
     robust: bool = False,
+    setup: str | os.PathLike[str] | None = None,
 ) -> Problem:
     """What a command was given, as a problem.
 
     Parameters
     ----------
     given : Problem, str, path or Board
-    effects, law, robust
+    effects, law, robust, setup
         As of `Problem.from_card`; of a problem that is there already they may not be given.
 
     Returns
@@ -280,8 +284,8 @@ def as_problem(
         If the card cannot be used, or a problem is given together with what it states itself.
     """
     if not isinstance(given, Problem):
-        return Problem(prepare(given, effects), law, robust)
-    told = {"effects": effects is not None, "law": law is not None, "robust": robust}
+        return Problem(prepare(given, effects, setup=setup), law, robust)
+    told = {"effects": effects is not None, "law": law is not None, "robust": robust, "setup": setup is not None}
     if any(told.values()):
         stated = ", ".join(name for name, is_told in told.items() if is_told)
         raise InputError(Fault(stated, "nothing beside a Problem", "a value", "Problem.from_card takes it"))

@@ -4,8 +4,9 @@
     :exit: 3
     ```
 
-It runs in a folder that holds copies of `docs/cards` and the cards of `designs.py`. What is shown was printed by this
-very version; a command that ends with another exit code than the one given stops the build.
+It runs in a folder that holds copies of `docs/cards`, the cards of `designs.py` and the recordings of `taps.py`. What
+is shown was printed by this very version; a command that ends with another exit code than the one given stops the
+build.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 from designs import write_designs
+from taps import write_taps
 
 WIDTH = 92
 """Columns of the terminal that the commands believe to print on."""
@@ -50,6 +52,7 @@ def _clear_the_bench(app: Any) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(Path(app.srcdir) / "cards", folder)
     write_designs(folder)
+    write_taps(folder)
     _printed.clear()
 
 

@@ -32,6 +32,7 @@ OPEN_TO_ALL = {"errors", "quantities", "labels"}
 ROOMS = {
     **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
     "recordings": {"recordings", "modes", *OPEN_TO_ALL},
+    "report": {*ROAD, "recordings", *OPEN_TO_ALL},
     "workflow": {*ROAD, "recordings", "workflow", *OPEN_TO_ALL},
     "cli": {"cli", "asking", "terminal", "workflow", "errors"},
     "asking": {"asking", "workflow", "errors"},
@@ -61,6 +62,9 @@ DOORS = {
     "matplotlib": "report",
     "corner": "report",
     "jinja2": "report",
+    "PIL": "recordings",
+    "soundfile": "recordings",
+    "pyuff": "recordings",
 }
 """Heavy libraries and the one room that may import each."""
 ONLY_WHERE_NEEDED = {*DOORS, "scipy.stats"}

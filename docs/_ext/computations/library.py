@@ -54,6 +54,17 @@ CHECKS = (
         "mass, and how often it is claimed.",
     ),
     (
+        "recordings",
+        "make recordings",
+        "Simulated hits on boards of another discretisation: how many picked frequencies lie within their standard "
+        "errors, bias, false and missed modes, and a control that reads the highest line.",
+    ),
+    (
+        "sand",
+        "make sand",
+        "Pictures of sand, uneven, partial and askew: how often the right mode is the likeliest.",
+    ),
+    (
         "calibration",
         "make calibration",
         "Boards are drawn from the prior, measured with noise and fitted; if the inference is right, the truth falls "

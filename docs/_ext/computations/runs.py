@@ -18,12 +18,12 @@ _MOST_WORDS = {
 }
 
 
-def _summary(card: str) -> dict[str, Any]:
+def _summary(card: str, *options: str) -> dict[str, Any]:
     """The summary of a fit that a page runs, or has run: the same command is never run twice."""
     folder = bench(SOURCE)
     path = folder / "results" / card / "summary.json"
     named = card if not (folder / f"{card}.toml").exists() else f"{card}.toml"
-    code, text = printed(f"fit {named}", folder)
+    code, text = printed(" ".join(["fit", named, *options]), folder)
     assert code == 0, text
     return json.loads(path.read_text(encoding="utf-8"))
 
@@ -37,9 +37,9 @@ def sheet_of(folder: Path, card: str) -> str:
     return picture(name, "a sheet with the Chladni figures of the lowest modes, each with its label and frequency")
 
 
-def files_of(folder: Path, card: str) -> str:
+def files_of(folder: Path, card: str, *options: str) -> str:
     """What a fit has written, each file with a few words; the report is linked where there is one."""
-    _summary(card)
+    _summary(card, *options)
     results = bench(SOURCE) / "results" / card
     lines = [f"`{name}`\n: {words}\n" for name, words in _MOST_WORDS.items() if (results / name).exists()]
     if (results / "report.html").exists():

@@ -1,0 +1,164 @@
+"""What `pick` found, as its JSON has it and as tables and pages are made from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from bayesplate.recordings.picking import Picked, PickedMode
+from bayesplate.recordings.spectra import Spectra
+
+LEAST_LABEL = 0.005
+"""Probability below which a label is not listed."""
+MOST_LABELS = 4
+
+
+@dataclass(frozen=True)
+class LabelChance:
+    """A label that a peak may have, and the probability that it is this one."""
+
+    label: str
+    probability: float
+
+
+@dataclass(frozen=True)
+class PickedRow:
+    """One peak.
+
+    Attributes
+    ----------
+    hz, sd_hz : float
+        Frequency and its standard error.
+    noise_hz, scatter_hz, window_hz : float
+        Its parts: noise, scatter between hits and places beyond it, choice of lines.
+    damping_percent, damping_sd_percent : float
+    sign : str
+        "+" or "-" between hammer and sensor, where their polarity is known or was found; otherwise empty.
+    amplitude : float
+        Strength over the strongest.
+    spurious_probability : float
+        That it is no mode of the board.
+    kind : str
+        What it would be then; empty where nothing speaks of it.
+    seen : float
+        Share of the widths of windows in which the search found it.
+    alike : float
+        Share of its power that is the same from hit to hit.
+    labels : tuple of LabelChance
+        The most probable first; none without a card.
+    """
+
+    hz: float
+    sd_hz: float
+    noise_hz: float
+    scatter_hz: float
+    window_hz: float
+    damping_percent: float
+    damping_sd_percent: float
+    sign: str
+    amplitude: float
+    spurious_probability: float
+    kind: str
+    seen: float
+    alike: float
+    labels: tuple[LabelChance, ...] = ()
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether it is a mode rather than not."""
+        return self.spurious_probability < 0.5
+
+
+@dataclass(frozen=True)
+class PickReport:
+    """What `pick` found.
+
+    Attributes
+    ----------
+    format : int
+    files : tuple of str
+    n_hits, n_places : int
+    seconds : float
+        Of each ring-down.
+    lowest_hz, highest_hz : float
+        Between which modes were looked for.
+    peaks : tuple of PickedRow
+        In the order of frequency, those that are likely no mode included.
+    polarity : str
+        "same" or "opposite" of force and response, as given or found; empty where it is not known.
+    board : str
+        Of the card from which labels were computed; empty without one.
+    fragment : str
+        The [setup] that a card takes.
+    remarks : tuple of str
+    """
+
+    format: int
+    files: tuple[str, ...]
+    n_hits: int
+    n_places: int
+    seconds: float
+    lowest_hz: float
+    highest_hz: float
+    peaks: tuple[PickedRow, ...]
+    polarity: str
+    board: str
+    fragment: str
+    remarks: tuple[str, ...]
+
+    @property
+    def likely(self) -> tuple[PickedRow, ...]:
+        """The peaks that are modes rather than not."""
+        return tuple(peak for peak in self.peaks if peak.is_likely)
+
+
+def rows(
+    picked: Picked, flips: bool | None, labels: Mapping[int, Sequence[tuple[str, float]]]
+) -> tuple[PickedRow, ...]:
+    """Rows of picked modes.
+
+    Parameters
+    ----------
+    picked : Picked
+    flips : bool or None
+        Whether force and response have opposite polarity; None if that is not known.
+    labels : mapping
+        Number of a mode to its labels and their probabilities.
+
+    Returns
+    -------
+    tuple of PickedRow
+    """
+    return tuple(
+        PickedRow(
+            hz=mode.frequency,
+            sd_hz=mode.sd,
+            noise_hz=mode.noise_sd,
+            scatter_hz=mode.scatter_sd,
+            window_hz=mode.window_sd,
+            damping_percent=100.0 * mode.damping,
+            damping_sd_percent=100.0 * mode.damping_sd,
+            sign=sign_of(picked.spectra, mode, flips),
+            amplitude=mode.amplitude,
+            spurious_probability=mode.spurious,
+            kind=mode.kind,
+            seen=mode.seen,
+            alike=mode.alike,
+            labels=tuple(LabelChance(*one) for one in labels.get(number, ()) if one[1] >= LEAST_LABEL)[:MOST_LABELS],
+        )
+        for number, mode in enumerate(picked.modes)
+    )
+
+
+def sign_of(spectra: Spectra, mode: PickedMode, flips: bool | None) -> str:
+    """Sign of a residue between the only two places; empty where the force, the polarity or the sign is not known."""
+    if flips is None or spectra.force is None or len(spectra.between) > 1:
+        return ""
+    value = mode.mobility[0]
+    if abs(value) < 3.0 * mode.mobility_sd[0] or mode.complexity > _MOST_COMPLEX:
+        return ""
+    return "+" if (value > 0.0) != flips else "-"
+
+
+_MOST_COMPLEX = 60.0
+"""Degrees by which a residue may be complex that still has a sign."""

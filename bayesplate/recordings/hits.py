@@ -1,0 +1,151 @@
+"""Where a board was hit in a recording: by the force where it was recorded, otherwise by how the sound sets in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.recordings.signals import Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Floats = NDArray[np.float64]
+
+LEAST_DURATION = 0.25
+"""s; a shorter decay does not tell neighbouring modes of a board apart."""
+LONGEST_DURATION = 4.0
+"""s of a decay that are looked at: by then boards are silent."""
+LEAST_FALL = 10.0
+"""dB by which a sound must have fallen before the next hit."""
+BOUNCE = 0.1
+"""s after a hit within which another one is a bounce of the hammer."""
+_BLOCK = 0.002
+"""s over which a sound's power is taken."""
+_RISE = 10.0
+"""dB by which a hit stands above what was heard just before."""
+_ABOVE_FLOOR = 20.0
+"""dB by which a hit stands above the quiet of the recording."""
+_BELOW_LOUDEST = 26.0
+"""dB below the loudest hit at which nothing is a hit any more."""
+_LOOK_BACK = 5
+_AFTER_SOUND = 0.004
+"""s after a tap sets in, when finger or knuckle have left the board."""
+_OF_PULSE, _OF_BOUNCE = 0.05, 0.1
+"""Share of the greatest force that belongs to a pulse, and from which on another pulse is a hit."""
+_AFTER_FORCE = 0.0005
+
+
+@dataclass(frozen=True)
+class Hit:
+    """One hit in a recording, in samples.
+
+    Attributes
+    ----------
+    onset : int
+        Where it begins.
+    start : int
+        From where on the board rings by itself.
+    stop : int
+        Where the next hit, or the end, cuts it off.
+    fault : str
+        Why it cannot be used; empty if it can.
+    """
+
+    onset: int
+    start: int
+    stop: int
+    fault: str = ""
+
+
+def find_hits(recording: Recording) -> list[Hit]:
+    """Every hit of a recording, in order; empty where there is none."""
+    if recording.force is not None:
+        pulses = _pulses(recording.force, recording.rate)
+        lag = round(_AFTER_FORCE * recording.rate)
+    else:
+        onsets = _onsets(recording.response, recording.rate)
+        lag = round(_AFTER_SOUND * recording.rate)
+        pulses = [(onset, onset) for onset in onsets]
+    ends = [*(begin for begin, _ in pulses[1:]), recording.response.size][: len(pulses)]
+    hits = []
+    after_bounce = False
+    for i, ((begin, end), stop) in enumerate(zip(pulses, ends, strict=True)):
+        start = end + lag
+        is_last = i == len(pulses) - 1
+        is_bounced = not is_last and stop - begin < BOUNCE * recording.rate
+        fault = "" if not (is_bounced or after_bounce) else "a double hit: the hammer bounced"
+        if not fault:
+            fault = _fault(recording, start, stop, is_last=is_last)
+        hits.append(Hit(begin, start, stop, fault))
+        after_bounce = is_bounced
+    return hits
+
+
+def _fault(recording: Recording, start: int, stop: int, *, is_last: bool) -> str:
+    """Why what follows a hit cannot be used."""
+    length = (stop - start) / recording.rate
+    heard = recording.response[start:stop]
+    if length < LEAST_DURATION:
+        return f"only {max(length, 0.0):.2g} s until " + ("the end" if is_last else "the next hit")
+    if not is_last and _fall(heard) < LEAST_FALL:
+        return f"the next hit came before it had fallen by {LEAST_FALL:g} dB"
+    return ""
+
+
+def _fall(heard: Floats) -> float:
+    """By how many dB a sound falls from its first tenth to its last."""
+    tenth = max(heard.size // 10, 1)
+    centred = heard - heard.mean()
+    first, last = (float(np.mean(part**2)) for part in (centred[:tenth], centred[-tenth:]))
+    return 10.0 * float(np.log10(max(first, 1e-300) / max(last, 1e-300)))
+
+
+def _pulses(force: Floats, rate: float) -> list[tuple[int, int]]:
+    """First and last sample of every pulse of force."""
+    level = np.abs(force - np.median(force))
+    top = float(level.max())
+    if top <= 0.0 or top < 8.0 * float(np.median(level)) + 1e-300:
+        return []
+    on = np.flatnonzero(level > _OF_PULSE * top)
+    gaps = np.flatnonzero(np.diff(on) > 0.002 * rate)
+    begins, ends = on[np.r_[0, gaps + 1]], on[np.r_[gaps, on.size - 1]]
+    strong = [level[b : e + 1].max() > _OF_BOUNCE * top for b, e in zip(begins, ends, strict=True)]
+    return [(int(b), int(e)) for b, e, is_hit in zip(begins, ends, strong, strict=True) if is_hit]
+
+
+def _onsets(response: Floats, rate: float) -> list[int]:
+    """Where a sound sets in: its power leaps above what was heard just before, and above the quiet of all."""
+    block = max(round(_BLOCK * rate), 1)
+    n = response.size // block
+    if n < 2 * _LOOK_BACK:
+        return []
+    # How the slope changes from sample to sample: a hit is a click, the ringing of a board and hum are not.
+    change = np.diff(response[: n * block], n=2, prepend=response[[0, 0]])
+    power = np.mean(change.reshape(n, block) ** 2, axis=1)
+    floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
+    level = 10.0 * np.log10(np.maximum(power, 1e-300) / floor)
+    before = np.full(n, 0.0)
+    before[1:] = np.maximum.accumulate(level)[:-1] if n < 2 else level[:-1]
+    for back in range(2, _LOOK_BACK + 1):
+        before[back:] = np.maximum(before[back:], level[:-back])
+    rises = np.flatnonzero((level - before > _RISE) & (level > _ABOVE_FLOOR) & (level > level.max() - _BELOW_LOUDEST))
+    return _first_of_each(rises, block, rate)
+
+
+def _first_of_each(rises: NDArray[np.intp], block: int, rate: float) -> list[int]:
+    """Onsets in samples: what sets in within a few blocks of another is the same hit."""
+    apart = max(round(0.01 * rate), 1)
+    onsets: list[int] = []
+    for rise in rises * block:
+        if not onsets or rise - onsets[-1] > apart:
+            onsets.append(int(rise))
+    return onsets
+
+
+def usable(hits: Sequence[Hit]) -> list[Hit]:
+    """Those without a fault."""
+    return [hit for hit in hits if not hit.fault]

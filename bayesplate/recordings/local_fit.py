@@ -1,0 +1,235 @@
+"""A local rational fit: a few damped modes in a window of frequencies, common to all records, by maximum likelihood.
+
+The spectrum of a free decay that was cut out without a taper is, line by line, a sum of one simple rational term for
+each mode, whatever the decay has lost when it is cut off; modes beyond the window are a low polynomial. With the
+frequencies f_m and the decay rates d_m of the modes given, the residues of every record are linear: they are projected
+out (variable projection), and Gauss's steps are taken in f_m and d_m alone.
+
+References
+----------
+Golub and Pereyra, Separable nonlinear least squares, Inverse Problems, 2003.
+Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+DEGREE = 2
+"""Of the polynomial that stands for what lies beyond the window."""
+_MOST_STEPS, _FEW_STEPS = 30, 4
+_SHRUNK, _GROWN, _FIRST_DAMPING = 0.2, 6.0, 1e-3
+_SETTLED = 1e-7
+"""Of the sum of squares, relative."""
+_LEAST_DECAY = 0.02
+"""Decay rate over the spacing of the lines, below which a line is steady."""
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Lines of all records in a band of frequencies.
+
+    Attributes
+    ----------
+    frequency : (n_lines,) array, Hz
+    values : (n_lines, n_records) complex array
+        Spectra, each record over the standard deviation of its noise.
+    fixed : (n_fixed, 2) array, Hz
+        Frequency and decay rate of strong modes outside, which reach in with tails.
+    unlike : float
+        Share of a line that no simple mode describes, for no mode of a real board is simple to the last digit.
+    floor : float
+        Share of the window's highest line that other lines may be off by.
+    least_variance : float
+        Below which the variance of a record's noise is not put; 1 is what was expected of it.
+    """
+
+    frequency: Floats
+    values: Complex
+    fixed: Floats
+    unlike: float = 0.0
+    floor: float = 0.0
+    least_variance: float = 0.0
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Square roots of the weights of the lines, the same for all records: (n_lines,) array."""
+        level = np.mean(np.abs(self.values) ** 2, axis=1)
+        return np.asarray(1.0 / np.sqrt(1.0 + self.unlike**2 * level + self.floor**2 * level.max()))
+
+    @property
+    def spacing(self) -> float:
+        """Of the lines, Hz."""
+        return float(self.frequency[1] - self.frequency[0])
+
+    def basis(self, poles: Floats) -> Complex:
+        """Shapes of modes (n_modes, 2: Hz), of what is fixed, and the polynomial: (n_lines, n_basis) array."""
+        low, high = self.frequency[0], self.frequency[-1]
+        at = (2.0 * self.frequency - low - high) / (high - low)
+        every = np.concatenate([poles, self.fixed])
+        return np.concatenate([shapes(self.frequency, every), at[:, None] ** np.arange(DEGREE + 1)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Modes fitted in a window.
+
+    Attributes
+    ----------
+    window : Window
+    poles : (n_modes, 2) array, Hz
+        Frequency and decay rate, which is half the width of the peak at half its power.
+    residues : (n_modes, n_records) complex array
+        Of the values of the window.
+    rest : (n_lines, n_records) complex array
+        What the fit leaves.
+    jacobian : (n_lines, 2 n_modes) complex array
+        Change of a mode's shape with its frequency, then with its decay rate, what other shapes can take up removed.
+    orthogonal : (n_lines, n_basis) complex array
+        An orthonormal basis of the shapes; it, `rest` and `jacobian` are weighted.
+    """
+
+    window: Window
+    poles: Floats
+    residues: Complex
+    rest: Complex
+    jacobian: Complex
+    orthogonal: Complex
+
+    @property
+    def n_free(self) -> int:
+        """Lines beyond the shapes of each record."""
+        return self.window.frequency.size - len(self.poles) - len(self.window.fixed) - DEGREE - 1
+
+    @property
+    def power(self) -> Floats:
+        """Mean square of what is left of each record: (n_records,) array."""
+        return np.asarray(np.sum(np.abs(self.rest) ** 2, axis=0) / self.n_free)
+
+    @property
+    def variance(self) -> Floats:
+        """Of the noise of each record, (n_records,) array: what is left, if that is not too little."""
+        return np.maximum(self.power, max(self.window.least_variance, 1e-300))
+
+    def information(self) -> tuple[Floats, Floats]:
+        """What each record says of the parameters: scores (n_records, n) and information (n_records, n, n).
+
+        The n parameters are all frequencies, then all decay rates; each record is weighed by what is left of it.
+        """
+        both = np.concatenate([self.residues, self.residues])
+        power = self.variance
+        inner = self.jacobian.conj().T @ self.jacobian
+        pairs = np.einsum("ar,br->rab", both.conj(), both)
+        information = 2.0 * np.real(inner * pairs) / power[:, None, None]
+        scores = 2.0 * np.real(both.conj().T * (self.jacobian.conj().T @ self.rest).T) / power[:, None]
+        return scores, information
+
+
+def shapes(frequency: Floats, poles: Floats) -> Complex:
+    """1 / (i (f - f_m) + d_m) of each mode: (n_lines, n_modes) array."""
+    return np.asarray(1.0 / (1j * (frequency[:, None] - poles[:, 0]) + poles[:, 1]))
+
+
+def fitted(window: Window, poles: Floats) -> Fitted:
+    """What modes with given frequencies and decay rates leave of a window."""
+    basis, weights = window.basis(poles), window.weights[:, None]
+    n = len(poles)
+    change = np.concatenate([1j * basis[:, :n] ** 2, -(basis[:, :n] ** 2)], axis=1) * weights
+    basis = basis * weights
+    scale = np.linalg.norm(basis, axis=0)
+    both: tuple[Complex, Complex] = np.linalg.qr(basis / scale)
+    orthogonal, triangle = both
+    values = window.values * weights
+    inner = orthogonal.conj().T @ values
+    residues = (solve_triangular(triangle, inner) / scale[:, None])[:n]
+    jacobian = change - orthogonal @ (orthogonal.conj().T @ change)
+    return Fitted(window, poles, residues, values - orthogonal @ inner, jacobian, orthogonal)
+
+
+def refined(window: Window, poles: Floats, most_steps: int = _MOST_STEPS) -> Fitted:
+    """The most likely modes near given ones, by damped Gauss-Newton steps; every record weighs as its noise lets it.
+
+    Parameters
+    ----------
+    window : Window
+    poles : (n_modes, 2) array, Hz
+        Where to begin.
+    most_steps : int
+
+    Returns
+    -------
+    Fitted
+        Of the window as it was given.
+    """
+    here = fitted(window, poles)
+    if not len(poles):
+        return here
+    damping = _FIRST_DAMPING
+    cost = _cost(here)
+    for _ in range(most_steps):
+        scores, information = here.information()
+        score, matrix = scores.sum(axis=0), information.sum(axis=0)
+        scale = np.diagonal(matrix).copy()
+        step = np.linalg.solve(matrix + np.diag(damping * scale + 1e-300), score)
+        there = fitted(window, _moved(window, here.poles, step))
+        lower = _cost(there)
+        if lower < cost:
+            gain, here, cost = cost - lower, there, lower
+            damping = max(damping * _SHRUNK, 1e-9)
+            if gain < _SETTLED * abs(cost) + 1e-4:
+                break
+        else:
+            damping *= _GROWN
+            if damping > 1e6:
+                break
+    return here
+
+
+def _moved(window: Window, poles: Floats, step: Floats) -> Floats:
+    """Modes after a step: none moves further than its own width or a few lines, none grows with time."""
+    n = len(poles)
+    reach = np.maximum(poles[:, 1], window.spacing)
+    frequency = poles[:, 0] + np.clip(step[:n], -reach, reach)
+    decay = np.clip(poles[:, 1] + step[n:], 0.4 * poles[:, 1], 2.5 * poles[:, 1])
+    return np.stack([frequency, np.maximum(decay, _LEAST_DECAY * window.spacing)], axis=1)
+
+
+def _cost(fit: Fitted) -> float:
+    """-2 ln of the likelihood, but for a constant: the noise of each record is at its best."""
+    n_records = fit.rest.shape[1]
+    squares = np.sum(np.abs(fit.rest) ** 2, axis=0)
+    variance = fit.variance
+    spread = -2.0 * n_records * float(np.sum(np.log(fit.window.weights)))
+    return float(2.0 * np.sum(fit.window.frequency.size * np.log(variance) + squares / variance)) + 2.0 * spread
+
+
+def likelihood_gain(less: Fitted, more: Fitted) -> float:
+    """Twice the ln of how much likelier a window is with more modes."""
+    return _cost(less) - _cost(more)
+
+
+def with_share(fit: Fitted, shares: tuple[float, ...]) -> Fitted:
+    """The fit with the share that no simple mode describes which makes the window likeliest."""
+    tried = [refined(replace(fit.window, unlike=share), fit.poles, _FEW_STEPS) for share in shares]
+    return refined((best := min(tried, key=_cost)).window, best.poles)
+
+
+def without(fit: Fitted, mode: int) -> Fitted:
+    """The best fit without one of its modes, the others free to move a little."""
+    return refined(fit.window, np.delete(fit.poles, mode, axis=0), _FEW_STEPS)
+
+
+def compressed(window: Window, most: int) -> Window:
+    """The strongest combinations of the records: any combination has the same modes."""
+    if window.values.shape[1] <= most:
+        return window
+    _, _, right = np.linalg.svd(window.values, full_matrices=False)
+    return replace(window, values=window.values @ right[:most].conj().T)

@@ -1,0 +1,296 @@
+"""Modes of all records: found in overlapping windows of two widths, then fitted together with their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.recordings.greedy import search
+from bayesplate.recordings.local_fit import Fitted, Window, compressed, likelihood_gain, refined, with_share, without
+from bayesplate.recordings.spectra import Spectra
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+WIDTHS = (100.0, 60.0)
+"""Hz of the windows in which modes are looked for; the first are those of the final fits."""
+_MARGIN = 40.0
+"""Hz on either side of a window that are fitted too."""
+_LEAST_LINES = 40
+_MOST_RECORDS, _MOST_FITTED = 6, 10
+"""Combinations of records among which modes are looked for, and to which they are fitted before the last steps."""
+_LAST_STEPS = 4
+UNLIKE, FLOOR = 0.03, 0.01
+"""In the search: share of a line, and of the window's highest line, that simple modes need not describe."""
+_SHARES = (0.0, 0.01, 0.03, 0.1)
+_CHANCE = 0.3
+"""Modes that noise alone may give in a window before the search of it ends."""
+_CELLS_A_LINE = 3.0
+"""Different modes that can be tried for one line of a spectrum."""
+_BROADEST = 0.06
+"""Damping ratio beyond which what was fitted is no mode of a board but the ground on which others stand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """A mode that was found.
+
+    Attributes
+    ----------
+    frequency, decay : float, Hz
+        The decay rate is half the width of the peak at half its power: damping ratio times frequency.
+    covariance : (2, 2) array, Hz^2
+        Of both, by what each record leaves after the fit.
+    steps : (n_records, 2) array, Hz
+        By how much each record would move both, and
+    variances : (n_records, 2) array, Hz^2
+        how much it should by its noise.
+    residues : (n_records,) complex array
+        In units of the spectra.
+    residue_sd : (n_records,) array
+    gain : float
+        Twice the ln of how much likelier the spectra are with this mode.
+    expected : float
+        Of how many modes noise alone would give so much, in all the band.
+    shift : float, Hz
+        By which the frequency differs in a window of the other width, beyond what the different lines let expect.
+    seen : float
+        Share of the widths of windows in which it was found.
+    """
+
+    frequency: float
+    decay: float
+    covariance: Floats
+    steps: Floats
+    variances: Floats
+    residues: Complex
+    residue_sd: Floats
+    gain: float
+    expected: float
+    shift: float
+    seen: float
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio, 1."""
+        return self.decay / self.frequency
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """What the search of one window found, mode by mode: the diagram of stability.
+
+    Attributes
+    ----------
+    width : float, Hz
+    orders : tuple of (n_modes,) array, Hz
+        Frequencies of the modes within the window with one mode, with two, and so on.
+    """
+
+    width: float
+    orders: tuple[Floats, ...]
+
+
+def find_modes(spectra: Spectra, lowest: float, highest: float) -> tuple[list[Floats], list[Path]]:
+    """Look for modes between two frequencies in windows of each width.
+
+    Parameters
+    ----------
+    spectra : Spectra
+    lowest, highest : float, Hz
+
+    Returns
+    -------
+    by_width : list of (n_modes, 2) array, Hz
+        Frequency and decay rate of the modes that windows of each width show.
+    paths : list of Path
+    """
+    values = spectra.values / spectra.noise
+    by_width: list[Floats] = []
+    paths: list[Path] = []
+    for width in WIDTHS:
+        found = []
+        for window, low, high in _windows(spectra, values, lowest, highest, width):
+            one = search(_for_search(window), _least_gain(window))
+            poles = one.fit.poles
+            found.append(poles[(poles[:, 0] >= low) & (poles[:, 0] < high)])
+            inside = tuple(np.sort(p[(p[:, 0] >= low) & (p[:, 0] < high), 0]) for p in one.path)
+            paths.append(Path(width, inside))
+        by_width.append(np.concatenate(found))
+    return by_width, paths
+
+
+def joined(by_width: list[Floats], spectra: Spectra) -> Floats:
+    """Modes of windows of the first width, and of the others where the first have none: (n_modes, 2) array, Hz."""
+    spacing = float(spectra.frequency[1] - spectra.frequency[0])
+    every = by_width[0]
+    for poles in by_width[1:]:
+        new = [pole for pole in poles if not _has(every, pole, spacing)]
+        every = np.concatenate([every, np.reshape(new, (-1, 2))])
+    return every[np.argsort(every[:, 0])]
+
+
+def fit_modes(spectra: Spectra, start: Floats, by_width: list[Floats], lowest: float, highest: float) -> list[Mode]:
+    """Fit modes to all records at once, each in its window, and leave out those that noise alone would give.
+
+    Parameters
+    ----------
+    spectra : Spectra
+    start : (n_modes, 2) array, Hz
+        Frequencies and decay rates to begin with.
+    by_width : list of (n_modes, 2) array, Hz
+        What windows of each width have shown.
+    lowest, highest : float, Hz
+
+    Returns
+    -------
+    list of Mode
+        In the order of frequency.
+    """
+    noise = spectra.noise
+    values = spectra.values / noise
+    modes: list[Mode] = []
+    n_lines = int(np.sum((spectra.frequency >= lowest) & (spectra.frequency < highest)))
+    for window, low, high in _windows(spectra, values, lowest, highest, WIDTHS[0]):
+        modes += _modes_of(window, low, high, start, noise, n_lines, by_width)
+    return sorted(modes, key=lambda mode: mode.frequency)
+
+
+def _windows(
+    spectra: Spectra, values: Complex, lowest: float, highest: float, width: float
+) -> Iterator[tuple[Window, float, float]]:
+    """Windows of about one width, each with its margins, and the ends between which its modes count."""
+    spacing = float(spectra.frequency[1] - spectra.frequency[0])
+    n = max(1, round((highest - lowest) / max(width, _LEAST_LINES * spacing)))
+    ends = np.linspace(lowest, highest, n + 1)
+    margin = max(_MARGIN, 0.5 * _LEAST_LINES * spacing)
+    for low, high in pairwise(ends):
+        kept = (spectra.frequency >= max(low - margin, 0.3 * lowest, 3.0 * spacing)) & (
+            spectra.frequency <= high + margin
+        )
+        yield Window(spectra.frequency[kept], values[kept], np.zeros((0, 2))), float(low), float(high)
+
+
+def _for_search(window: Window) -> Window:
+    strongest = compressed(window, _MOST_RECORDS)
+    return replace(strongest, unlike=UNLIKE, floor=FLOOR, least_variance=1.0)
+
+
+def _least_gain(window: Window) -> float:
+    """Gain of the likelihood that noise alone gives to few modes in a window."""
+    from scipy.special import chdtri
+
+    n_records = min(window.values.shape[1], _MOST_RECORDS)
+    return float(chdtri(2.0 * n_records + 2.0, _CHANCE / (_CELLS_A_LINE * window.frequency.size)))
+
+
+def _has(poles: Floats, one: Floats, spacing: float) -> bool:
+    """Whether a mode is among others, but for its width or a line."""
+    reach = np.maximum(np.maximum(poles[:, 1], one[1]), spacing)
+    return bool(np.any(np.abs(poles[:, 0] - one[0]) < reach))
+
+
+def _modes_of(
+    window: Window, low: float, high: float, start: Floats, noise: Floats, n_lines: int, by_width: list[Floats]
+) -> Iterator[Mode]:
+    """Modes of one window between two frequencies, fitted to all records at once."""
+    ends = window.frequency[0], window.frequency[-1]
+    own = start[(start[:, 0] >= ends[0]) & (start[:, 0] <= ends[1])]
+    if not len(own):
+        return
+    strongest = compressed(window, _MOST_FITTED)
+    few, gains = _pruned(with_share(refined(strongest, own), _SHARES), _least_gain(window))
+    if not len(few.poles):
+        return
+    fit = refined(replace(window, unlike=few.window.unlike), few.poles, _LAST_STEPS)
+    scores, information = fit.information()
+    inverse = np.linalg.pinv(information.sum(axis=0), hermitian=True)
+    steps = scores @ inverse
+    widening = _correlation(fit)
+    narrow = _narrower(fit, low, high)
+    n = len(fit.poles)
+    for m, (frequency, decay) in enumerate(fit.poles):
+        if not low <= frequency < high or decay > _BROADEST * frequency:
+            continue
+        at = np.array([m, n + m])
+        each = np.einsum("ij,rjk,ki->ri", inverse[at], information, inverse[:, at])
+        spacing = window.spacing
+        counted = [_has(poles, fit.poles[m], spacing) for poles in by_width]
+        yield Mode(
+            frequency=float(frequency),
+            decay=float(decay),
+            covariance=widening * inverse[np.ix_(at, at)],
+            steps=steps[:, at],
+            variances=widening * each,
+            residues=fit.residues[m] * noise,
+            residue_sd=_residue_sd(fit, m) * noise,
+            gain=gains[m],
+            expected=_expected(gains[m], few.rest.shape[1], n_lines),
+            shift=_shift(narrow, fit.poles[m], inverse[m, m]),
+            seen=float(np.mean(counted)),
+        )
+
+
+def _pruned(fit: Fitted, least: float) -> tuple[Fitted, list[float]]:
+    """The fit without the modes that noise alone would give, and what each of the others gains."""
+    while len(fit.poles):
+        gains = [likelihood_gain(without(fit, m), fit) for m in range(len(fit.poles))]
+        if min(gains) >= least:
+            return fit, gains
+        fit = without(fit, int(np.argmin(gains)))
+    return fit, []
+
+
+def _expected(gain: float, n_records: int, n_lines: int) -> float:
+    """How many modes in all the band noise alone would give such a gain."""
+    from scipy.special import chdtrc
+
+    return float(_CELLS_A_LINE * n_lines * chdtrc(2.0 * n_records + 2.0, max(gain, 0.0)))
+
+
+def _correlation(fit: Fitted) -> float:
+    """By how much what is left varies more slowly than from line to line: a factor of variances, 1 to 10."""
+    rest = fit.rest / np.sqrt(fit.variance)
+    total = float(np.sum(np.abs(rest) ** 2))
+    lags = [float(np.real(np.sum(rest[k:].conj() * rest[:-k]))) / max(total, 1e-300) for k in range(1, 7)]
+    limit = 2.0 / np.sqrt(rest.size)
+    kept = []
+    for lag in lags:
+        if lag < limit:
+            break
+        kept.append(lag)
+    return float(np.clip(1.0 + 2.0 * sum(kept), 1.0, 10.0))
+
+
+def _narrower(fit: Fitted, low: float, high: float) -> Fitted:
+    """The same modes fitted to the lines of the window without most of its margins."""
+    window = fit.window
+    kept = (window.frequency >= low - 0.4 * _MARGIN) & (window.frequency <= high + 0.4 * _MARGIN)
+    if kept.sum() < 0.6 * kept.size or kept.sum() < 3 * len(fit.poles) + 8:
+        return fit
+    return refined(replace(window, frequency=window.frequency[kept], values=window.values[kept]), fit.poles)
+
+
+def _shift(narrow: Fitted, pole: Floats, variance: float) -> float:
+    """By how much a frequency moves in the narrower window, beyond what fewer lines let expect."""
+    nearest = int(np.argmin(np.abs(narrow.poles[:, 0] - pole[0])))
+    _, information = narrow.information()
+    inverse = np.linalg.pinv(information.sum(axis=0), hermitian=True)
+    expected = max(float(inverse[nearest, nearest]) - variance, 0.0)
+    return float(np.sqrt(max((narrow.poles[nearest, 0] - pole[0]) ** 2 - expected, 0.0)))
+
+
+def _residue_sd(fit: Fitted, mode: int) -> Floats:
+    """Standard deviation of a mode's residue in each record at given modes: (n_records,) array."""
+    weighted = shapes_of(fit)
+    gram = np.linalg.pinv(weighted.conj().T @ weighted, hermitian=True)
+    return np.asarray(np.sqrt(max(float(np.real(gram[mode, mode])), 0.0) * fit.variance))
+
+
+def shapes_of(fit: Fitted) -> Complex:
+    """The weighted basis of a fit: (n_lines, n_basis) array."""
+    return np.asarray(fit.window.basis(fit.poles) * fit.window.weights[:, None])

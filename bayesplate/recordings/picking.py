@@ -1,0 +1,198 @@
+"""From spectra of decays to picked modes: frequency, damping and residues, each with what is not known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.recordings.modes_found import Mode, Path, find_modes, fit_modes, joined
+from bayesplate.recordings.plausibility import Verdict, complexity, verdicts
+from bayesplate.recordings.spectra import Spectra
+from bayesplate.recordings.strength import Answer, answers
+
+Floats = NDArray[np.float64]
+
+LOWEST, HIGHEST = 20.0, 1000.0
+"""Hz between which modes are looked for unless others are given."""
+_PART = 0.5
+"""Probability from which on a part of another peak is fitted together with it as one mode."""
+_PRIOR_GROUPS = 8.0
+"""Hits or places without scatter of their own that stand beside those that were taken, so that few tell little."""
+
+
+@dataclass(frozen=True)
+class PickedMode:
+    """A mode as the recordings show it.
+
+    Attributes
+    ----------
+    frequency, sd : float, Hz
+        With its standard error, everything below joined.
+    noise_sd, scatter_sd, window_sd : float, Hz
+        What noise leaves open; what hits and places scatter beyond it; how far the choice of lines moves it.
+    damping, damping_sd : float
+        Ratio to the critical one.
+    mobility : tuple of float
+        Residue of the mobility between each pair of places, its real part, in the units of the recordings.
+    mobility_sd : tuple of float
+    complexity : float
+        Degrees by which the residues are not real.
+    alike : float
+        Share of the residues' power that is the same from hit to hit.
+    amplitude : float
+        Strength over the strongest mode's.
+    seen : float
+        Share of the widths of windows in which it was found.
+    spurious : float
+        Probability that it is no mode of the board.
+    kind : str
+        What it would be then.
+    """
+
+    frequency: float
+    sd: float
+    noise_sd: float
+    scatter_sd: float
+    window_sd: float
+    damping: float
+    damping_sd: float
+    mobility: tuple[float, ...]
+    mobility_sd: tuple[float, ...]
+    complexity: float
+    alike: float
+    amplitude: float
+    seen: float
+    spurious: float
+    kind: str
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether it is a mode rather than not."""
+        return self.spurious < 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Picked:
+    """What was picked from recordings.
+
+    Attributes
+    ----------
+    modes : tuple of PickedMode
+        In the order of frequency, those that are likely none included.
+    spectra : Spectra
+    paths : tuple of Path
+        Of the search, for the diagram of stability.
+    lowest, highest : float, Hz
+    """
+
+    modes: tuple[PickedMode, ...]
+    spectra: Spectra
+    paths: tuple[Path, ...]
+    lowest: float
+    highest: float
+
+    @property
+    def likely(self) -> tuple[PickedMode, ...]:
+        """The modes that are modes rather than not."""
+        return tuple(mode for mode in self.modes if mode.is_likely)
+
+
+def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHEST) -> Picked:
+    """Modes between two frequencies.
+
+    Parameters
+    ----------
+    spectra : Spectra
+    lowest, highest : float, Hz
+
+    Returns
+    -------
+    Picked
+    """
+    by_width, paths = find_modes(spectra, lowest, highest)
+    modes = fit_modes(spectra, joined(by_width, spectra), by_width, lowest, highest)
+    answered = answers(spectra, modes)
+    judged = verdicts(spectra, modes, answered)
+    parts = {m: one.part_of for m, one in enumerate(judged) if one.part_of >= 0 and one.spurious > _PART}
+    whole = _without_parts(spectra, modes, [*parts], by_width, (lowest, highest)) if parts else {}
+    strongest = max((one.strength for one in answered), default=1.0)
+    picked = []
+    for m, mode in enumerate(modes):
+        other, doubt = mode, 0.0
+        if m in parts.values() and m in whole:
+            other, doubt = whole[m], max(judged[k].spurious for k, of in parts.items() if of == m)
+        picked.append(_picked(spectra, (mode, other, doubt), answered[m], judged[m], strongest))
+    return Picked(tuple(picked), spectra, tuple(paths), lowest, highest)
+
+
+def _without_parts(
+    spectra: Spectra, modes: Sequence[Mode], parts: Sequence[int], by_width: list[Floats], band: tuple[float, float]
+) -> dict[int, Mode]:
+    """The modes again, by their number, where parts of a peak are left to the mode that they are of."""
+    kept = [m for m in range(len(modes)) if m not in parts]
+    start = np.array([[modes[m].frequency, modes[m].decay] for m in kept])
+    again = fit_modes(spectra, start, by_width, *band)
+    if not again:
+        return {}
+    off = np.abs(np.array([modes[m].frequency for m in kept])[:, None] - [one.frequency for one in again])
+    of_old, of_new = off.argmin(axis=1), off.argmin(axis=0)
+    return {m: again[of_old[i]] for i, m in enumerate(kept) if of_new[of_old[i]] == i}
+
+
+def _picked(
+    spectra: Spectra, fits: tuple[Mode, Mode, float], answer: Answer, verdict: Verdict, strongest: float
+) -> PickedMode:
+    """A mode averaged over two fits, the second with a probability: with a part of its peak as a mode, and without."""
+    one, other, doubt = fits
+    frequency = (1.0 - doubt) * one.frequency + doubt * other.frequency
+    split = abs(one.frequency - other.frequency) * float(np.sqrt(doubt * (1.0 - doubt)))
+    mode = other if doubt > _PART else one
+    noise = float(np.sqrt(mode.covariance[0, 0]))
+    scatter = noise * np.sqrt(max(_excess(spectra, mode, 0) - 1.0, 0.0))
+    damping_sd = float(np.sqrt(mode.covariance[1, 1] * max(_excess(spectra, mode, 1), 1.0))) / mode.frequency
+    # two choices of lines are two estimates, each with an error of its own: their difference has twice its variance
+    window = float(np.hypot(mode.shift / np.sqrt(2.0), split))
+    turned = answer.mobility
+    return PickedMode(
+        frequency=frequency,
+        sd=float(np.sqrt(noise**2 + scatter**2 + window**2)),
+        noise_sd=noise,
+        scatter_sd=float(scatter),
+        window_sd=window,
+        damping=mode.damping,
+        damping_sd=damping_sd,
+        mobility=tuple(float(one) for one in np.real(turned)),
+        mobility_sd=tuple(float(one) for one in answer.sd),
+        complexity=complexity(answer),
+        alike=answer.alike,
+        amplitude=answer.strength / strongest,
+        seen=mode.seen,
+        spurious=verdict.spurious,
+        kind=verdict.kind,
+    )
+
+
+def _excess(spectra: Spectra, mode: Mode, which: int) -> float:
+    """By how much the steps of hits, or of places, exceed their variances: the larger of the two ratios.
+
+    The steps of all records add up to nothing, so that one degree of freedom is lost.
+    """
+    by_hit = _ratio(mode.steps[:, which], mode.variances[:, which])
+    n_places = len(spectra.between)
+    steps = np.bincount(spectra.places, mode.steps[:, which], n_places)
+    variances = np.bincount(spectra.places, mode.variances[:, which], n_places)
+    return max(by_hit, _ratio(np.asarray(steps, dtype=float), np.asarray(variances, dtype=float)))
+
+
+def _ratio(steps: Floats, variances: Floats) -> float:
+    """Sum of squares over the expected one, as if `_PRIOR_GROUPS` more had scattered as expected."""
+    if steps.size < 2:
+        return 1.0
+    share = variances / variances.sum()
+    expected = variances * np.maximum(1.0 - share, 1e-9)
+    ratio = float(np.sum(steps**2 / expected * (1.0 - share)))
+    freedom = float(np.sum(1.0 - share))
+    return (ratio + _PRIOR_GROUPS) / (freedom + _PRIOR_GROUPS)

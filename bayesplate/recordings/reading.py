@@ -1,0 +1,113 @@
+"""Files to recordings: WAV and CSV by themselves, FLAC and UFF with the extra; every fault of every file at once."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from bayesplate.errors import Fault, InputError
+from bayesplate.recordings.checks import signal_faults
+from bayesplate.recordings.extras import read_flac, read_uff
+from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
+from bayesplate.recordings.tables import read_csv
+from bayesplate.recordings.wav import read_wav
+
+LARGEST_FILE = 400_000_000
+"""Bytes; half an hour of two channels of 24 bits at 48 kHz."""
+MOST_FILES = 200
+CHANNELS = ("force,response", "response,force", "response,response")
+
+Read = Recording | FrequencyResponse
+Reader = Callable[[Path, str, float | None, str, Motion], list[Read]]
+
+READERS: dict[str, Reader] = {
+    ".wav": read_wav,
+    ".csv": read_csv,
+    ".flac": read_flac,
+    ".uff": read_uff,
+    ".unv": read_uff,
+}
+"""By the ending of the file."""
+
+
+def read_recordings(
+    paths: Sequence[str | os.PathLike[str]],
+    rate: float | None = None,
+    channels: str = CHANNELS[0],
+    motion: Motion = "acceleration",
+) -> list[list[Read]]:
+    """What every file holds.
+
+    Parameters
+    ----------
+    paths : sequence of path
+    rate : float, optional, Hz
+        For files that do not say it.
+    channels : str
+        What the two channels of a sound file are: one of `CHANNELS`.
+    motion : str
+        What a response is whose file does not say it: one of `bayesplate.recordings.signals.MOTIONS`.
+
+    Returns
+    -------
+    list of list of Recording or FrequencyResponse
+        File by file.
+
+    Raises
+    ------
+    InputError
+        With every fault of every file.
+    """
+    faults: list[Fault] = []
+    if not 0 < len(paths) <= MOST_FILES:
+        raise InputError(Fault("FILES", f"1 to {MOST_FILES} recordings", str(len(paths))))
+    found: list[list[Read]] = []
+    for path, shown in zip(map(Path, paths), _names(paths), strict=True):
+        try:
+            _require_file(path, shown)
+            read = READERS[path.suffix.lower()](path, shown, rate, channels, motion)
+        except InputError as error:
+            faults += error.faults
+            continue
+        faults += [fault for one in read for fault in signal_faults(one)]
+        found.append(read)
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _names(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Names of files as messages show them: the last part of the path, all of it where two files share that."""
+    names = [_plain(Path(path).name) for path in paths]
+    return [_plain(str(path)) if names.count(name) > 1 else name for path, name in zip(paths, names, strict=True)]
+
+
+def _plain(name: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in name)[-120:]
+
+
+def _require_file(path: Path, shown: str) -> None:
+    """A regular file of a known kind and a size that fits into memory; looked at from outside only."""
+    if path.suffix.lower() not in READERS:
+        got = f'"{_plain(path.suffix)}"' if path.suffix else "no ending"
+        raise InputError(Fault(shown, f"a recording: {', '.join(READERS)}", got, "save it as WAV or CSV"))
+    try:
+        status = os.stat(path)
+    except FileNotFoundError:
+        where = f"looked in {_plain(str(path.absolute().parent))}"
+        raise InputError(Fault(shown, "a recording", "no such file", where)) from None
+    except OSError as error:
+        raise InputError(Fault(shown, "a readable file", error.strerror or str(error))) from None
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(Fault(shown, "a regular file", "a folder or a device"))
+    if status.st_size == 0:
+        raise InputError(Fault(shown, "a recording", "an empty file", "record it again"))
+    if status.st_size > LARGEST_FILE:
+        got = f"{status.st_size / 1e6:,.0f} MB"
+        raise InputError(
+            Fault(shown, f"at most {LARGEST_FILE / 1e6:,.0f} MB", got, "cut out the minutes with the hits")
+        )
+    if not os.access(path, os.R_OK):
+        raise InputError(Fault(shown, "a readable file", "permission denied"))

@@ -1,0 +1,115 @@
+"""How strongly each mode answers a force between two places, with which sign, and alike from hit to hit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.recordings.modes_found import Mode
+from bayesplate.recordings.signals import Motion
+from bayesplate.recordings.spectra import Spectra
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_TURN: dict[Motion, tuple[complex, int]] = {
+    "acceleration": (-1j, -1),
+    "velocity": (1.0, 0),
+    "displacement": (1j, 1),
+    "pressure": (-1j, -1),
+}
+"""By what to multiply a residue to get that of the mobility: a factor and a power of the frequency. The pressure near a
+board goes with its acceleration."""
+_LATEST = 0.004
+"""s by which taps without a force may have been noticed late."""
+_N_DELAYS = 241
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """How a mode answers.
+
+    Attributes
+    ----------
+    mobility : (n_places,) complex array
+        Residue of the mobility between each pair of places, in the units of the recordings; for a simple mode it is
+        real. Without a force it is known but for a factor for each place.
+    sd : (n_places,) array
+    alike : float
+        Share of the residues' power that is the same for every hit between the same places, 0 to 1; 1 where no two
+        records are of the same places.
+    """
+
+    mobility: Complex
+    sd: Floats
+    alike: float
+
+    @property
+    def strength(self) -> float:
+        """Root mean square over the places."""
+        return float(np.sqrt(np.mean(np.abs(self.mobility) ** 2)))
+
+
+def answers(spectra: Spectra, modes: Sequence[Mode]) -> list[Answer]:
+    """How each mode answers; hits without a force are first set to one time.
+
+    Parameters
+    ----------
+    spectra : Spectra
+    modes : sequence of Mode
+
+    Returns
+    -------
+    list of Answer
+    """
+    forces = _forces(spectra, modes)
+    return [_answer(spectra, mode, force) for mode, force in zip(modes, forces, strict=True)]
+
+
+def _answer(spectra: Spectra, mode: Mode, force: Complex) -> Answer:
+    factor, power = _TURN[spectra.motion]
+    turned = factor * mode.frequency**power * mode.residues
+    n_places = len(spectra.between)
+    mobility, sd = np.zeros(n_places, dtype=complex), np.zeros(n_places)
+    common = total = 0.0
+    spare = 0
+    for place in range(n_places):
+        own = spectra.places == place
+        weight = float(np.sum(np.abs(force[own]) ** 2))
+        mobility[place] = np.sum(force[own].conj() * turned[own]) / weight
+        sd[place] = mode.frequency**power * float(np.sqrt(np.mean(mode.residue_sd[own] ** 2) / weight))
+        if own.sum() > 1:
+            common += float(np.abs(mobility[place]) ** 2 * weight)
+            total += float(np.sum(np.abs(turned[own]) ** 2))
+            spare += int(own.sum()) - 1
+    return Answer(mobility, sd, common / total if spare and total > 0.0 else 1.0)
+
+
+def _forces(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:
+    """What each hit was at each mode's frequency: (n_records,) complex arrays."""
+    if spectra.force is not None:
+        nearest = [int(np.argmin(np.abs(spectra.frequency - mode.frequency))) for mode in modes]
+        return [spectra.force[line] for line in nearest]
+    delays, gains = np.zeros(spectra.places.size), np.ones(spectra.places.size)
+    hertz = np.array([mode.frequency for mode in modes])
+    residues = np.array([mode.residues for mode in modes]).reshape(len(modes), -1)
+    for place in range(len(spectra.between)):
+        own = np.flatnonzero(spectra.places == place)
+        if len(modes) and own.size > 1:
+            delays[own], gains[own] = _delays(hertz, residues[:, own])
+    return [gains * np.exp(-2j * np.pi * one * delays) for one in hertz]
+
+
+def _delays(hertz: Floats, residues: Complex) -> tuple[Floats, Floats]:
+    """Delay (s) and strength of each hit against the strongest one, from all modes together."""
+    loud = residues / np.maximum(np.abs(residues).max(axis=1, keepdims=True), 1e-300)
+    first = int(np.argmax(np.sum(np.abs(loud) ** 2, axis=0)))
+    tried = np.linspace(-_LATEST, _LATEST, _N_DELAYS)
+    turns = np.exp(2j * np.pi * np.outer(tried, hertz))
+    alike = np.real(turns @ (loud * loud[:, [first]].conj()))
+    delays = tried[np.argmax(alike, axis=0)]
+    strengths = np.sqrt(np.mean(np.abs(loud) ** 2, axis=0))
+    return delays, strengths

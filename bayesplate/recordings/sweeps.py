@@ -1,0 +1,122 @@
+"""Exponential sine sweeps to impulse responses: the response is turned back by the sweep's inverse filter.
+
+An exponential sweep x(t) = sin(K (exp(t / L) - 1)) with L = T / ln(f2 / f1) and K = 2 pi f1 L passes each octave in
+the same time. Reversed in time, with a level that falls by 6 dB an octave, it is its own inverse; what the loudspeaker
+adds in harmonics comes out before the impulse response and is cut away.
+
+References
+----------
+Farina, Simultaneous measurement of impulse response and distortion with a swept-sine technique, AES 108, 2000.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.errors import Fault, InputError
+from bayesplate.recordings.hits import LEAST_DURATION, LONGEST_DURATION, Hit
+from bayesplate.recordings.signals import Recording
+
+Floats = NDArray[np.float64]
+
+_BEFORE = 0.01
+"""s before the impulse response that are kept."""
+_AFTER = 0.002
+"""s after it from which on the board rings by itself."""
+_FLOOR = 1e-4
+"""Share of a sweep's greatest power below which a frequency was not excited."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """An exponential sweep.
+
+    Attributes
+    ----------
+    first, last : float, Hz
+        Where it begins and ends.
+    duration : float, s
+    """
+
+    first: float
+    last: float
+    duration: float
+
+    def signal(self, rate: float) -> Floats:
+        """The sweep: (n_samples,) array, -1 to 1."""
+        times = np.arange(round(self.duration * rate)) / rate
+        scale = self.duration / np.log(self.last / self.first)
+        return np.asarray(np.sin(2.0 * np.pi * self.first * scale * np.expm1(times / scale)))
+
+    def inverse(self, rate: float) -> Floats:
+        """Its inverse filter: reversed, and falling with the frequency: (n_samples,) array."""
+        signal = self.signal(rate)
+        falling = np.exp(-np.arange(signal.size) / rate * np.log(self.last / self.first) / self.duration)
+        reverse = signal[::-1] * falling
+        # at the middle of the band sweep and inverse together have a gain of one
+        middle = np.sqrt(self.first * self.last)
+        at = np.exp(-2j * np.pi * middle / rate * np.arange(signal.size))
+        return np.asarray(reverse / abs((signal @ at) * (reverse @ at)))
+
+
+def read_sweep(text: str) -> Sweep:
+    """A sweep from its parameters, "F1,F2,SECONDS".
+
+    Raises
+    ------
+    InputError
+        If they are not those of a sweep.
+    """
+    try:
+        first, last, duration = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(Fault("sweep", "F1,F2,SECONDS or a file", f'"{text[:60]}"', "45,8000,8")) from None
+    if not (0.0 < first < last and duration > LEAST_DURATION and np.isfinite([first, last, duration]).all()):
+        raise InputError(Fault("sweep", "two rising frequencies in Hz and a time in s", f'"{text[:60]}"', "45,8000,8"))
+    return Sweep(first, last, duration)
+
+
+def impulse_response(recording: Recording, sweep: Sweep | Floats) -> tuple[Recording, Hit]:
+    """The impulse response in a recording of a sweep, as if the board had been hit once.
+
+    Parameters
+    ----------
+    recording : Recording
+        Without a force; the sweep and what rings after it.
+    sweep : Sweep or (n_samples,) array
+        Its parameters, or the sweep itself at the rate of the recording.
+
+    Returns
+    -------
+    recording : Recording
+        With the impulse response in place of the response.
+    hit : Hit
+    """
+    from scipy.signal import oaconvolve
+
+    rate = recording.rate
+    if isinstance(sweep, Sweep):
+        whole = oaconvolve(recording.response, sweep.inverse(rate))
+    else:
+        whole = _divided(recording.response, sweep)
+    onset = int(np.argmax(np.abs(whole)))
+    first = max(onset - round(_BEFORE * rate), 0)
+    response = whole[first : first + round((LONGEST_DURATION + _BEFORE) * rate)]
+    onset -= first
+    return replace(recording, response=response), Hit(onset, onset + round(_AFTER * rate), response.size)
+
+
+def _divided(response: Floats, sweep: Floats) -> Floats:
+    """The response over the sweep, frequency by frequency, where the sweep has any power."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    n = next_fast_len(response.size + sweep.size, real=True)
+    x = rfft(sweep, n)
+    power = np.abs(x) ** 2
+    quotient = rfft(response, n) * x.conj() / np.maximum(power, _FLOOR * power.max())
+    delay = sweep.size  # a sweep that was heard before it was played would come out negative
+    turned = quotient * np.exp(-2j * np.pi * np.arange(x.size) * delay / n)
+    return np.asarray(irfft(turned, n))

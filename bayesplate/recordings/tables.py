@@ -1,0 +1,122 @@
+"""Tables to recordings: CSV with named columns, of a signal over time or of a response over frequency."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.errors import Fault, InputError
+from bayesplate.recordings.signals import MOTIONS, FrequencyResponse, Motion, Recording
+
+Floats = NDArray[np.float64]
+
+_TIME, _HERTZ = ("time", "time_s", "t"), ("f_hz", "hz", "frequency", "frequency_hz")
+_REAL, _IMAGINARY, _COHERENCE = ("re", "real"), ("im", "imag", "imaginary"), ("coherence",)
+_FORCE, _RESPONSE = ("force",), ("response", "sound", *MOTIONS)
+KNOWN = (*_TIME, *_FORCE, *_RESPONSE, *_HERTZ, *_REAL, *_IMAGINARY, *_COHERENCE)
+WANTED = "named columns: force if it was measured, acceleration, velocity, displacement or sound, time; or f_hz, re, im"
+_JITTER = 1e-3
+"""Share of a step by which the times of samples, or the lines of a spectrum, may be unevenly spaced."""
+_LONGEST_HEADER = 10_000
+
+
+def read_csv(
+    path: Path, shown: str, rate: float | None, channels: str, motion: Motion
+) -> list[Recording | FrequencyResponse]:
+    """The recording of a CSV file; parameters as of `read_recordings`."""
+    names, line, skipped = _header(path, shown)
+    columns = _columns(path, shown, names, skipped)
+    if _of(columns, _HERTZ) is not None:
+        return [_response(columns, shown, motion)]
+    faults = []
+    response = _of(columns, _RESPONSE)
+    if response is None:
+        faults.append(Fault(f"{shown} line {line}", WANTED, ", ".join(names) or "nothing"))
+    if len([name for name in columns if name in _RESPONSE]) > 1:
+        faults.append(Fault(f"{shown} line {line}", "one response", "several", "one file for each sensor"))
+    times = _of(columns, _TIME)
+    if times is None and rate is None:
+        faults.append(Fault(f"{shown} rate", "a column time, or --rate", "neither", "--rate 48000"))
+    own_rate = rate or 1.0
+    if times is not None and not faults:
+        own_rate, fault = _rate_of(times, shown, rate)
+        faults += [fault] if fault else []
+    if faults or response is None:
+        raise InputError(faults)
+    named = next(name for name in columns if name in _RESPONSE)
+    told: Motion = next((one for one in MOTIONS if one == named), "pressure" if named == "sound" else motion)
+    return [Recording(shown, own_rate, response, _of(columns, _FORCE), told)]
+
+
+def _header(path: Path, shown: str) -> tuple[list[str], int, int]:
+    """Names of the columns, the number of their line, and how many lines stand before the numbers."""
+    with path.open("rb") as file:
+        head = file.read(_LONGEST_HEADER)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in head:
+        raise InputError(
+            Fault(shown, "a text file in UTF-8", "another encoding or binary data", "save it as CSV in UTF-8")
+        )
+    lines = head.decode("utf-8-sig", "replace").splitlines()
+    for number, line in enumerate(lines, start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        if ";" in line or "\t" in line:
+            got = "semicolons or tabs"
+            raise InputError(Fault(f"{shown} line {number}", "commas between columns", got, "and a point in 52.5"))
+        names = [cell.strip().strip('"').lower() for cell in line.split(",")]
+        if not any(name in KNOWN for name in names):
+            raise InputError(Fault(f"{shown} line {number}", WANTED, f'"{line[:60].strip()}"'))
+        unknown = [name for name in names if name not in KNOWN]
+        if unknown:
+            wanted = f"columns among {', '.join(dict.fromkeys(KNOWN))}"
+            raise InputError([Fault(f"{shown} line {number}", wanted, f'"{name[:40]}"') for name in unknown])
+        return names, number, number
+    raise InputError(Fault(shown, WANTED, "no header"))
+
+
+def _columns(path: Path, shown: str, names: list[str], skipped: int) -> dict[str, Floats]:
+    try:
+        values = np.loadtxt(path, delimiter=",", skiprows=skipped, ndmin=2, comments="#", encoding="utf-8-sig")
+    except (ValueError, UnicodeDecodeError) as error:
+        raise InputError(
+            Fault(shown, f"{len(names)} numbers on each line", str(error)[:120], "mend or cut that line")
+        ) from None
+    if values.shape[1] != len(names) and values.size:
+        raise InputError(Fault(shown, f"{len(names)} columns, as the header names", str(values.shape[1])))
+    if not values.size:
+        raise InputError(Fault(shown, "samples below the header", "none", "record it again"))
+    return {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(names)}
+
+
+def _of(columns: dict[str, Floats], names: tuple[str, ...]) -> Floats | None:
+    return next((columns[name] for name in names if name in columns), None)
+
+
+def _rate_of(times: Floats, shown: str, rate: float | None) -> tuple[float, Fault | None]:
+    steps = np.diff(times)
+    if times.size < 2 or not np.isfinite(times).all() or not (steps > 0).all():
+        return 1.0, Fault(f"{shown} time", "times in s that rise", "times that do not")
+    step = float((times[-1] - times[0]) / (times.size - 1))
+    if (
+        np.abs(times - times[0] - step * np.arange(times.size)).max()
+        > max(_JITTER * step, 1e-6 * float(times[-1])) + step
+    ):
+        return 1.0, Fault(f"{shown} time", "evenly spaced samples", "uneven ones", "record without gaps")
+    own = 1.0 / step
+    if rate is not None and abs(rate / own - 1.0) > _JITTER:
+        return own, Fault(f"{shown} rate", f"{rate:g} Hz, as --rate says", f"{own:.6g} Hz", "leave --rate out")
+    return (rate or float(f"{own:.7g}")), None
+
+
+def _response(columns: dict[str, Floats], shown: str, motion: Motion) -> FrequencyResponse:
+    hertz, real, imaginary = (_of(columns, names) for names in (_HERTZ, _REAL, _IMAGINARY))
+    if hertz is None or real is None or imaginary is None:
+        raise InputError(Fault(shown, "the columns f_hz, re and im", ", ".join(columns)))
+    steps = np.diff(hertz)
+    if hertz.size < 100 or not (steps > 0).all() or np.ptp(steps) > 2e-2 * float(np.mean(steps)):
+        raise InputError(
+            Fault(f"{shown} f_hz", "a hundred evenly spaced lines or more, rising", f"{hertz.size} others")
+        )
+    return FrequencyResponse(shown, hertz, real + 1j * imaginary, _of(columns, _COHERENCE), motion)

@@ -1,0 +1,154 @@
+"""From recordings to spectra: every hit of every file, and everything that stands in the way at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesplate.errors import Fault, InputError
+from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, usable
+from bayesplate.recordings.reading import Read
+from bayesplate.recordings.signals import FrequencyResponse, Recording
+from bayesplate.recordings.spectra import Spectra, decay_spectra, response_spectra
+
+_OVER_HIGHEST = 2.5
+"""Samples a second over the highest frequency, at least."""
+_SHORT = 0.5
+"""Share of the usual length below which a decay is left out, so that it does not shorten all others."""
+_RATE_OFF = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """What was taken from recordings.
+
+    Attributes
+    ----------
+    spectra : Spectra
+    hits : tuple of (Recording, tuple of Hit)
+        Those that were used; empty for frequency responses.
+    remarks : tuple of str
+        What was left out, and why.
+    """
+
+    spectra: Spectra
+    hits: tuple[tuple[Recording, tuple[Hit, ...]], ...]
+    remarks: tuple[str, ...]
+
+
+def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
+    """Spectra of everything that files hold.
+
+    Parameters
+    ----------
+    files : sequence of sequence of Recording or FrequencyResponse
+    highest : float, Hz
+        Up to which modes are looked for.
+
+    Returns
+    -------
+    Heard
+
+    Raises
+    ------
+    InputError
+        With every file that has no hit that can be used, or that does not go with the others.
+    """
+    every = [one for file in files for one in file]
+    responses = [one for one in every if isinstance(one, FrequencyResponse)]
+    if responses:
+        faults = _response_faults(every, responses)
+        if faults:
+            raise InputError(faults)
+        return Heard(response_spectra(responses, highest), (), ())
+    recordings = [one for one in every if isinstance(one, Recording)]
+    faults = _recording_faults(recordings, highest)
+    heard: list[tuple[Recording, list[Hit]]] = []
+    remarks: list[str] = []
+    for one in recordings:
+        hits = find_hits(one)
+        good = usable(hits)
+        bad = [(number, hit) for number, hit in enumerate(hits, start=1) if hit.fault]
+        if not hits:
+            wanted = "a hit that stands out of the quiet"
+            faults.append(Fault(one.name, wanted, "none", "leave a moment of quiet before each hit"))
+        elif 2 * len(good) < len(hits) or not good:
+            faults += [_hit_fault(one, number, hit) for number, hit in bad]
+        else:
+            remarks += [
+                f"{one.name}: hit {number} at {hit.onset / one.rate:.2f} s left out, {hit.fault}" for number, hit in bad
+            ]
+            heard.append((one, good))
+    if faults:
+        raise InputError(faults)
+    kept, short = _without_short(heard)
+    return Heard(decay_spectra(kept, highest), tuple((one, tuple(hits)) for one, hits in kept), (*remarks, *short))
+
+
+def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> Heard:
+    """Spectra of impulse responses that were made from sweeps; parameters and faults as of `take`."""
+    faults = _recording_faults([one for one, _ in impulses], highest)
+    faults += [
+        Fault(one.name, f"{LEAST_DURATION:g} s after the end of the sweep", "less", "record on until it is silent")
+        for one, hit in impulses
+        if hit.stop - hit.start < LEAST_DURATION * one.rate
+    ]
+    if faults:
+        raise InputError(faults)
+    hits = tuple((one, (hit,)) for one, hit in impulses)
+    return Heard(decay_spectra(hits, highest), hits, ())
+
+
+def _hit_fault(one: Recording, number: int, hit: Hit) -> Fault:
+    place = f"{one.name} hit {number} at {hit.onset / one.rate:.2f} s"
+    return Fault(place, "one hit, and time to ring down", hit.fault, "hit again, and wait until it is silent")
+
+
+def _response_faults(every: Sequence[Read], responses: Sequence[FrequencyResponse]) -> list[Fault]:
+    if len(responses) < len(every):
+        return [Fault("FILES", "recordings or frequency responses", "both", "pick them apart")]
+    first = responses[0]
+    faults = []
+    for one in responses[1:]:
+        if one.frequency.shape != first.frequency.shape or not np.allclose(one.frequency, first.frequency, rtol=1e-6):
+            faults.append(Fault(f"{one.name} frequencies", f"those of {first.name}", "others", "pick them apart"))
+        if one.motion != first.motion:
+            faults.append(Fault(one.name, f"{first.motion}, as {first.name}", one.motion, "pick them apart"))
+    return faults
+
+
+def _recording_faults(recordings: Sequence[Recording], highest: float) -> list[Fault]:
+    first = recordings[0]
+    faults = []
+    for one in recordings:
+        if one.rate < _OVER_HIGHEST * highest:
+            wanted = f"{_OVER_HIGHEST * highest:g} samples a second or more for modes up to {highest:g} Hz"
+            faults.append(Fault(f"{one.name} rate", wanted, f"{one.rate:g}", "is it right? --highest lowers the limit"))
+        if abs(one.rate / first.rate - 1.0) > _RATE_OFF:
+            faults.append(Fault(f"{one.name} rate", f"{first.rate:g} Hz, as {first.name}", f"{one.rate:g} Hz"))
+        if (one.force is None) != (first.force is None):
+            got = "without a force" if one.force is None else "with a force"
+            faults.append(Fault(one.name, f"the channels of {first.name}", got, "pick them apart"))
+        if one.motion != first.motion:
+            faults.append(Fault(one.name, f"{first.motion}, as {first.name}", one.motion, "pick them apart"))
+    return faults
+
+
+def _without_short(heard: Sequence[tuple[Recording, list[Hit]]]) -> tuple[list[tuple[Recording, list[Hit]]], list[str]]:
+    """All decays but those far shorter than usual."""
+    lengths = [hit.stop - hit.start for _, hits in heard for hit in hits]
+    least = _SHORT * float(np.median(lengths))
+    kept, told = [], []
+    for one, hits in heard:
+        long_enough = [hit for hit in hits if hit.stop - hit.start >= least]
+        told += [
+            f"{one.name}: the hit at {hit.onset / one.rate:.2f} s left out, it rings for "
+            f"{(hit.stop - hit.start) / one.rate:.2g} s only"
+            for hit in hits
+            if hit not in long_enough
+        ]
+        if long_enough:
+            kept.append((one, long_enough))
+    return kept, told

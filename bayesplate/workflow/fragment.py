@@ -1,0 +1,109 @@
+"""The [setup] fragment that `pick` writes: what a card takes of the recordings, in TOML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from bayesplate.cards.writing import array, number, table, text
+from bayesplate.recordings.contract import PickedRow
+
+if TYPE_CHECKING:
+    from bayesplate.recordings.signals import Place
+    from bayesplate.recordings.spectra import Spectra
+
+_MILLI = 1e-3
+_LEAST_SD = 1e-5
+"""Of a frequency, relative: no laboratory's clock is better."""
+_LEAST_SPURIOUS, _MOST_SPURIOUS = 0.002, 0.5
+_MOST_SURE = 0.999
+
+
+def fragment_text(
+    peaks: Sequence[PickedRow],
+    labelled: Mapping[int, tuple[str, float]],
+    spectra: Spectra,
+    *,
+    files: Sequence[str],
+    name: str = "",
+    sensor_mass: tuple[float, float] | None = None,
+) -> str:
+    """A [setup] with the likely peaks.
+
+    Parameters
+    ----------
+    peaks : sequence of PickedRow
+        All that were picked.
+    labelled : mapping
+        Number of a peak to the label that is stated, and the confidence in it.
+    spectra : Spectra
+        With the places of hammer and sensor.
+    files : sequence of str
+    name : str
+        Of the card's setup; empty if it has none.
+    sensor_mass : (float, float), optional, kg
+        Of the accelerometer, and its standard deviation.
+
+    Returns
+    -------
+    str
+    """
+    likely = [(i, peak) for i, peak in enumerate(peaks) if peak.is_likely]
+    told = ", ".join("".join(c for c in one if c.isprintable()) for one in files[:3]) + (
+        ", ..." if len(files) > 3 else ""
+    )
+    lines = [f"# Picked from {told}. Use it with: bayesplate fit CARD --setup THIS_FILE", "[setup]"]
+    if name:
+        lines.append(f"name = {text(name)}")
+    bare = [(i, peak) for i, peak in likely if i not in labelled]
+    doubt = sum(peak.spurious_probability for _, peak in likely) / max(len(likely), 1)
+    if bare:
+        lines.append(f"spurious_probability = {number(round(min(max(doubt, _LEAST_SPURIOUS), _MOST_SPURIOUS), 4))}")
+    named = [(peak, *labelled[i]) for i, peak in likely if i in labelled]
+    if named:
+        lines += ["", "[setup.frequencies_hz]"]
+        lines += [f"{text(label)} = {_hertz(peak)}" for peak, label, _ in named]
+        lines += ["", "[setup.label_confidence]"]
+        lines += [f"{text(label)} = {number(round(min(sure, _MOST_SURE), 3))}" for _, label, sure in named]
+        signed = [(label, peak.sign) for peak, label, _ in named if peak.sign]
+        if signed:
+            lines += ["", "[setup.signs]", *(f"{text(label)} = {text(sign)}" for label, sign in signed)]
+    for _, peak in bare:
+        lines += ["", f"[[setup.peaks]]{_remark(peak)}", f"hz = {_hertz(peak)}"]
+        lines += [f"sign = {text(peak.sign)}"] if peak.sign else []
+        lines += [f"amplitude = {peak.amplitude:.3g}", f"damping_percent = {peak.damping_percent:.3g}"]
+    return "\n".join([*lines, *_places(spectra, sensor_mass)]) + "\n"
+
+
+def _hertz(peak: PickedRow) -> str:
+    sd = max(peak.sd_hz, _LEAST_SD * peak.hz)
+    return table({"mean": f"{peak.hz:.7g}", "sd": f"{sd:.2g}"})
+
+
+def _remark(peak: PickedRow) -> str:
+    """Labels as a comment: the fit finds them anew."""
+    if not peak.labels:
+        return ""
+    return "  # " + ", ".join(f"{one.label} {100.0 * one.probability:.0f} %" for one in peak.labels[:2])
+
+
+def _places(spectra: Spectra, sensor_mass: tuple[float, float] | None) -> list[str]:
+    """Hammer and accelerometer, as far as they are known and a card can say them."""
+    hammers = list(dict.fromkeys(hammer for hammer, _ in spectra.between if hammer is not None))
+    sensors = list(dict.fromkeys(sensor for _, sensor in spectra.between if sensor is not None))
+    lines = []
+    if len(hammers) == 1 and len(spectra.between) == 1:
+        lines += ["", "[setup.hammer]", f"at_mm = {_place(hammers[0])}"]
+    if sensors and spectra.motion != "pressure":
+        places = [_place(sensor) for sensor in sensors]
+        lines += ["", "[[setup.attached]]", 'kind = "accelerometer"']
+        lines += [f"at_mm = {places[0] if len(places) == 1 else array(places)}"]
+        if sensor_mass is not None:
+            mass, sd = sensor_mass
+            grams = number(mass, _MILLI)
+            lines += [f"mass_g = {table({'mean': grams, 'sd': number(sd, _MILLI)}) if sd else grams}"]
+    return lines
+
+
+def _place(place: Place) -> str:
+    return array(f"{1e3 * value:.6g}" for value in place)

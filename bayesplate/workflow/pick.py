@@ -1,0 +1,267 @@
+"""`pick`: recordings to frequencies with their uncertainty, labels, and the [setup] that a card takes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bayesplate.cards.words import plain
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.recordings.contract import PickReport, rows
+from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
+from bayesplate.recordings.reading import read_recordings
+from bayesplate.recordings.sand import read_picture
+from bayesplate.recordings.signals import Motion, Recording
+from bayesplate.recordings.sweeps import impulse_response, read_sweep
+from bayesplate.recordings.taking import Heard, take, take_impulses
+from bayesplate.results.folder import FIGURES, make_folder, require_new, write_text
+from bayesplate.workflow.arguments import require_arguments
+from bayesplate.workflow.fragment import fragment_text
+from bayesplate.workflow.pick_words import show_pick
+from bayesplate.workflow.places import given_places
+from bayesplate.workflow.prepare import Prepared, prepare
+
+if TYPE_CHECKING:
+    from bayesplate.recordings.hits import Hit
+    from bayesplate.recordings.reading import Read
+    from bayesplate.recordings.sand import Floats
+    from bayesplate.workflow.pick_labels import Labels
+
+FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
+_RATE_OFF = 1e-6
+_SAND_OFF = 0.03
+"""Relative distance up to which a picture of sand belongs to a peak."""
+
+FilePath = str | os.PathLike[str]
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PickResult:
+    """What `pick` leaves.
+
+    Attributes
+    ----------
+    summary : PickReport
+    picked : Picked
+        With the spectra.
+    folder : Path or None
+        Where its files are; None if none were asked for.
+    """
+
+    summary: PickReport
+    picked: Picked
+    folder: Path | None
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{peak.hz:.1f}" for peak in self.summary.likely[:8])
+        return f"<PickResult of {', '.join(self.summary.files[:3])}: {len(self.summary.likely)} modes, Hz: {found}>"
+
+    def _repr_html_(self) -> str:
+        """The table as a notebook shows it."""
+        return show_pick(self.summary).html("Picked modes")
+
+
+def pick(
+    files: Sequence[FilePath],
+    *,
+    card: FilePath | None = None,
+    rate: float | None = None,
+    hammer: Sequence[Place] = (),
+    sensor: Sequence[Place] = (),
+    sensor_mass: tuple[float, float] | None = None,
+    channels: str = "force,response",
+    motion: Motion = "acceleration",
+    polarity: str | None = None,
+    sweep: str | None = None,
+    sand: Mapping[float, FilePath] | None = None,
+    lowest: float = LOWEST,
+    highest: float = HIGHEST,
+    out: FilePath | None = None,
+    force: bool = False,
+) -> PickResult:
+    """Pick the modes of a board from recordings of hits, taps or sweeps.
+
+    Parameters
+    ----------
+    files : sequence of path
+        WAV or CSV; FLAC and UFF with the extra `bayesplate[recordings]`. Files between the same two places are repeats.
+    card : str or path, optional
+        A board card with sizes and edges, which may be without frequencies: labels are computed for it.
+    rate : float, optional, Hz
+        For files that do not say it.
+    hammer, sensor : sequence of (float, float), m
+        Where the board was hit and listened to, from the corner x = y = 0: none, one for all files, or one for each.
+    sensor_mass : (float, float), optional, kg
+        Of the accelerometer, and its standard deviation; it is passed on to the card.
+    channels : str
+        What two channels of a sound file are: "force,response", "response,force" or "response,response".
+    motion : str
+        What a response is whose file does not say it: "acceleration", "velocity", "displacement" or "pressure".
+    polarity : str, optional
+        "same" if a force towards the board and the response it causes have one sign, "opposite" if not. By default it
+        is found by the labels, if there is a card.
+    sweep : str, optional
+        For recordings of an exponential sweep: "F1,F2,SECONDS", or the path of the sweep itself.
+    sand : mapping, optional
+        Frequency in Hz to a picture of sand, cropped to the board.
+    lowest, highest : float, Hz
+        Between which modes are looked for.
+    out : path, optional
+        Folder of setup.toml, recordings.html, pick.json and figures; nothing is written without it.
+    force : bool
+        Replace what is there.
+
+    Returns
+    -------
+    PickResult
+
+    Raises
+    ------
+    InputError
+        With every fault of the arguments, then of all files, then of all hits; nothing is written then.
+    """
+    require_arguments(
+        files=files, card_or_none=card, rate=rate, places=(hammer, sensor, len(files)), sensor_mass=sensor_mass,
+        channels=channels, motion=motion, polarity=polarity, band=(lowest, highest), sand=sand, out=out, force=force,
+    )  # fmt: skip
+    targets = () if out is None else require_new(Path(out), (FRAGMENT, PAGE, SUMMARY), force=force)
+    prepared = None if card is None else _one_setup(prepare(card, may_lack_frequencies=True))
+    pictures = {hertz: read_picture(path) for hertz, path in (sand or {}).items()}
+    read = read_recordings(files, rate, channels, motion)
+    read = [
+        [one.at(*places) for one in own] for own, places in zip(read, given_places(hammer, sensor, read), strict=True)
+    ]
+    heard = take(read, highest) if sweep is None else take_impulses(_impulses(read, sweep), highest)
+    picked = pick_modes(heard.spectra, lowest, highest)
+    summary = _summary(files, heard, picked, prepared, polarity, pictures, sensor_mass)
+    if out is not None:
+        _write(Path(out), targets, summary, picked, heard)
+    return PickResult(summary, picked, None if out is None else Path(out))
+
+
+def _one_setup(prepared: Prepared) -> Prepared:
+    """A card whose labels are meant without doubt: it has one setup."""
+    if len(prepared.board.setups) > 1:
+        names = ", ".join(setup.name for setup in prepared.board.setups)
+        raise InputError(Fault(prepared.board.name, "a card with one setup", names, "one card for the edges at hand"))
+    return prepared
+
+
+def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recording, Hit]]:
+    """Impulse responses in place of recordings of a sweep, each as if the board had been hit once."""
+    recordings = [one for own in read for one in own if isinstance(one, Recording)]
+    wrong = [one.name for own in read for one in own if not isinstance(one, Recording) or one.force is not None]
+    if wrong:
+        wanted = "one channel with the response to the sweep"
+        raise InputError([Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong])
+    if not Path(sweep).exists():
+        played = read_sweep(sweep)
+        return [impulse_response(one, played) for one in recordings]
+    ((itself, *_),) = read_recordings([sweep])
+    if not isinstance(itself, Recording):
+        raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
+    off = [one for one in recordings if abs(one.rate / itself.rate - 1.0) > _RATE_OFF]
+    if off:
+        raise InputError(
+            [Fault(f"{one.name} rate", f"{itself.rate:g} Hz, as the sweep", f"{one.rate:g} Hz") for one in off]
+        )
+    return [impulse_response(one, itself.response) for one in recordings]
+
+
+def _summary(
+    files: Sequence[FilePath],
+    heard: Heard,
+    picked: Picked,
+    prepared: Prepared | None,
+    polarity: str | None,
+    pictures: Mapping[float, Floats],
+    sensor_mass: tuple[float, float] | None,
+) -> PickReport:
+    names = tuple(plain(Path(one).name) for one in files)
+    numbers = [number for number, mode in enumerate(picked.modes) if mode.is_likely]
+    flips = None if polarity is None else polarity == "opposite"
+    remarks = list(heard.remarks)
+    labels = None
+    if prepared is not None:
+        shown, beside = _pictures_of(picked, pictures)
+        remarks += beside
+        labels, told = _labelled(prepared, picked, flips, shown)
+        remarks += told
+    elif pictures:
+        remarks.append("pictures of sand need a card: they are compared with the modes of its board")
+    flips = flips if labels is None else labels.flips
+    by_mode = {} if labels is None else {number: labels.of(i) for i, number in enumerate(numbers)}
+    peaks = rows(picked, flips, by_mode)
+    sure = {} if labels is None else {number: labels.stated(i) for i, number in enumerate(numbers)}
+    named = _each_once({number: one for number, one in sure.items() if one is not None})
+    text = fragment_text(
+        peaks,
+        named,
+        picked.spectra,
+        files=names,
+        name="" if prepared is None else prepared.board.setups[0].name,
+        sensor_mass=sensor_mass,
+    )
+    return PickReport(
+        format=1,
+        files=names,
+        n_hits=len(picked.spectra.names),
+        n_places=len(picked.spectra.between),
+        seconds=picked.spectra.duration,
+        lowest_hz=picked.lowest,
+        highest_hz=picked.highest,
+        peaks=peaks,
+        polarity="" if flips is None else "opposite" if flips else "same",
+        board="" if prepared is None else prepared.board.name,
+        fragment=text,
+        remarks=tuple(remarks),
+    )
+
+
+def _labelled(
+    prepared: Prepared, picked: Picked, flips: bool | None, shown: Mapping[int, Sequence[Floats]]
+) -> tuple[Labels | None, list[str]]:
+    from bayesplate.workflow.pick_labels import label_peaks
+
+    try:
+        return label_peaks(prepared.board, prepared.prior, picked, flips, shown), []
+    except NotIdentifiableError as error:
+        return None, [f"no labels: {error}"]
+
+
+def _pictures_of(picked: Picked, pictures: Mapping[float, Floats]) -> tuple[dict[int, list[Floats]], list[str]]:
+    """Pictures by the number of the likely peak nearest to their frequency, and those without one."""
+    found: dict[int, list[Floats]] = {}
+    told = []
+    likely = picked.likely
+    for hertz, picture in pictures.items():
+        off = [abs(mode.frequency / hertz - 1.0) for mode in likely]
+        if not off or min(off) > _SAND_OFF:
+            told.append(f"no peak within {100.0 * _SAND_OFF:g} % of the sand at {hertz:g} Hz")
+        else:
+            found.setdefault(off.index(min(off)), []).append(picture)
+    return found, told
+
+
+def _each_once(named: Mapping[int, tuple[str, float]]) -> dict[int, tuple[str, float]]:
+    """Each label for the peak that it is surest of."""
+    best: dict[str, int] = {}
+    for number, (label, sure) in named.items():
+        if label not in best or sure > named[best[label]][1]:
+            best[label] = number
+    return {number: one for number, one in named.items() if best[one[0]] == number}
+
+
+def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked, heard: Heard) -> None:
+    from bayesplate.report.recordings_page import write_recordings_page
+    from bayesplate.results.folder import json_text
+
+    make_folder(folder / FIGURES)
+    fragment, _, numbers = targets
+    write_text(fragment, summary.fragment)
+    write_text(numbers, json_text(summary))
+    write_recordings_page(folder, summary, picked, heard)

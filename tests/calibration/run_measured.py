@@ -1,0 +1,83 @@
+"""Pick measured recordings: `python tests/calibration/run_measured.py --folder ../shared/data`.
+
+The raw hits of a free half-top (2R), its frequency response, and that of another (1R), against peaks that were read off
+by another method. The data have no stated licence and are not part of the project: where the folder is absent, this
+says so and ends with exit code 0. Otherwise 0: all peaks found within 0.3 % or the listed spread, their signs agree but
+for one polarity, and no more than two further peaks are rather modes than not; 1: not, with what is missed; 2: usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is imported
+
+import bayesplate
+from bayesplate.recordings.contract import PickedRow
+
+WITHIN, MOST_FURTHER, HIGHEST = 3e-3, 2, 1000.0
+AT = {"hammer": [(0.020, 0.020)], "sensor": [(0.560, 0.197)]}
+"""Where the listing says that hammer and sensor were, m."""
+
+
+def compared(words: str, peaks: Sequence[dict[str, Any]], picked: Sequence[PickedRow]) -> tuple[list[str], bool]:
+    """Line by line how picked modes agree with listed peaks, and whether they do."""
+    likely = [peak for peak in picked if peak.is_likely]
+    off = sorted((abs(mode.hz - peak["f_hz"]), i, j) for i, peak in enumerate(peaks) for j, mode in enumerate(likely))
+    of_peak: dict[int, int] = {}
+    for _, i, j in off:
+        if i not in of_peak and j not in of_peak.values():
+            of_peak[i] = j
+    lines, found, alike = [words], 0, {1: 0, -1: 0}
+    for i, peak in enumerate(peaks):
+        mode = likely[of_peak[i]] if i in of_peak else None
+        reach = max(WITHIN * peak["f_hz"], peak["spread_hz"])
+        if mode is None or abs(mode.hz - peak["f_hz"]) > reach:
+            nearest = "none" if mode is None else f"{mode.hz:.2f} +- {mode.sd_hz:.2f} Hz"
+            lines.append(f"  missed: {peak['f_hz']:.2f} Hz (within {reach:.2f} Hz), nearest {nearest}")
+            continue
+        found += 1
+        if peak["sign"] in "+-" and mode.sign:
+            alike[1 if mode.sign == peak["sign"] else -1] += 1
+    further = [mode for j, mode in enumerate(likely) if j not in of_peak.values()]
+    lines.append(f"  {found} of {len(peaks)} peaks found; signs {max(alike.values())} of {sum(alike.values())} agree")
+    told = ", ".join(f"{mode.hz:.1f} Hz ({100 * mode.spurious_probability:.0f} % none)" for mode in further) or "none"
+    lines.append(f"  further modes: {told}")
+    return lines, found == len(peaks) and min(alike.values()) == 0 and len(further) <= MOST_FURTHER
+
+
+def main() -> int:
+    """Run the command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--folder", type=Path, required=True, help="with raw_2R/, the listings and the responses")
+    folder = parser.parse_args().folder
+    if not folder.is_dir():
+        print(f"skipped: no folder {folder}. The measured recordings are no part of the project.")
+        return 0
+    listed = {
+        name: tomllib.loads((folder / f"spruce_free_{name}.toml").read_text(encoding="utf-8"))["peak"]
+        for name in ("2R", "1R")
+    }
+    hits = sorted((folder / "raw_2R").glob("hit_*.csv"))
+    every = [
+        ("2R, five hits", "2R", hits, 48_000.0),
+        ("2R, frequency response", "2R", [folder / "spruce_free_2R_frf.csv"], None),
+        ("1R, frequency response", "1R", [folder / "spruce_free_1R_frf.csv"], None),
+    ]
+    is_right = True
+    for words, name, files, rate in every:
+        picked = bayesplate.pick(files, rate=rate, highest=HIGHEST, polarity="same", **AT).summary
+        lines, agrees = compared(words, listed[name], picked.peaks)
+        print("\n".join(lines))
+        is_right = is_right and agrees
+    return 0 if is_right else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,78 @@
+"""Recordings made for tests: a free board of the generator that was hit or tapped, as arrays and as files."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import ritz
+from generator.ringing import Blow, Ringing, recorded, ringing, with_noise
+from numpy.typing import NDArray
+from scipy.io import wavfile
+
+Floats = NDArray[np.float64]
+E_X, E_Y, G_XY = 12.1e9, 0.87e9, 0.72e9
+SIDES, THICKNESS, DENSITY = (0.580, 0.217), 4.7e-3, 429.0
+SENSOR = (0.560, 0.197)
+CARD = """\
+format = 1
+name = "planted"
+
+[plate]
+length_x_mm = 580
+length_y_mm = 217
+thickness_mm = 4.7
+density_kg_m3 = 429
+
+[material]
+poisson_xy = 0.4
+
+[setup]
+edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }
+noise_percent = { median = 0.1, factor = 2 }
+"""
+
+
+@lru_cache(maxsize=4)
+def board(n_modes: int = 16, least: float = 0.004, most: float = 0.012) -> Ringing:
+    """A free board of known constants, its damping drawn once."""
+    plate = ritz.Plate.from_moduli(
+        E_X, E_Y, G_XY, 0.4, rho=DENSITY, h=THICKNESS, L_x=SIDES[0], L_y=SIDES[1], edges=ritz.ALL_FREE
+    )
+    damping = np.random.default_rng(5).uniform(least, most, n_modes)
+    return ringing(plate, n_modes, damping)
+
+
+def hits(
+    rng: np.random.Generator,
+    times: list[float],
+    hammer: tuple[float, float],
+    sensor: tuple[float, float] = SENSOR,
+    *,
+    rate: float = 4000.0,
+    seconds: float = 1.5,
+    decibels: float = 45.0,
+    hum: float = 0.0,
+) -> tuple[Floats, Floats]:
+    """Force and acceleration of a board that is hit at some times, s, with noise."""
+    blows = [Blow(one + rng.uniform(0.0, 1e-3), rng.uniform(0.4e-3, 1e-3), rng.uniform(3.0, 6.0)) for one in times]
+    force, heard = recorded(board(), hammer, sensor, blows, rate, seconds)
+    return with_noise(rng, force, 40.0, rate), with_noise(rng, heard, decibels, rate, hum)
+
+
+def write_wav(path: Path, rate: float, *channels: Floats, level: float = 0.5) -> Path:
+    """A file of 16 bits, each channel up to a share of what it can hold."""
+    columns = np.stack([level * channel / np.abs(channel).max() for channel in channels], axis=1)
+    wavfile.write(path, round(rate), np.round(32767.0 * columns).astype(np.int16))
+    return path
+
+
+def write_taps(folder: Path, rng: np.random.Generator, *, rate: float = 8000.0) -> list[Path]:
+    """Two recordings of six taps each by a microphone, with hum: what a maker has."""
+    paths = []
+    for number, hammer in enumerate([(0.03, 0.02), (0.15, 0.19)], start=1):
+        times = [0.5 + 1.4 * i for i in range(6)]
+        _, heard = hits(rng, times, hammer, (0.52, 0.03), rate=rate, seconds=9.0, decibels=35.0, hum=0.02)
+        paths.append(write_wav(folder / f"tap{number}.wav", rate, heard))
+    return paths

@@ -1,0 +1,104 @@
+"""Hits in recordings: found where they were struck, and set aside with the reason where they cannot be used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_recordings import hits
+
+from bayesplate.errors import InputError
+from bayesplate.recordings.hits import find_hits
+from bayesplate.recordings.signals import FrequencyResponse, Recording
+from bayesplate.recordings.taking import take
+
+RATE = 4000.0
+HAMMER = (0.03, 0.02)
+TIMES = [0.5, 1.9, 3.3, 4.7]
+
+
+def recording(times, *, has_force=True, seconds=6.0, name="a.wav", **options) -> Recording:
+    """A board that is hit at some times."""
+    force, heard = hits(np.random.default_rng(1), times, HAMMER, rate=RATE, seconds=seconds, **options)
+    return Recording(name, RATE, heard, force if has_force else None)
+
+
+def still_ringing(times, name) -> Recording:
+    """A bell that is hit again long before it has rung down."""
+    at = np.arange(round(1.8 * RATE)) / RATE
+    since = at - np.array(times)[:, None]
+    heard = np.sum(np.where(since > 0.0, np.exp(-since) * np.sin(1300.0 * since), 0.0), axis=0)
+    return Recording(name, RATE, heard, np.sum(np.abs(since) < 5e-4, axis=0, dtype=float))
+
+
+@pytest.mark.parametrize("has_force", [True, False], ids=["by the force", "by the sound"])
+def test_every_hit_is_found_where_it_was_struck(has_force):
+    found = find_hits(recording(TIMES, has_force=has_force, decibels=35.0, hum=0.03))
+
+    np.testing.assert_allclose([hit.onset / RATE for hit in found], TIMES, atol=0.003)
+    assert {hit.fault for hit in found} == {""}
+    assert all(0.0 < (hit.start - hit.onset) / RATE < 0.01 for hit in found)
+
+
+@pytest.mark.parametrize("has_force", [True, False], ids=["by the force", "by the sound"])
+def test_a_bounce_is_a_double_hit_and_the_others_are_kept(has_force):
+    times = [0.5, 0.56, 1.9, 3.3]
+    one = recording(times, has_force=has_force)
+    clicks = np.zeros_like(one.response)  # what a microphone hears of the hammer itself
+    for at in times:
+        first = round(at * RATE)
+        clicks[first : first + 8] = np.random.default_rng(first).standard_normal(8) * np.abs(one.response).max()
+
+    found = find_hits(replace(one, response=one.response + clicks))
+
+    assert [hit.fault[:12] for hit in found] == ["a double hit", "a double hit", "", ""]
+
+
+def test_noise_alone_holds_no_hit():
+    quiet = np.random.default_rng(2).standard_normal(24_000)
+
+    assert find_hits(Recording("quiet", RATE, quiet)) == []
+    assert find_hits(Recording("quiet", RATE, quiet, quiet[::-1])) == []
+
+
+def test_what_can_be_used_is_used_and_the_rest_is_told():
+    taken = take([[recording([0.5, 0.56, 1.9, 3.3, 4.7])]], 500.0)
+
+    assert len(taken.spectra.names) == 3
+    assert [line.partition(" left out")[0] for line in taken.remarks] == [
+        "a.wav: hit 1 at 0.50 s", "a.wav: hit 2 at 0.56 s",
+    ]  # fmt: skip
+
+
+def test_what_cannot_be_used_is_refused_with_every_hit_and_every_file():
+    quiet = Recording("quiet.wav", RATE, 1e-3 * np.random.default_rng(2).standard_normal(24_000), np.zeros(24_000))
+    close = recording([0.5, 0.7, 0.9], name="close.wav", seconds=1.4)
+    early = still_ringing([0.5, 0.9, 1.3], name="early.wav")
+    slow = Recording("slow.wav", 1000.0, np.zeros(3000), np.zeros(3000))
+
+    with pytest.raises(InputError) as caught:
+        take([[quiet], [close], [early], [slow]], 500.0)
+
+    message = str(caught.value)
+    for said in (
+        "quiet.wav: wanted a hit that stands out of the quiet, got none",
+        "close.wav hit 1 at 0.50 s: wanted one hit, and time to ring down, got only 0.2 s until the next hit",
+        "early.wav hit 2 at 0.90 s: wanted one hit, and time to ring down, got the next hit came before it had fallen",
+        "slow.wav rate: wanted 1250 samples a second or more for modes up to 500 Hz, got 1000",
+        "slow.wav rate: wanted 4000 Hz, as quiet.wav, got 1000 Hz",
+    ):
+        assert said in message
+
+
+def test_what_does_not_go_together_is_refused():
+    hertz = np.arange(200) * 1.0
+    response = FrequencyResponse("a.csv", hertz, np.ones(200) + 0j)
+    other = FrequencyResponse("b.csv", 2.0 * hertz, np.ones(200) + 0j)
+
+    with pytest.raises(InputError, match="FILES: wanted recordings or frequency responses, got both"):
+        take([[recording(TIMES)], [response]], 500.0)
+    with pytest.raises(InputError, match=r"b\.csv frequencies: wanted those of a\.csv, got others"):
+        take([[response], [other]], 150.0)
+    with pytest.raises(InputError, match=r"b\.wav: wanted the channels of a\.wav, got without a force"):
+        take([[recording(TIMES)], [recording(TIMES, has_force=False, name="b.wav")]], 500.0)

@@ -1,0 +1,131 @@
+"""Picked modes of a board that was hit: where they were planted, with their signs, and hum is no mode."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_recordings import SENSOR, board, hits
+from scipy.signal import fftconvolve
+
+from bayesplate.recordings.picking import Picked, pick_modes
+from bayesplate.recordings.responses import averaged
+from bayesplate.recordings.signals import FrequencyResponse, Recording
+from bayesplate.recordings.spectra import response_spectra
+from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep
+from bayesplate.recordings.taking import Heard, take, take_impulses
+
+RATE = 4000.0
+HAMMERS = ((0.02, 0.02), (0.15, 0.19), (0.29, 0.03))
+LOWEST, HIGHEST = 20.0, 420.0
+
+
+@pytest.fixture(scope="module")
+def heard() -> Heard:
+    """Three places, three hits each, with hum."""
+    rng = np.random.default_rng(8)
+    files = []
+    for place, hammer in enumerate(HAMMERS):
+        for hit in range(3):
+            force, response = hits(rng, [0.02], hammer, rate=RATE, decibels=45.0, hum=0.01)
+            files.append([Recording(f"{place}-{hit}", RATE, response, force, hammer=hammer, sensor=SENSOR)])
+    return take(files, HIGHEST)
+
+
+@pytest.fixture(scope="module")
+def picked(heard) -> Picked:
+    """Its modes below 420 Hz."""
+    return pick_modes(heard.spectra, LOWEST, HIGHEST)
+
+
+def test_the_planted_modes_are_found_and_nothing_else(picked):
+    truth = board().damped
+    truth = truth[truth < 400.0]
+    found = np.array([mode.frequency for mode in picked.likely if mode.frequency < 400.0])
+    damping = np.array([mode.damping for mode in picked.likely if mode.frequency < 400.0])
+
+    np.testing.assert_allclose(found, truth, rtol=2e-3)
+    np.testing.assert_allclose(damping, board().damping[: truth.size], rtol=0.15)
+    errors = (found - truth) / [mode.sd for mode in picked.likely if mode.frequency < 400.0]
+    assert np.abs(errors).max() < 4.0
+
+
+def test_hum_is_set_aside_by_its_name(picked):
+    (hum,) = (mode for mode in picked.modes if abs(mode.frequency - 50.0) < 0.1)
+
+    assert hum.spurious > 0.9
+    assert hum.kind in ("hum", "not alike from hit to hit")
+
+
+def test_residues_between_the_places_have_the_signs_and_sizes_of_the_shapes(picked):
+    """The generator's own residues; modes that hardly answer at a place tell nothing of their sign."""
+    every = np.stack([board().residues(hammer, SENSOR) for hammer in HAMMERS], axis=1)
+    for mode in (one for one in picked.likely if one.frequency < 400.0):
+        own = every[int(np.argmin(np.abs(board().damped - mode.frequency)))]
+        loud = np.abs(own) > 0.2 * np.abs(own).max()
+        assert (np.sign(np.array(mode.mobility)[loud]) == np.sign(own[loud])).all()
+        ratio = np.array(mode.mobility)[loud] / own[loud]
+        assert np.ptp(ratio) < 0.3 * ratio.mean()
+
+
+def test_the_averaged_response_is_the_board_and_its_coherence_falls_in_the_noise(heard):
+    """H1 near resonances against the modal sum; the coherence of three hits is near one there."""
+    one = averaged(heard)[0]
+    truth = board().damped[1:8]
+    at = [int(np.argmin(np.abs(one.frequency - hertz))) for hertz in truth]
+
+    assert one.n_hits == 3
+    assert np.min(one.coherence[at]) > 0.98
+    residues = np.abs(board().residues(HAMMERS[0], SENSOR)[1:8])
+    peaks = residues / (2.0 * board().damping[1:8])  # accelerance at a lone resonance, 1/kg
+    assert np.corrcoef(np.log(one.level[at]), np.log(peaks))[0, 1] > 0.95
+
+
+def test_taps_without_a_force_give_the_same_frequencies(heard, picked):
+    deaf = pick_modes(replace(heard.spectra, force=None), LOWEST, HIGHEST)
+    with_force = {round(mode.frequency, 1) for mode in picked.likely}
+    without = {round(mode.frequency, 1) for mode in deaf.likely}
+
+    assert len(with_force & without) >= len(with_force) - 1
+
+
+def test_a_frequency_response_is_picked_as_it_is():
+    """A modal sum with noise: no time signal was ever there."""
+    rng = np.random.default_rng(4)
+    hertz = np.arange(0.0, 520.0, 0.5)
+    omega, own = 2.0 * np.pi * hertz[:, None], 2.0 * np.pi * board().hertz
+    bands = -(omega**2) * board().residues(HAMMERS[0], SENSOR)
+    values = np.sum(bands / (own**2 - omega**2 + 2j * board().damping * own * omega), axis=1)
+    values = values + 1e-3 * np.abs(values).max() * (
+        rng.standard_normal(hertz.size) + 1j * rng.standard_normal(hertz.size)
+    )
+    found = pick_modes(response_spectra([FrequencyResponse("frf", hertz, values)], HIGHEST), LOWEST, HIGHEST)
+
+    truth = board().damped
+    for mode in found.likely:
+        assert np.abs(truth / mode.frequency - 1.0).min() < 2e-3
+    assert len(found.likely) >= 5
+
+
+@pytest.mark.parametrize("by", ["parameters", "itself"])
+def test_a_sweep_gives_the_frequencies_of_the_board(by):
+    """The response to a sweep, by convolution with the modal impulse response; harmonics of the loudspeaker added."""
+    rate, sweep = 2000.0, Sweep(20.0, 800.0, 3.0)
+    times = np.arange(round(2.0 * rate)) / rate
+    omega = 2.0 * np.pi * board().damped
+    decay = 2.0 * np.pi * board().hertz * board().damping
+    waves = np.exp(-decay[:, None] * times) * np.sin(omega[:, None] * times) * omega[:, None]
+    impulse = board().residues(HAMMERS[0], SENSOR) @ waves / rate
+    played = sweep.signal(rate)
+    response = fftconvolve(played + 0.05 * played**2, impulse)
+    response = response + 1e-3 * np.abs(response).max() * np.random.default_rng(3).standard_normal(response.size)
+    known = read_sweep("20,800,3") if by == "parameters" else played
+
+    one = impulse_response(Recording("sweep", rate, response), known)
+    found = pick_modes(take_impulses([one], 300.0).spectra, LOWEST, 300.0).likely
+
+    truth = board().damped
+    assert len(found) >= 6
+    for mode in found:
+        assert np.abs(truth / mode.frequency - 1.0).min() < max(1e-3, 4.0 * mode.sd / mode.frequency)

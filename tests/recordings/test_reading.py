@@ -1,0 +1,221 @@
+"""Files of recordings: what each kind holds, and every fault of every file at once."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+import pytest
+from made_recordings import write_wav
+from scipy.io import wavfile
+
+from bayesplate.errors import InputError
+from bayesplate.recordings.checks import clipped_samples
+from bayesplate.recordings.reading import LARGEST_FILE, read_recordings
+from bayesplate.recordings.signals import FrequencyResponse, Recording
+
+RATE = 8000
+TIMES = np.arange(RATE) / RATE
+RING = np.exp(-3.0 * TIMES) * np.sin(2.0 * np.pi * 210.0 * TIMES)
+
+
+def only(path, **options) -> Recording | FrequencyResponse:
+    """What a file with one recording holds."""
+    ((one,),) = read_recordings([path], **options)
+    return one
+
+
+@pytest.mark.parametrize(
+    ("kind", "step"),
+    [(np.uint8, 2.0**-7), (np.int16, 2.0**-15), (np.int32, 2.0**-31), (np.float32, 2.0**-24), (np.float64, 0.0)],
+)
+def test_every_kind_of_sample_gives_the_same_numbers(tmp_path, kind, step):
+    values = 0.5 * RING
+    if np.issubdtype(kind, np.floating):
+        stored = values.astype(kind)
+    elif kind is np.uint8:
+        stored = np.round(values * 128.0 + 128.0).astype(kind)
+    else:
+        stored = np.round(values * (np.iinfo(kind).max + 1.0)).astype(kind)
+    wavfile.write(tmp_path / "a.wav", RATE, stored)
+
+    one = only(tmp_path / "a.wav")
+
+    assert one.rate == RATE
+    np.testing.assert_allclose(one.response, values, atol=0.51 * step + 1e-15)
+
+
+def test_a_file_of_24_bits_is_read(tmp_path):
+    """By hand: RIFF, 24 bits, three bytes a sample, the lowest first."""
+    samples = np.round(0.5 * RING * 2.0**23).astype("<i4")
+    data = samples.view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
+    header = b"RIFF" + (36 + len(data)).to_bytes(4, "little") + b"WAVEfmt " + (16).to_bytes(4, "little")
+    header += (1).to_bytes(2, "little") + (1).to_bytes(2, "little") + RATE.to_bytes(4, "little")
+    header += (3 * RATE).to_bytes(4, "little") + (3).to_bytes(2, "little") + (24).to_bytes(2, "little")
+    (tmp_path / "a.wav").write_bytes(header + b"data" + len(data).to_bytes(4, "little") + data)
+
+    np.testing.assert_allclose(only(tmp_path / "a.wav").response, 0.5 * RING, atol=2.0**-23)
+
+
+def test_two_channels_are_force_and_response_or_what_is_said(tmp_path):
+    path = write_wav(tmp_path / "a.wav", RATE, RING, np.cos(TIMES))
+
+    one, other = only(path), only(path, channels="response,force")
+    ((first, second),) = read_recordings([path], channels="response,response")
+
+    np.testing.assert_array_equal(one.force, other.response)
+    np.testing.assert_array_equal(one.response, second.response)
+    assert first.force is None
+
+
+def test_a_table_names_its_columns_and_may_hold_the_time(tmp_path):
+    rows = np.stack([TIMES, RING, np.cos(TIMES)], axis=1)
+    np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="time,Force,acceleration", comments="")
+    np.savetxt(tmp_path / "b.csv", rows[:, 1:], "%.9g", ",", header="force,velocity", comments="# a rig\n")
+
+    one, other = only(tmp_path / "a.csv"), only(tmp_path / "b.csv", rate=4000.0)
+
+    assert one.rate == pytest.approx(RATE, rel=1e-6)
+    np.testing.assert_allclose(one.force, RING, atol=1e-9)
+    assert (one.motion, other.motion, other.rate) == ("acceleration", "velocity", 4000.0)
+
+
+def test_a_frequency_response_is_read_with_its_coherence(tmp_path):
+    hertz = np.arange(200) * 0.5
+    rows = np.stack([hertz, hertz**2, -hertz, np.full(200, 0.9)], axis=1)
+    np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="# own estimate\nf_hz,re,im,coherence", comments="")
+
+    one = only(tmp_path / "a.csv")
+
+    assert isinstance(one, FrequencyResponse)
+    np.testing.assert_allclose(one.values, hertz**2 - 1j * hertz)
+    np.testing.assert_allclose(one.coherence, 0.9)
+
+
+def spoilt(name: str) -> np.ndarray:
+    """A signal with one thing wrong."""
+    signal = 0.5 * RING.copy()
+    if name == "not finite":
+        signal[100] = np.nan
+    elif name == "silent":
+        signal[:] = 0.0
+    elif name == "short":
+        signal = signal[:800]
+    elif name == "clipped":
+        signal = np.clip(signal, -0.3, 0.3)
+    return signal
+
+
+FAULTS = {
+    "not finite": "not finite.wav: wanted finite numbers, got sample 101 is none",
+    "silent": "silent.wav: wanted a sound, got silence (is the right channel connected?)",
+    "short": "short.wav: wanted 0.25 s or more, got 0.1 s (let the board ring out)",
+    "clipped": "clipped.wav: wanted a signal that is not clipped, got",
+}
+
+
+def test_every_fault_of_every_file_is_told_at_once(tmp_path):
+    for name in FAULTS:
+        wavfile.write(tmp_path / f"{name}.wav", RATE, spoilt(name))
+    (tmp_path / "empty.wav").write_bytes(b"")
+    (tmp_path / "noise.wav").write_bytes(b"RIFFnonsense")
+    (tmp_path / "text.doc").write_text("hit")
+    write_wav(tmp_path / "three.wav", RATE, RING, RING, RING)
+    (tmp_path / "unnamed.csv").write_text("1,2\n3,4\n")
+    (tmp_path / "comma.csv").write_text("force;acceleration\n0,5;0,7\n")
+    (tmp_path / "typo.csv").write_text("force,accelleration\n1,2\n")
+    (tmp_path / "rate.csv").write_text("acceleration\n" + "0.1\n0.2\n" * 9000)
+    (tmp_path / "words.csv").write_text("acceleration\nloud\n")
+    said = [
+        *FAULTS.values(),
+        "empty.wav: wanted a recording, got an empty file",
+        "noise.wav: wanted a WAV file, got",
+        'text.doc: wanted a recording: .wav, .csv, .flac, .uff, .unv, got ".doc"',
+        "three.wav channels: wanted one channel, or two: force and response, got 3",
+        "unnamed.csv line 1: wanted named columns",
+        "comma.csv line 1: wanted commas between columns, got semicolons or tabs",
+        "typo.csv line 1: wanted columns among time, time_s, t, force, response, sound, acceleration",
+        "rate.csv rate: wanted a column time, or --rate, got neither (--rate 48000)",
+        "words.csv: wanted 1 numbers on each line, got",
+        "gone.wav: wanted a recording, got no such file",
+    ]
+    names = [f"{name}.wav" for name in FAULTS] + [line.partition(":")[0].split()[0] for line in said[len(FAULTS) :]]
+
+    with pytest.raises(InputError) as caught:
+        read_recordings([tmp_path / name for name in names])
+
+    message = str(caught.value)
+    assert [line for line in said if line not in message] == []
+    assert len(caught.value.faults) == len(said)
+
+
+def test_a_sound_file_of_another_rate_than_said_is_refused(tmp_path):
+    path = write_wav(tmp_path / "a.wav", RATE, RING)
+
+    with pytest.raises(InputError, match=r"a\.wav rate: wanted 44100 Hz, as --rate says, got 8000 Hz"):
+        read_recordings([path], rate=44100.0)
+
+
+def test_two_gigabytes_are_refused_without_being_read(tmp_path):
+    """A file with a hole: it takes no room on the disk, and would take it all in memory."""
+    path = tmp_path / "long.wav"
+    write_wav(path, RATE, RING)
+    with path.open("r+b") as file:
+        file.truncate(2_000_000_000)
+    started = time.perf_counter()
+
+    with pytest.raises(InputError, match=r"long\.wav: wanted at most 400 MB, got 2,000 MB"):
+        read_recordings([path])
+
+    assert LARGEST_FILE < 2_000_000_000
+    assert time.perf_counter() - started < 0.5
+
+
+def test_a_wave_that_just_reaches_its_top_is_not_clipped():
+    """The negative control: one sample at the top, or a plateau that is none."""
+    assert clipped_samples(np.round(100.0 * RING) / 100.0, np.inf) == 0
+    assert clipped_samples(np.array([0.0, 1.0, 0.0, -1.0] * 50), 1.0) == 0
+    assert clipped_samples(np.clip(RING, -0.6, 0.6), np.inf) > 20
+
+
+@pytest.mark.parametrize(("ending", "library"), [(".flac", "soundfile"), (".uff", "pyuff")])
+def test_the_extra_is_named_where_it_is_missing(tmp_path, monkeypatch, ending, library):
+    monkeypatch.setitem(sys.modules, library, None)
+    path = tmp_path / f"a{ending}"
+    path.write_bytes(b"fLaC")
+
+    with pytest.raises(InputError, match=rf'wanted {library} installed.*pip install "bayesplate\[recordings\]"'):
+        read_recordings([path])
+
+
+def test_flac_is_read(tmp_path):
+    soundfile = pytest.importorskip("soundfile", reason="the extra bayesplate[recordings] is not installed")
+    soundfile.write(tmp_path / "a.flac", 0.5 * RING, RATE, subtype="PCM_24")
+
+    one = only(tmp_path / "a.flac")
+
+    np.testing.assert_allclose(one.response, 0.5 * RING, atol=2.0**-22)
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+def test_uff_is_read_in_time_and_frequency(tmp_path):
+    """Binary data sets, 58b; the library leaves the files open that it writes."""
+    pyuff = pytest.importorskip("pyuff", reason="the extra bayesplate[recordings] is not installed")
+    hertz = np.arange(200) * 0.5
+    common = {"rsp_node": 1, "rsp_dir": 3, "ref_node": 1, "ref_dir": 3, "binary": 1, "return_full_dict": True}
+    common |= {"abscissa_spacing": 1, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13}
+    sets = {
+        "time": pyuff.prepare_58(**common, func_type=1, data=RING, x=TIMES, abscissa_spec_data_type=17),
+        "frequency": pyuff.prepare_58(**common, func_type=4, data=hertz + 1j, x=hertz, abscissa_spec_data_type=18),
+    }
+    for name, content in sets.items():
+        texts = {key for key in content if key.startswith("id") or key.endswith(("_name", "_lab"))}
+        whole = {key: ("" if key in texts else 0) if value is None else value for key, value in content.items()}
+        pyuff.UFF(str(tmp_path / f"{name}.uff")).write_sets(whole, "add")
+
+    heard, response = only(tmp_path / "time.uff"), only(tmp_path / "frequency.uff")
+
+    np.testing.assert_allclose(heard.response, RING, atol=1e-6)
+    assert heard.rate == pytest.approx(RATE, rel=1e-5)
+    np.testing.assert_allclose(response.values, hertz + 1j, atol=1e-6)

@@ -1,0 +1,83 @@
+"""Sand: pictures of the generator's shapes are told apart by the package's, and what is no picture is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import ritz
+from generator.sand import photograph
+from PIL import Image
+
+from bayesplate.errors import InputError
+from bayesplate.frequencies.spectrum import spectrum
+from bayesplate.frequencies.system import system_of
+from bayesplate.recordings.sand import agreement, read_picture, sand_evidence
+from bayesplate.workflow.prepare import prepare
+
+GRID = np.linspace(0.0, 1.0, 61)
+MODES = {"finnish-spruce-cantilever": (ritz.FINNISH, (1, 5)), "fiemme-spruce-clamped": (ritz.FIEMME, (2, 5))}
+"""Board and some of its modes, none of a veering pair."""
+
+
+def shapes_of(name: str, plate: ritz.Plate, n_modes: int = 10) -> np.ndarray:
+    """The package's shapes at the constants of the generator's plate."""
+    board = prepare(name).board
+    values = {**board.nominal(), "D_x": plate.D_x, "D_y": plate.D_y, "D_s": plate.D_s}
+    modes, _ = spectrum(system_of(board, board.setups[0]), values, n_modes)
+    return modes.displacement(GRID, GRID)
+
+
+@pytest.mark.parametrize("name", MODES)
+def test_the_mode_is_told_from_all_others_and_a_picture_of_nothing_from_none(name):
+    """Ten modes without a word on the frequency; a picture of noise alone is the negative control."""
+    plate, shown = MODES[name]
+    solved = ritz.solve(ritz.Ritz(plate))
+    shapes = shapes_of(name, plate)
+    rng = np.random.default_rng(3)
+    for mode in shown:
+        picture = photograph(rng, solved.shape(mode), (plate.L_x, plate.L_y))
+        evidence = sand_evidence(picture, shapes)
+        assert int(np.argmax(evidence)) == mode
+        assert np.exp(evidence[mode]) / np.exp(evidence).sum() > 0.5
+    nothing = sand_evidence(np.clip(0.5 + 0.2 * rng.standard_normal((120, 240)), 0.0, 1.0), shapes)
+    assert np.exp(nothing).max() / np.exp(nothing).sum() < 0.5
+
+
+def test_lines_may_be_darker_than_the_board():
+    plate, _ = MODES["fiemme-spruce-clamped"]
+    shapes = shapes_of("fiemme-spruce-clamped", plate, 4)
+    picture = photograph(np.random.default_rng(1), ritz.solve(ritz.Ritz(plate)).shape(3), (plate.L_x, plate.L_y))
+
+    np.testing.assert_allclose(agreement(picture, shapes), agreement(1.0 - picture, shapes), atol=1e-9)
+
+
+def test_a_picture_is_read_as_it_is_seen(tmp_path):
+    """Rows run downward: the light upper half comes first."""
+    values = np.full((60, 120), 40, dtype=np.uint8)
+    values[:30] = 200
+    Image.fromarray(values).convert("RGB").save(tmp_path / "a.png")
+
+    np.testing.assert_allclose(read_picture(tmp_path / "a.png"), values / 255.0, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.png", b"not a picture", r"a\.png: wanted a PNG or JPEG picture"),
+        ("a.svg", b"<svg/>", r'a\.svg: wanted a PNG or JPEG picture, got "\.svg" \(crop it to the board'),
+        ("a.jpg", None, r"a\.jpg: wanted a picture, got no such file"),
+    ],
+)
+def test_what_is_no_picture_is_refused(tmp_path, name, content, said):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+
+    with pytest.raises(InputError, match=said):
+        read_picture(tmp_path / name)
+
+
+def test_a_blank_picture_is_refused(tmp_path):
+    Image.fromarray(np.full((60, 60), 99, dtype=np.uint8)).save(tmp_path / "blank.png")
+
+    with pytest.raises(InputError, match=r"blank\.png: wanted a picture with lines on it"):
+        read_picture(tmp_path / "blank.png")
