@@ -4,13 +4,14 @@
     diagnose(card)   the fit, what its residual points to, and the error before and after
     compare(card)    every method side by side
     check(card)      what a card can identify, without sampling
+    plan(card)       what to measure next, by what it is expected to give
     modes(card)      the lowest modes and their Chladni figures
     cite(card)       references of exactly what a fit uses
     new(path)        a first card, to be completed
 
 `card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
-densities and the frequencies that other samplers ask for; `fit`, `check` and `diagnose` take a `Campaign` or its card
-too. Nothing is written unless `out=` names a folder.
+densities and the frequencies that other samplers ask for; `fit`, `check`, `diagnose` and `plan` take a `Campaign` or
+its card too. Nothing is written unless `out=` names a folder.
 
 Glossary of symbols
 -------------------
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
         NotIdentifiableError,
     )
     from bayesplate.labels import Label
+    from bayesplate.planning.plan import Plan
     from bayesplate.plate.board import Board
     from bayesplate.plate.measured import Peak, Reading
     from bayesplate.plate.setup import AttachedItem, DeclaredAir, Setup
@@ -68,6 +70,7 @@ if TYPE_CHECKING:
     from bayesplate.workflow.fit import FitResult, fit
     from bayesplate.workflow.modes import ModesResult, modes
     from bayesplate.workflow.new import new
+    from bayesplate.workflow.plan import PlanResult, plan
     from bayesplate.workflow.problem import Problem
 
 __all__ = [
@@ -98,6 +101,8 @@ __all__ = [
     "NotConvergedError",
     "NotIdentifiableError",
     "Peak",
+    "Plan",
+    "PlanResult",
     "PriorCard",
     "Problem",
     "Quantity",
@@ -111,6 +116,7 @@ __all__ = [
     "fit",
     "modes",
     "new",
+    "plan",
 ]
 
 _HOMES = {
@@ -141,6 +147,8 @@ _HOMES = {
     "NotConvergedError": "bayesplate.errors",
     "NotIdentifiableError": "bayesplate.errors",
     "Peak": "bayesplate.plate.measured",
+    "Plan": "bayesplate.planning.plan",
+    "PlanResult": "bayesplate.workflow.plan",
     "PriorCard": "bayesplate.cards.prior",
     "Problem": "bayesplate.workflow.problem",
     "Quantity": "bayesplate.quantities",
@@ -153,6 +161,7 @@ _HOMES = {
     "diagnose": "bayesplate.workflow.diagnose",
     "fit": "bayesplate.workflow.fit",
     "new": "bayesplate.workflow.new",
+    "plan": "bayesplate.workflow.plan",
 }
 """Where each name is defined. `modes` is the folder of that name, which can be called: see `bayesplate.modes`."""
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from numbers import Integral
+from numbers import Integral, Real
 from typing import get_args
 
 import numpy as np
@@ -15,6 +16,7 @@ from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
+from bayesplate.planning.proposals import GOALS, Costs
 from bayesplate.plate.board import Board
 from bayesplate.workflow.prepare import Prepared
 
@@ -27,7 +29,8 @@ def require_arguments(**given: object) -> None:
     Parameters
     ----------
     **given
-        Any of card, prior, out, seed, effects, law, robust, coefficients, report, force, resume, n_null, progress.
+        Any of card, prior, out, seed, effects, law, robust, coefficients, report, force, resume, n_null, progress,
+        goal, costs, between.
 
     Raises
     ------
@@ -97,6 +100,20 @@ def _callable(name: str, value: object) -> Iterator[Fault]:
         yield Fault(name, "a function or None", _shown(value))
 
 
+def _costs(name: str, value: object) -> Iterator[Fault]:
+    if value is None:
+        return
+    if not isinstance(value, Mapping):
+        yield Fault(name, f"minutes by class: {', '.join(Costs.names())}", _shown(value))
+        return
+    for key, minutes in value.items():
+        if key not in Costs.names():
+            near = did_you_mean(key, Costs.names()) if isinstance(key, str) else ""
+            yield Fault(f"{name} {key}", f"one of {', '.join(Costs.names())}", _shown(key), near)
+        elif isinstance(minutes, bool) or not isinstance(minutes, Real) or not 0.0 < float(minutes) < math.inf:
+            yield Fault(f"{name} {key}", "a positive number of minutes", _shown(minutes))
+
+
 def _effects(name: str, value: object) -> Iterator[Fault]:
     if value is None:
         return
@@ -127,4 +144,7 @@ _CHECKS: dict[str, Check] = {
     "coefficients": _word(get_args(CoefficientSource)),
     **dict.fromkeys(("robust", "report", "force", "resume"), _switch),
     "progress": _callable,
+    "goal": _word(GOALS),
+    "costs": _costs,
+    "between": _effects,
 }
