@@ -230,17 +230,37 @@ def _simulated(
     weights = beliefs.probabilities
     counts = [max(round(n_draws * p), _FEWEST_DRAWS) for p in weights]
     read = np.concatenate([one.drawn(rng, n) for one, n in zip(updates, counts, strict=True)])
-    logs, means = [], []
-    for p, one in zip(weights, updates, strict=True):
-        misses = one.misses(read)
-        log_weight = float(np.log(p / len(one.expected)))
-        logs.append(log_weight - 0.5 * (misses**2).sum(axis=2) - one.log_size[:, None])
-        means.append(one.moduli[:, None, :] + misses @ np.swapaxes(one.pull, 1, 2))
+    logs = _log_joint(beliefs, updates, read)
+    means = [one.moduli[:, None, :] + one.misses(read) @ np.swapaxes(one.pull, 1, 2) for one in updates]
     shares, constants = normalised(np.concatenate(logs)), np.concatenate(means)
     middle = np.einsum("tn,tnm->nm", shares, constants)
     between = np.einsum("tn,tnm->nm", shares, constants**2) - middle**2
-    log_each = np.stack([log_sum(log) for log in logs])
-    log_each = log_each - log_sum(log_each)
-    left = -np.sum(np.exp(log_each) * log_each, axis=0)
     strata = np.split(np.arange(len(read)), np.cumsum(counts)[:-1])
-    return _Mean.of_strata(left[:, None], strata, weights), _Mean.of_strata(between, strata, weights)
+    left = entropy(_of_each(logs))[:, None]
+    return _Mean.of_strata(left, strata, weights), _Mean.of_strata(between, strata, weights)
+
+
+def _log_joint(beliefs: Beliefs, updates: Sequence[_Update], read: Floats) -> list[Floats]:
+    """ln of weight times density of readings in each term: one (n_terms, n_draws) array per explanation."""
+    return [
+        float(np.log(p / len(one.expected))) - 0.5 * (one.misses(read) ** 2).sum(axis=2) - one.log_size[:, None]
+        for p, one in zip(beliefs.probabilities, updates, strict=True)
+    ]
+
+
+def _of_each(logs: Sequence[Floats]) -> Floats:
+    """Probability of each explanation: (n_explanations, n_draws) array."""
+    return normalised(np.stack([log_sum(log) for log in logs]))
+
+
+def entropy(probabilities: Floats) -> Floats:
+    """Of explanations, nats: (n_draws,) array from (n_explanations, n_draws)."""
+    from scipy.special import entr
+
+    return np.asarray(entr(probabilities).sum(axis=0))
+
+
+def probabilities_after(beliefs: Beliefs, readings: Readings, read: Floats) -> Floats:
+    """Probability of each explanation after some readings: (n_explanations, n_draws) array from (n_draws, n)."""
+    updates = [_Update.of(one, readings, k) for k, one in enumerate(beliefs.explanations)]
+    return _of_each(_log_joint(beliefs, updates, read))

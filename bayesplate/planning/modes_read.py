@@ -53,12 +53,15 @@ class StationReadings:
         The modes that were read, in another session; None where there are none.
     with_mass : tuple of Readings
         The same with a known mass at each spot, in the session that goes on.
+    spots : tuple of int
+        Which of the station's spots these are.
     """
 
     further: Readings
     rows: tuple[int, ...]
     again: Readings | None
     with_mass: tuple[Readings, ...]
+    spots: tuple[int, ...]
 
 
 def station_readings(
@@ -104,6 +107,7 @@ def station_readings(
         tuple(rows),
         readings(old, new) if n_old and is_followed[old].all() else None,
         tuple(_plus(readings(old, kept), readings(old, kept, spot)) for spot in whole),
+        tuple(spot - 1 for spot in whole),
     )
 
 

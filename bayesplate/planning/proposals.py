@@ -72,6 +72,10 @@ class Proposal:
         Of the modes that are read.
     rows : tuple of int
         Which of the modes of its station.
+    spot : int
+        Of its station, where a known mass stands.
+    further : Readings or None
+        All modes of the session that could have been chosen, and `every_row` which they are.
     """
 
     what: str
@@ -82,6 +86,9 @@ class Proposal:
     gain: Gain
     law: BareLaw | None = None
     rows: tuple[int, ...] = ()
+    spot: int = 0
+    further: Readings | None = None
+    every_row: tuple[int, ...] = ()
 
     def excludes(self, other: Proposal) -> bool:
         """Whether another proposal reads the same modes in the same session, or is the same thing done otherwise."""
@@ -192,7 +199,7 @@ def _of_station(
     listed = [
         Proposal(
             what, station.setup.name, sentence, cost + len(rows) * costs.reading, readings,
-            expected_gain(beliefs, readings, rng), law, rows,
+            expected_gain(beliefs, readings, rng), law, rows, further=every.further, every_row=every.rows,
         )
         for what, sentence, cost, readings, rows in made
     ]  # fmt: skip
@@ -200,9 +207,11 @@ def _of_station(
     if gains:
         best = max(range(len(gains)), key=lambda i: score(gains[i], goal))
         cost = costs.reading * (1 + len(old))
-        sentence = told.with_mass(old, best)
+        sentence = told.with_mass(old, every.spots[best])
         readings = every.with_mass[best]
-        listed.append(Proposal("mass", station.setup.name, sentence, cost, readings, gains[best], law, old))
+        listed.append(
+            Proposal("mass", station.setup.name, sentence, cost, readings, gains[best], law, old, every.spots[best])
+        )
     return listed
 
 

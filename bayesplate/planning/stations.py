@@ -118,7 +118,9 @@ def _carrying(board: Board, setup: Setup) -> Board:
     return replace(board, setups=(*board.setups, setup), chosen=(*board.chosen, *new.values()))
 
 
-def stations(board: Board, values: Values, prior: PriorCard | None = None) -> tuple[Station, ...]:
+def stations(
+    board: Board, values: Values, prior: PriorCard | None = None, *, is_elsewhere: bool = True
+) -> tuple[Station, ...]:
     """Every way to hold the board that is looked at: as it was held, free, and as a cantilever.
 
     Parameters
@@ -128,6 +130,8 @@ def stations(board: Board, values: Values, prior: PriorCard | None = None) -> tu
         Where the modes are computed.
     prior : PriorCard, optional
         Its noise, where it states one, is that of an edge that was not tried yet.
+    is_elsewhere : bool
+        Whether ways in which the board was not held are looked at.
     """
     found: list[Station] = []
     for setup in board.setups:
@@ -136,7 +140,7 @@ def stations(board: Board, values: Values, prior: PriorCard | None = None) -> tu
         more = _next_modes(board, Station(empty, setup), values, FURTHER, {one.label for one in read})
         found.append(Station(replace(empty, readings=(*read, *more)), setup, len(read)))
     ways: tuple[tuple[str, Ends], ...] = (("free", ("free", "free")), ("cantilever", ("clamped", "free")))
-    for name, ends_x in ways:
+    for name, ends_x in ways if is_elsewhere else ():
         other = _elsewhere(board, name, ends_x, prior)
         if other is not None:
             more = _next_modes(board, Station(other, board.setups[0]), values, ELSEWHERE, set())

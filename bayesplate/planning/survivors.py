@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from bayesplate.diagnosis.decision.verdict import WITHIN, Answer, answers
 from bayesplate.diagnosis.evidence.search import Found
@@ -11,15 +11,23 @@ MOST = 4
 """Explanations besides that of no effect; each takes a dozen plates to solve."""
 
 
-def survivors(found: Found) -> tuple[Answer, ...]:
+def survivors(found: Found, rivals: Collection[tuple[str, ...]] = ()) -> tuple[Answer, ...]:
     """No effect, and the answers of a search within a factor ten of the best of them, the most probable first.
 
     No effect is left out where it is ten times less probable than the best answer.
+
+    Parameters
+    ----------
+    found : Found
+    rivals : collection of tuple of str
+        Answers that survive in any case: alternatives that a verdict lists because another assumption favours them.
     """
-    return surviving(found, {one.members: one.support for one in answers(found)}, found.none)
+    return surviving(found, {one.members: one.support for one in answers(found)}, found.none, rivals)
 
 
-def surviving(found: Found, support: Mapping[tuple[str, ...], float], none: float) -> tuple[Answer, ...]:
+def surviving(
+    found: Found, support: Mapping[tuple[str, ...], float], none: float, rivals: Collection[tuple[str, ...]] = ()
+) -> tuple[Answer, ...]:
     """The same by probabilities that are known from a finished diagnosis.
 
     Parameters
@@ -30,9 +38,11 @@ def surviving(found: Found, support: Mapping[tuple[str, ...], float], none: floa
         By the effects of an answer.
     none : float
         Probability of no effect.
+    rivals : collection of tuple of str
+        See `survivors`.
     """
     ranked = [one for one in answers_of(found, support) if one.support > 0.0]
-    near = [one for one in ranked if one.support * WITHIN >= ranked[0].support][:MOST]
+    near = [one for one in ranked if one.support * WITHIN >= ranked[0].support or one.members in rivals][:MOST]
     kept = list(near)
     if not near or none * WITHIN >= near[0].support:
         kept.append(Answer((), 0, none))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Sequence
 
 from bayesplate.effects.words import joined
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Gain
+from bayesplate.planning.plan import ProposalEntry
 from bayesplate.plate.material import MODULI
 
 WORTH = 0.05
@@ -52,10 +54,14 @@ def _of_constants(gain: Gain) -> str:
     return f"the {verb} of {joined(list(told))} would shrink to {sizes} of what {now}"
 
 
-def shared_line(sentence: str, shared: Mapping[str, float]) -> str:
-    """What a reading does to what the boards of a campaign share."""
-    told = {name: value for name, value in shared.items() if value < 1.0 - WORTH}
-    if not told:
+def campaign_line(proposals: Sequence[ProposalEntry]) -> str:
+    """The first line of a campaign's plan; empty where nothing would help."""
+    if not proposals or proposals[0].gain.score < WORTH:
         return ""
-    sizes = joined([f"{name} to {value:.2f}" for name, value in told.items()])
-    return f"{sentence}: what the boards share would be known better, the interval of {sizes} of what it is."
+    best = proposals[0].gain
+    told = best.shared or {name: getattr(best, name) for name in MODULI}
+    shrunk = {name: value for name, value in told.items() if -math.log(value) >= WORTH}
+    if not shrunk:
+        return f"{proposals[0].sentence}."
+    sizes = joined([f"{name.replace('_', ' ')} to {value:.2g}" for name, value in shrunk.items()])
+    return f"{proposals[0].sentence}: the interval of {sizes} of what it is."

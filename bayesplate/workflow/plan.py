@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bayesplate.cards import is_campaign
-from bayesplate.diagnosis.decision.verdict import Answer
+from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
 from bayesplate.diagnosis.evidence.peaks import with_own_labels
 from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
@@ -193,6 +193,7 @@ class _Finished:
 
     support: Mapping[tuple[str, ...], float]
     none: float
+    rivals: frozenset[tuple[str, ...]]
 
 
 def _finished(folder: Path, prepared: Prepared) -> _Finished | None:
@@ -207,15 +208,17 @@ def _finished(folder: Path, prepared: Prepared) -> _Finished | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     highest = max(support.values(), default=0.0)
-    near = {members: share for members, share in support.items() if members and 10.0 * share >= highest > 0.0}
-    return _Finished(near, none) if near else None
+    listed = told["effects"] if told["verdict"] == "indistinguishable group" else ()
+    rivals = frozenset(members for members in support if members and set(members) <= set(listed))
+    near = {one: p for one, p in support.items() if one and p > 0.0 and (WITHIN * p >= highest or one in rivals)}
+    return _Finished(near, none, rivals) if near else None
 
 
 def _among(found: Found, between: Sequence[str] | None, finished: _Finished | None) -> tuple[Answer, ...] | None:
     """The explanations to tell apart, if not those that survive the search at hand."""
     if between:
         return asked(found, between)
-    return None if finished is None else surviving(found, finished.support, finished.none)
+    return None if finished is None else surviving(found, finished.support, finished.none, finished.rivals)
 
 
 def _plan_of(
