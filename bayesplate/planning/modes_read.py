@@ -101,7 +101,7 @@ def station_readings(
     rows = [i for i in range(n_old, n) if is_followed[i]]
     old = list(range(n_old))
     spots = range(1, 1 + len(station.spots)) if n_old else ()
-    whole = [spot for spot in spots if is_followed[[spot * n + i for i in old]].all()]
+    whole = [spot for spot in spots if is_followed[[*old, *(spot * n + i for i in old)]].all()]
     return StationReadings(
         readings(rows, kept or new),
         tuple(rows),
@@ -152,7 +152,24 @@ def _of_explanation(one: Explanation, law: BareLaw, found: Found | None, effects
         beside, along = effects[name].beside(own_table, cells)
         shift += beside
         slopes[:, :, first + columns.start : first + columns.stop] += along[:, :n, : columns.stop - columns.start]
+    _put_known(one, law, found, shift, slopes)
     return shift, slopes
+
+
+def _put_known(one: Explanation, law: BareLaw, found: Found, shift: Floats, slopes: Floats) -> None:
+    """Put what the search's own table says of the modes that were read in place of what was solved here.
+
+    Where labels are open a reading need not be the same mode under all explanations: there it stays.
+    """
+    baseline, station = found.ground.baseline, law.station
+    if not station.n_old or baseline.every.is_open:
+        return
+    setup = [each.name for each in baseline.board.setups].index(station.base.name)
+    rows = np.flatnonzero(baseline.setup_index == setup)
+    table = found.ground.hypotheses[one.hypothesis].table
+    first = one.mean.shape[1] - table.slopes.shape[2]
+    shift[:, : rows.size] = law.middle[: rows.size] + table.shift[one.cells][:, rows]
+    slopes[:, : rows.size, first:] = table.slopes[one.cells][:, rows]
 
 
 def bands(beliefs: Beliefs, readings: Readings, rng: np.random.Generator, within: tuple[float, ...]) -> Floats:

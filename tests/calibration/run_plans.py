@@ -1,8 +1,8 @@
 """Calibrate plans: `python tests/calibration/run_plans.py --boards 200 --workers 2 --out results/plans.jsonl`.
 
-Prints how often a plan's first proposal settles which of two explanations is true, beside a random proposal and the next
-modes up, and whether expected gains are realised. Exit code 0: every bar met; 1: some are missed, and stay there as
-missed; 2: usage. A run that was interrupted goes on where it stopped if it is given the same file.
+Prints how often the first proposal of a plan settles which of two explanations is true, beside a random proposal and
+the next modes up, and whether expected gains are realised. Exit code 0: every bar met; 1: some are missed, and stay
+there as missed; 2: usage. A run that was interrupted goes on where it stopped if it is given the same file.
 """
 
 from __future__ import annotations
