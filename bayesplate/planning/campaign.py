@@ -13,7 +13,7 @@ from bayesplate.cards import PriorCard
 from bayesplate.planning.inputs_read import measurements
 from bayesplate.planning.joint import BoardInJoint, Joint, board_in_joint
 from bayesplate.planning.plan import GainEntry, ProposalEntry, SequenceEntry
-from bayesplate.planning.proposals import CONSTANTS, Costs
+from bayesplate.planning.proposals import CONSTANTS, FAINT, Costs
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.plate.setup import AttachedItem
@@ -28,8 +28,6 @@ _WEIGHED_TO = 1e-5
 _WITHOUT = ("thickness_profile", "outline_profile")
 _CUT = 2
 """Boards of which a shorter one is looked at."""
-_FAINT = 2e-3
-"""Nats below which a reading is not listed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +87,7 @@ def readings(
     listed += list(_of_shared(joint, shared, costs))
     listed += list(_boards(joint, priors, shared, costs))
     ranked = sorted(((worth(joint, (one,), goal), i) for i, one in enumerate(listed)), key=lambda pair: -pair[0])
-    return tuple(listed[i] for value, i in ranked if value > _FAINT)
+    return tuple(listed[i] for value, i in ranked if value > FAINT)
 
 
 def worth(joint: Joint, some: Sequence[Reading], goal: str | None) -> float:

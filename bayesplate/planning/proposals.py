@@ -24,6 +24,8 @@ EXPLANATIONS, CONSTANTS = "explanations", "constants"
 GOALS = (*MODULI, CONSTANTS, EXPLANATIONS)
 BEST = 3
 """Further modes that are proposed together."""
+FAINT = 2e-3
+"""Nats below which a proposal is not listed."""
 FIRST = (3, 6)
 """Modes that are proposed together for a board that was not measured yet."""
 
@@ -74,6 +76,8 @@ class Proposal:
         Which of the modes of its station.
     spot : int
         Of its station, where a known mass stands.
+    about : str
+        The input or the effect that is looked at; empty where frequencies are read.
     further : Readings or None
         All modes of the session that could have been chosen, and `every_row` which they are.
     """
@@ -87,14 +91,13 @@ class Proposal:
     law: BareLaw | None = None
     rows: tuple[int, ...] = ()
     spot: int = 0
+    about: str = ""
     further: Readings | None = None
     every_row: tuple[int, ...] = ()
 
     def excludes(self, other: Proposal) -> bool:
-        """Whether another proposal reads the same modes in the same session, or is the same thing done otherwise."""
-        if self.law is not None and other.law is not None:
-            return self.law is other.law
-        return self.law is None and other.law is None and self.sentence == other.sentence
+        """Whether another proposal reads modes of the same way to hold the board, or looks at the same thing."""
+        return (self.law is not None and self.law is other.law) or (self.about != "" and self.about == other.about)
 
 
 def score(gain: Gain, goal: str | None) -> float:
@@ -143,7 +146,13 @@ def proposals(
     tuple of Proposal
     """
     listed = [*_of_modes(beliefs, values, costs, goal, rng, found, prior), *_of_sizes(beliefs, costs, rng, found)]
-    return tuple(sorted(listed, key=lambda one: -score(one.gain, goal)))
+    return _ranked(listed, goal)
+
+
+def _ranked(listed: Sequence[Proposal], goal: str | None) -> tuple[Proposal, ...]:
+    """The most promising first; those that give nothing are left out."""
+    kept = [one for one in listed if score(one.gain, goal) > FAINT]
+    return tuple(sorted(kept, key=lambda one: -score(one.gain, goal)))
 
 
 def _of_modes(
@@ -178,7 +187,7 @@ def prior_proposals(
             sentence, what = told.begin(rows), "edges" if station.is_new else "modes"
             gain = expected_gain(beliefs, some, rng)
             listed.append(Proposal(what, station.setup.name, sentence, cost, some, gain, laws[0], rows))
-    return tuple(sorted(listed, key=lambda one: -score(one.gain, goal)))
+    return _ranked(listed, goal)
 
 
 def _of_station(
@@ -238,12 +247,13 @@ def _of_sizes(beliefs: Beliefs, costs: Costs, rng: np.random.Generator, found: F
     for one in measurements(beliefs.board):
         readings = input_readings(beliefs, one)
         gain = expected_gain(beliefs, readings, rng)
-        listed.append(Proposal("size", "", one.sentence, one.n * costs.reading, readings, gain))
+        about = one.parameter.name
+        listed.append(Proposal("size", "", one.sentence, one.n * costs.reading, readings, gain, about=about))
     for effect, look in LOOKS.items() if found else ():
         seen = look_readings(beliefs, found, effect) if found and effect in found.ground.candidates else None
         if seen is not None:
             gain = expected_gain(beliefs, seen, rng)
-            listed.append(Proposal("size", "", look.sentence, look.n * costs.reading, seen, gain))
+            listed.append(Proposal("size", "", look.sentence, look.n * costs.reading, seen, gain, about=effect))
     return listed
 
 

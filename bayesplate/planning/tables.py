@@ -5,7 +5,7 @@ from __future__ import annotations
 from bayesplate.planning.plan import GainEntry, Plan
 from bayesplate.plate.material import MODULI
 from bayesplate.results.tables import Table
-from bayesplate.results.words import MISSING, narrow_name
+from bayesplate.results.words import MISSING
 
 MOST = 12
 """Proposals that a table lists; plan.json has all."""
@@ -24,7 +24,7 @@ def _explanations(plan: Plan) -> Table:
 
 def _columns(plan: Plan) -> tuple[str, ...]:
     shared = plan.proposals[0].gain.shared if plan.proposals else {}
-    names = tuple(_narrow(name) for name in shared) if shared else tuple(narrow_name(name) for name in MODULI)
+    names = tuple(_narrow(name) for name in shared) if shared else MODULI
     doubt = ("doubt, nats",) if len(plan.explanations) > 1 else ()
     return (*doubt, *names, "min", "gain", "gain /min")
 
@@ -50,8 +50,12 @@ def _proposals(plan: Plan) -> Table:
 
 
 def _sequences(plan: Plan) -> Table:
-    rows = tuple(("; then ".join(one.steps), *_cells(one.gain, one.cost_minutes, plan)) for one in plan.sequences)
+    rows = tuple(("\n".join(_numbered(one.steps)), *_cells(one.gain, one.cost_minutes, plan)) for one in plan.sequences)
     return Table("The best two and the best three together", ("steps", *_columns(plan)), rows)
+
+
+def _numbered(steps: tuple[str, ...]) -> list[str]:
+    return [f"{number}. {step}" for number, step in enumerate(steps, start=1)]
 
 
 def _benches(plan: Plan) -> tuple[Table, ...]:

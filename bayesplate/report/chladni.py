@@ -26,6 +26,7 @@ _BETWEEN = 0.62
 _CAPTION = 0.42
 _GAP = 0.30
 _BAND = 0.055
+_AIR = 0.25
 _LONGEST_HEADING = 62
 _MOST_COLUMNS = 4
 _N_COMBINED = 3
@@ -104,6 +105,8 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
 
     figure = Figure(figsize=A4)
     plan = layout(len(sheet.modes), sheet.aspect_ratio, has_combined=bool(sheet.combined))
+    if marks is not None:
+        plan = _close(plan)
     heading = f"{'Chladni figures' if marks is None else marks.heading}: {drawable(sheet.title)}"
     size = min(14.0, 14.0 * _LONGEST_HEADING / len(heading))
     _text(figure, A4[0] / 2, A4[1] - 0.45, heading, fontsize=size, weight="bold")
@@ -122,6 +125,12 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
         _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
     _legend(figure, sheet, marks)
     return figure
+
+
+def _close(plan: Layout) -> Layout:
+    """The same panels with no more room below each than its caption takes."""
+    height = min(plan.cell[1], plan.panel[1] + _CAPTION + _GAP + _AIR)
+    return replace(plan, cell=(plan.cell[0], height))
 
 
 def _draw_marks(panel: Axes, marks: Marks) -> None:

@@ -166,7 +166,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, qu
 def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_path, quick, with_shear, monkeypatch):
     """What is computed besides is left out: known effects, and advice."""
     monkeypatch.setattr("bayesplate.workflow.diagnose.known_fits", lambda *_: ())
-    monkeypatch.setattr("bayesplate.workflow.diagnose.recommendation", lambda *_: "")
+    monkeypatch.setattr("bayesplate.workflow.diagnose.advice", lambda *_: "")
     folder = tmp_path / "out"
     for name, content in with_shear.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
