@@ -207,12 +207,44 @@ def solved(station: Station, board: Board, values: Values) -> Floats:
 
 
 def _added(station: Station, board: Board, modes: Modes, values: Values) -> Floats:
-    """What a known mass adds to ln f of each mode, its shape kept: (n_spots, n_modes) array (Rayleigh's quotient)."""
+    """What a known mass adds to ln f of each mode: (n_spots, n_modes) array.
+
+    Solved among the modes at hand, and the rigid motions of a free board, whose shapes it mixes.
+    """
     length_x, length_y = vibrating_lengths(values, station.setup)
     vibrating = density(values) * values["thickness"] * length_x * length_y
     share = known_mass(board) / float(np.ravel(vibrating)[0])
-    moved = [modes.displacement(np.array([s]), np.array([t]))[:, 0, 0] for s, t in station.spots]
-    return -0.5 * np.log1p(share * np.array(moved).reshape(len(moved), len(modes.eigenvalues)) ** 2)
+    added = np.empty((len(station.spots), len(modes.eigenvalues)))
+    for row, (s, t) in zip(added, station.spots, strict=True):
+        moved = modes.displacement(np.array([s]), np.array([t]))[:, 0, 0]
+        rigid = [1.0, np.sqrt(12.0) * (s - 0.5), np.sqrt(12.0) * (t - 0.5)] if station.setup.is_free else []
+        row[:] = with_point_mass(modes.eigenvalues, moved, np.array(rigid), share)
+    return added
+
+
+def with_point_mass(eigenvalues: Floats, moved: Floats, rigid: Floats, share: float) -> Floats:
+    """What a point mass adds to ln f of each mode, solved among them: (n_modes,) array.
+
+    Parameters
+    ----------
+    eigenvalues : (n_modes,) array
+        omega^2, s^-2.
+    moved : (n_modes,) array
+        Mass-normalised deflection of each at the place.
+    rigid : (n_rigid,) array
+        That of the motions without stiffness.
+    share : float
+        The mass over that of what vibrates.
+    """
+    from scipy.linalg import eigh
+    from scipy.optimize import linear_sum_assignment
+
+    at = np.concatenate([rigid, moved])
+    squared = np.concatenate([np.zeros(rigid.size), eigenvalues])
+    found, shapes = eigh(np.diag(squared), np.eye(at.size) + share * np.outer(at, at))
+    rows, columns = linear_sum_assignment(shapes**2, maximize=True)
+    same = found[columns[np.argsort(rows)]][rigid.size :]
+    return np.asarray(0.5 * np.log(same / eigenvalues))
 
 
 @dataclass(frozen=True, eq=False)
