@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs calibration spectra campaigns coverage trial benchmarks
+.PHONY: fit test slow docs calibration spectra campaigns plans coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -33,6 +33,9 @@ spectra: $(VENV)/tested-with
 
 campaigns: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_campaigns.py --campaigns 100 --workers 2 --out results/campaigns.jsonl --publish docs/validation
+
+plans: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_plans.py --boards 200 --workers 2 --out results/plans.jsonl --publish docs/validation
 
 trial: $(VENV)/tested-with
 	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl

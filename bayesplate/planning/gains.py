@@ -1,10 +1,9 @@
 """What readings are expected to give: shrinkage of the constants' intervals, and of the doubt between explanations.
 
 Within a term everything is linear and normal: what the constants gain does not depend on what will be read, and half
-the log determinant of the information gained is exact (D. V. Lindley, Ann. Math. Stat. 27, 986-1005, 1956). Between
-terms and explanations it does depend on it. There readings are drawn from what is believed now, and what would be
-believed after each of them is worked out in closed form (nested sampling; Ryan, J. Comput. Graph. Stat. 12, 585-603,
-2003); the mean has a standard error.
+the log determinant of the information gained is exact. Between terms and explanations it does depend on it. There
+readings are drawn from what is believed now, and what would be believed after each of them is worked out in closed form
+(nested sampling); the mean has a standard error.
 """
 
 from __future__ import annotations
@@ -21,6 +20,12 @@ from bayesplate.plate.material import MODULI
 
 Floats = NDArray[np.float64]
 
+REFERENCES = (
+    "D. V. Lindley: On a measure of the information provided by an experiment. Ann. Math. Stat. 27, 986-1005 (1956), "
+    "doi:10.1214/aoms/1177728069. [expected gain of information]",
+    "K. J. Ryan: Estimating expected information gains for experimental designs with application to the random "
+    "fatigue-limit model. J. Comput. Graph. Stat. 12, 585-603 (2003), doi:10.1198/1061860032012. [nested sampling of it]",
+)
 N_DRAWS = 384
 _FEWEST_DRAWS = 32
 """Of one explanation, however improbable."""

@@ -50,14 +50,18 @@ def surviving(
 
 
 def asked(found: Found, effects: Sequence[str]) -> tuple[Answer, ...]:
-    """No effect and the effects that a user asks about, each alone, with the probabilities of the search."""
-    hypotheses = found.ground.hypotheses
-    wanted = [
+    """What a user asks about: no effect, each effect alone, and likely pairs of them, by the search's probabilities.
+
+    A pair that is ten times less probable than the best of all is left out.
+    """
+    listed = [
         Answer(one.members, i, float(found.probability[i]))
-        for i, one in enumerate(hypotheses)
-        if len(one.members) == 1 and one.members[0] in effects and one.swap is None
+        for i, one in enumerate(found.ground.hypotheses)
+        if set(one.members) <= set(effects) and one.swap is None
     ]
-    return tuple(sorted([*wanted, Answer((), 0, found.none)], key=lambda one: -one.support))
+    highest = max(one.support for one in listed)
+    kept = [one for one in listed if len(one.members) < 2 or one.support * WITHIN >= highest]
+    return tuple(sorted(kept, key=lambda one: -one.support))
 
 
 def answers_of(found: Found, support: Mapping[tuple[str, ...], float]) -> tuple[Answer, ...]:
