@@ -24,7 +24,7 @@ REFERENCES = (
     "D. V. Lindley: On a measure of the information provided by an experiment. Ann. Math. Stat. 27, 986-1005 (1956), "
     "doi:10.1214/aoms/1177728069. [expected gain of information]",
     "K. J. Ryan: Estimating expected information gains for experimental designs with application to the random "
-    "fatigue-limit model. J. Comput. Graph. Stat. 12, 585-603 (2003), doi:10.1198/1061860032012. [nested sampling of it]",
+    "fatigue-limit model. J. Comput. Graph. Stat. 12, 585-603 (2003), doi:10.1198/1061860032012. [nested sampling]",
 )
 N_DRAWS = 384
 _FEWEST_DRAWS = 32

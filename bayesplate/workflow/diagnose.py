@@ -17,11 +17,10 @@ from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
 from bayesplate.diagnosis.decision.verdict import Verdict, answer_words, decide
-from bayesplate.diagnosis.evidence.joint import with_joint_pairs
+from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
-from bayesplate.diagnosis.evidence.peaks import with_own_labels
-from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
+from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
@@ -173,11 +172,7 @@ def diagnose(
 
     before = run(problem, BEFORE, "fit without further effects")
     stages.begin("search for effects", _SEARCH)
-    ground = prepare_search(baseline_of(before.inference.problem), tell=stages.reached)
-    found = search(with_own_labels(ground))
-    together = with_joint_pairs(found, ground)
-    if together is not ground:
-        ground, found = together, search(with_own_labels(together))
+    ground, found = full_search(baseline_of(before.inference.problem), tell=stages.reached)
     stages.begin("effects that are known", _KNOWN)
     solved = {name: one.laws[0] for name, one in ground.candidates.items()}
     known = known_fits(before.inference.problem, solved, stages.reached)

@@ -13,8 +13,8 @@ import numpy as np
 
 from bayesplate.cards import is_campaign
 from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
-from bayesplate.diagnosis.evidence.peaks import with_own_labels
-from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
+from bayesplate.diagnosis.evidence.joint import full_search
+from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.planning.assembled import (
@@ -181,7 +181,7 @@ def _drawn_up(
     finished = None if out is None or between else _finished(Path(out), prepared)
     tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
     stages.begin("search for effects", _SEARCH)
-    searched = search(with_own_labels(prepare_search(baseline, tried=tried, tell=stages.reached)))
+    _, searched = full_search(baseline, tried, stages.reached)
     among = _among(searched, between, finished)
     stages.begin("gains of further readings", _PLAN)
     return drawn_up(searched, prepared.prior, seed, goal=goal, costs=costs, among=among)

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from runs import files_in, read_json
 
 from bayesplate.cli import main
-from bayesplate.diagnosis.evidence.search import prepare_search
+from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.errors import InputError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
@@ -50,7 +50,7 @@ def diagnose(folder: Path, *arguments: str) -> runs.Run:
 def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
     """Two candidates, and a sampler whose first judgement passes; a page only where it is asked for."""
     patch.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
-    patch.setattr("bayesplate.workflow.diagnose.prepare_search", partial(prepare_search, tried=TRIED))
+    patch.setattr("bayesplate.workflow.diagnose.full_search", partial(full_search, tried=TRIED))
     if not page:
         patch.setattr("bayesplate.workflow.diagnose.write_page", lambda *_: None)
 

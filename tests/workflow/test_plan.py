@@ -65,7 +65,9 @@ def test_a_board_without_frequencies_is_planned_from_its_prior(planned):
     assert first["gain"]["explanations"] is None
     scores = [one["gain"]["score"] for one in found["proposals"]]
     assert scores == sorted(scores, reverse=True)
-    assert [len(one["steps"]) for one in found["sequences"]] == [2, 3]
+    steps = [one["steps"] for one in found["sequences"]]
+    assert [len(one) for one in steps] == [2, 3][: len(steps)]
+    assert steps[0][0] == first["sentence"]
     assert found["sequences"][0]["gain"]["score"] >= scores[0]
 
 
@@ -184,7 +186,7 @@ class TestFinishedDiagnosis:
             raise Seen
 
         kept = tried
-        monkeypatch.setattr(home, "prepare_search", stop)
+        monkeypatch.setattr(home, "full_search", stop)
         monkeypatch.setattr(home, "baseline_of", lambda _: None)
         monkeypatch.setattr(home.Problem, "posed", SimpleNamespace())
         with pytest.raises(Seen):
