@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bayesplate.planning.plan import GainEntry, Plan
+from bayesplate.planning.words import shared_words
 from bayesplate.plate.material import MODULI
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING
@@ -24,14 +25,9 @@ def _explanations(plan: Plan) -> Table:
 
 def _columns(plan: Plan) -> tuple[str, ...]:
     shared = plan.proposals[0].gain.shared if plan.proposals else {}
-    names = tuple(_narrow(name) for name in shared) if shared else MODULI
+    names = tuple(shared_words(name) for name in shared) if shared else MODULI
     doubt = ("doubt, nats",) if len(plan.explanations) > 1 else ()
     return (*doubt, *names, "min", "gain", "gain /min")
-
-
-def _narrow(name: str) -> str:
-    """The name of a shared parameter, broken where it may be."""
-    return name.replace("_", " ").replace(".", " ")
 
 
 def _cells(gain: GainEntry, cost: float, plan: Plan) -> tuple[str, ...]:

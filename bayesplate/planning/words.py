@@ -54,6 +54,13 @@ def _of_constants(gain: Gain) -> str:
     return f"the {verb} of {joined(list(told))} would shrink to {sizes} of what {now}"
 
 
+def shared_words(name: str) -> str:
+    """A shared parameter as people read it: "G_xz / E_x" of transverse_shear.G_xz / E_x, "attached mass"."""
+    effect, _, key = name.partition(".")
+    words = effect.replace("_", " ")
+    return key if "/" in key else words if words.endswith(key) else f"{key} of {words}"
+
+
 def campaign_line(proposals: Sequence[ProposalEntry]) -> str:
     """The first line of a campaign's plan; empty where nothing would help."""
     if not proposals or proposals[0].gain.score < WORTH:
@@ -63,5 +70,5 @@ def campaign_line(proposals: Sequence[ProposalEntry]) -> str:
     shrunk = {name: value for name, value in told.items() if -math.log(value) >= WORTH}
     if not shrunk:
         return f"{proposals[0].sentence}."
-    sizes = joined([f"{name.replace('_', ' ')} to {value:.2g}" for name, value in shrunk.items()])
-    return f"{proposals[0].sentence}: the interval of {sizes} of what it is."
+    sizes = joined([f"{shared_words(name)} to {value:.2g}" for name, value in shrunk.items()])
+    return f"{proposals[0].sentence}: the interval would shrink, of {sizes} of what it is."

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayesplate.planning.plan import Plan, ProposalEntry
+from bayesplate.planning.words import shared_words
 from bayesplate.plate.material import MODULI
 from bayesplate.report.style import (
     BLUE,
@@ -34,8 +35,6 @@ MOST = 10
 """Proposals that are drawn."""
 _ROW, _LEFT, _PANEL, _GAP, _RIGHT, _TOP, _BOTTOM = 0.56, 3.1, 2.3, 0.35, 0.25, 0.45, 0.95
 _LINE = 46
-_COLOURS = dict(zip(MODULI, (BLUE, ORANGE, GREEN), strict=True))
-_MARKS = dict(zip(MODULI, "osD", strict=True))
 
 
 def gains_picture(plan: Plan) -> Picture:
@@ -113,7 +112,7 @@ def _intervals(axes: Axes, shown: Sequence[ProposalEntry]) -> list[object]:
         rows = np.arange(len(shown)) + 0.18 * (i - 0.5 * (len(names) - 1))
         mark, colour = "osDv"[i % 4], colours[i % 4]
         axes.hlines(rows, values, 100.0, color=colour, lw=1.0, zorder=2)
-        words = drawable(name.replace("_", " ")) if shared else in_figure(name)
+        words = drawable(shared_words(name)) if shared else in_figure(name)
         handles += axes.plot(values, rows, mark, color=colour, mec="black", mew=0.5, ms=5, zorder=3, label=words)
     axes.set(xlim=(0, 103))
     axes.axvline(100.0, color=DARK, lw=0.8)

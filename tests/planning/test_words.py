@@ -8,7 +8,7 @@ import pytest
 
 from bayesplate.planning.gains import Gain
 from bayesplate.planning.proposals import GOALS, Costs, score
-from bayesplate.planning.words import first_line, is_worth
+from bayesplate.planning.words import campaign_line, first_line, is_worth, shared_words
 
 TWO = SimpleNamespace(
     explanations=(SimpleNamespace(words="no effect"), SimpleNamespace(words="air loading")), entropy=0.6
@@ -60,3 +60,19 @@ def test_a_score_is_what_was_asked_for():
 def test_costs_have_the_classes_that_users_name():
     assert Costs.names() == ("reading", "clamping", "board")
     assert (Costs().reading, Costs().clamping, Costs().board) == (1.0, 10.0, 30.0)
+
+
+def entry(shared, score):
+    gain = SimpleNamespace(shared=shared, score=score, E_x=0.5, E_y=1.0, G_xy=1.0)
+    return SimpleNamespace(sentence="Weigh it", gain=gain)
+
+
+def test_a_campaign_is_told_what_its_boards_share_or_their_constants():
+    shared = {"transverse_shear.G_xz / E_x": 0.9, "attached_mass.mass": 0.034, "air_loading.density": 0.99}
+
+    assert campaign_line([entry(shared, 1.0)]) == (
+        "Weigh it: the interval would shrink, of G_xz / E_x to 0.9 and attached mass to 0.034 of what it is."
+    )
+    assert campaign_line([entry({}, 1.0)]) == "Weigh it: the interval would shrink, of E_x to 0.5 of what it is."
+    assert campaign_line([entry(shared, 0.04)]) == campaign_line([]) == ""
+    assert shared_words("air_loading.density") == "density of air loading"
