@@ -66,9 +66,10 @@ def campaign_line(proposals: Sequence[ProposalEntry]) -> str:
     if not proposals or proposals[0].gain.score < WORTH:
         return ""
     best = proposals[0].gain
-    told = best.shared or {name: getattr(best, name) for name in MODULI}
+    shared = {shared_words(name): value for name, value in best.shared.items()}
+    told = shared or {name: getattr(best, name) for name in MODULI}
     shrunk = {name: value for name, value in told.items() if -math.log(value) >= WORTH}
     if not shrunk:
         return f"{proposals[0].sentence}."
-    sizes = joined([f"{shared_words(name)} to {value:.2g}" for name, value in shrunk.items()])
+    sizes = joined([f"{name} to {value:.2g}" for name, value in shrunk.items()])
     return f"{proposals[0].sentence}: the interval would shrink, of {sizes} of what it is."
