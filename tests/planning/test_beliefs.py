@@ -124,6 +124,7 @@ def test_survivors_are_those_within_a_factor_ten_and_no_effect(boards):
 
     assert left(0.5, 0.4, 0.05) == {(), ("first",), ("second",)}
     assert left(0.5, 0.4, 0.03) == {(), ("first",)}
+    assert left(0.2, 0.8, 0.01) == {(), ("first",)}
     assert left(0.01, 0.8, 0.1) == {("first",), ("second",)}
     assert left(0.01, 0.9, 0.01) == {("first",)}
     assert left(0.01, 0.9, 0.01, [("second",)]) == {("first",), ("second",)}
