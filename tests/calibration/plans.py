@@ -23,7 +23,7 @@ from generator import effects as planted_effects
 from generator.boards import PlantedBoard, plant
 from generator.designs import DESIGNS, MEDIANS, POISSON
 from generator.designs import Setup as Held
-from generator.naming import named
+from generator.naming import LEAST_CORRELATION, frequencies, named
 from generator.plate import solve
 from generator.recipes import RECIPES
 from trial.cells import KINDS, SENSORS, UNKNOWN
@@ -138,6 +138,10 @@ def _planted(rng: np.random.Generator, design: str, true: Sequence[str]) -> Plan
     """A board whose effect has a size drawn from the prior of the search."""
     constants = {name: float(m * np.exp(np.log(f) * rng.standard_normal())) for name, (m, f) in MEDIANS.items()}
     fixed = {name: _size(name, design, constants, rng) for name in true}
+    (setup,), acting = DESIGNS[design].setups, [RECIPES[name].make(dict(values)) for name, values in fixed.items()]
+    plate = DESIGNS[design].plate(setup, {**constants, "nu_xy": POISSON})
+    if frequencies(plate, acting, setup.beams)[1] < LEAST_CORRELATION:
+        raise RuntimeError("a label is in doubt")  # nothing is left to be drawn: it would be in doubt again
     return plant(
         rng, design, true, noise_cents=NOISE_CENTS, fixed=fixed, sensor=SENSORS[design], noise_factor=UNKNOWN,
         constants=constants, noise_is_drawn=True,
