@@ -280,7 +280,11 @@ def shares(records: Sequence[Record]) -> dict[str, float]:
 
 
 def calibration(records: Sequence[Record]) -> list[Record]:
-    """By bins of the expected drop, as a share of the entropy: its mean, the realised one, and its standard error."""
+    """By bins of the expected drop, as a share of the entropy: its mean, the realised one, and its standard error.
+
+    Where nearly all doubt should go, rare misses make the mean, and a few boards may have none: the standard error is at
+    least that of a share which is all or nothing.
+    """
     rows = []
     for record in judged(records):
         before = np.array(record["before"])
@@ -292,7 +296,8 @@ def calibration(records: Sequence[Record]) -> list[Record]:
         inside = pairs[(pairs[:, 0] >= low) & (pairs[:, 0] < high)]
         if len(inside) >= 5:
             expected, realised = inside.mean(axis=0)
-            sd = float(inside[:, 1].std(ddof=1) / np.sqrt(len(inside)))
+            mean = float(np.clip(expected, 0.0, 1.0))
+            sd = max(float(inside[:, 1].std(ddof=1)), (mean * (1.0 - mean)) ** 0.5) / len(inside) ** 0.5
             table.append({"low": low, "high": high, "n": len(inside), "expected": float(expected),
                           "realised": float(realised), "sd": sd})  # fmt: skip
     return table
