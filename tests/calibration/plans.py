@@ -282,8 +282,8 @@ def shares(records: Sequence[Record]) -> dict[str, float]:
 def calibration(records: Sequence[Record]) -> list[Record]:
     """By bins of the expected drop, as a share of the entropy: its mean, the realised one, and its standard error.
 
-    Where nearly all doubt should go, rare misses make the mean, and a few boards may have none: the standard error is at
-    least that of a share which is all or nothing.
+    Where nearly all doubt should go, rare misses make the mean, and a few boards may have none: the standard error is
+    at least that of a share which is all or nothing.
     """
     rows = []
     for record in judged(records):
