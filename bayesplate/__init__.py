@@ -4,14 +4,15 @@
     diagnose(card)   the fit, what its residual points to, and the error before and after
     compare(card)    every method side by side
     check(card)      what a card can identify, without sampling
+    plan(card)       what to measure next, by what it is expected to give
     modes(card)      the lowest modes and their Chladni figures
     cite(card)       references of exactly what a fit uses
     pick(files)      recordings of hits, taps or sweeps to frequencies
     new(path)        a first card, to be completed
 
 `card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
-densities and the frequencies that other samplers ask for; `fit`, `check` and `diagnose` take a `Campaign` or its card
-too. Nothing is written unless `out=` names a folder.
+densities and the frequencies that other samplers ask for; `fit`, `check`, `diagnose` and `plan` take a `Campaign` or
+its card too. Nothing is written unless `out=` names a folder.
 
 Glossary of symbols
 -------------------
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
         NotIdentifiableError,
     )
     from bayesplate.labels import Label
+    from bayesplate.planning.plan import Plan
     from bayesplate.plate.board import Board
     from bayesplate.plate.measured import Peak, Reading
     from bayesplate.plate.setup import AttachedItem, DeclaredAir, Setup
@@ -71,6 +73,7 @@ if TYPE_CHECKING:
     from bayesplate.workflow.modes import ModesResult, modes
     from bayesplate.workflow.new import new
     from bayesplate.workflow.pick import PickResult, pick
+    from bayesplate.workflow.plan import PlanResult, plan
     from bayesplate.workflow.problem import Problem
 
 __all__ = [
@@ -103,6 +106,8 @@ __all__ = [
     "Peak",
     "PickReport",
     "PickResult",
+    "Plan",
+    "PlanResult",
     "PriorCard",
     "Problem",
     "Quantity",
@@ -117,6 +122,7 @@ __all__ = [
     "modes",
     "new",
     "pick",
+    "plan",
 ]
 
 _HOMES = {
@@ -149,6 +155,8 @@ _HOMES = {
     "Peak": "bayesplate.plate.measured",
     "PickReport": "bayesplate.recordings.contract",
     "PickResult": "bayesplate.workflow.pick",
+    "Plan": "bayesplate.planning.plan",
+    "PlanResult": "bayesplate.workflow.plan",
     "PriorCard": "bayesplate.cards.prior",
     "Problem": "bayesplate.workflow.problem",
     "Quantity": "bayesplate.quantities",
@@ -162,6 +170,7 @@ _HOMES = {
     "fit": "bayesplate.workflow.fit",
     "new": "bayesplate.workflow.new",
     "pick": "bayesplate.workflow.pick",
+    "plan": "bayesplate.workflow.plan",
 }
 """Where each name is defined. `modes` is the folder of that name, which can be called: see `bayesplate.modes`."""
 

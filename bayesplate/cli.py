@@ -88,7 +88,8 @@ def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None
 def main() -> None:
     """Learn the elastic constants of a rectangular plate from its modes.
 
-    CARD is the name of a shipped board or the path of a card (a .toml file). Campaigns go to check, fit and diagnose.
+    CARD is the name of a shipped board or the path of a card (a .toml file). Campaigns go to check, fit,
+    diagnose and plan.
     """
     # Thousands of small matrices: more than one thread each only waits for the others. Before numpy is loaded.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -280,6 +281,64 @@ def diagnose(
 
             print_shown(show_diagnosis(result.diagnosis))
             say(f"written to {result.folder}")
+
+
+def _costs(context: click.Context, option: click.Parameter, costs: tuple[str, ...]) -> dict[str, Any] | None:
+    """Minutes by class from CLASS=MINUTES, as often as there are classes."""
+    told: dict[str, Any] = {}
+    for one in costs:
+        name, _, minutes = one.partition("=")
+        try:
+            told[name.strip()] = float(minutes)
+        except ValueError:
+            raise click.BadParameter(f"{one!r}: wanted CLASS=MINUTES, as reading=2", context, option) from None
+    return told or None
+
+
+@main.command()
+@click.argument("card")
+@click.option("--for", "goal", metavar="WHAT", help="E_x, E_y, G_xy, constants or explanations.")
+@click.option(
+    "--cost",
+    "costs",
+    multiple=True,
+    metavar="CLASS=MINUTES",
+    callback=_costs,
+    help="Of a reading (1), a clamping (10), a board (30).",
+)
+@click.option("--between", callback=_names, help="Effects to be told apart, comma separated.")
+@_options("out", "seed", "effects", "force", "json", "quiet", "debug")
+def plan(
+    card: str,
+    goal: str | None,
+    costs: Any,
+    between: list[str] | None,
+    out: str | None,
+    seed: int,
+    effects: list[str] | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    debug: bool,
+) -> None:
+    """What to measure next on CARD, by what it is expected to give and what it costs."""
+    with reporting(as_json=as_json, debug=debug):
+        with progress_line(shown=not quiet and not as_json) as tell:
+            from bayesplate.workflow.plan import plan as run
+            from bayesplate.workflow.prepare import default_folder
+
+            folder = default_folder(card) if out is None else out
+            result = run(
+                card, goal=goal, costs=costs, between=between, out=folder, seed=seed, effects=effects, force=force,
+                progress=tell,
+            )  # fmt: skip
+        if as_json:
+            print_json(result.summary)
+        elif not quiet:
+            from bayesplate.workflow.shown import show_plan
+
+            print_shown(show_plan(result.summary))
+            say(f"written to {folder}: {', '.join(path.name for path in result.files)}")
 
 
 @main.command()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
-from bayesplate.report.style import drawable
+from bayesplate.report.style import BLUE, GREEN, VERMILLION, drawable
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.words import STIFFNESS
 
@@ -26,6 +26,7 @@ _BETWEEN = 0.62
 _CAPTION = 0.42
 _GAP = 0.30
 _BAND = 0.055
+_AIR = 0.25
 _LONGEST_HEADING = 62
 _MOST_COLUMNS = 4
 _N_COMBINED = 3
@@ -68,12 +69,32 @@ def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
     return max(found, key=lambda one: one.panel[0])
 
 
-def chladni_sheet(sheet: Sheet) -> Figure:
+@dataclass(frozen=True)
+class Marks:
+    """What is marked on every figure of a sheet, as fractions of the sides that vibrate.
+
+    Attributes
+    ----------
+    sensor, hammer : (float, float)
+    taps : tuple of (float, float)
+    heading : str
+        In place of the sheet's own.
+    """
+
+    sensor: tuple[float, float]
+    hammer: tuple[float, float]
+    taps: tuple[tuple[float, float], ...]
+    heading: str
+
+
+def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
     """Draw a sheet.
 
     Parameters
     ----------
     sheet : Sheet
+    marks : Marks, optional
+        Where sensor and hammer go.
 
     Returns
     -------
@@ -84,7 +105,9 @@ def chladni_sheet(sheet: Sheet) -> Figure:
 
     figure = Figure(figsize=A4)
     plan = layout(len(sheet.modes), sheet.aspect_ratio, has_combined=bool(sheet.combined))
-    heading = f"Chladni figures: {drawable(sheet.title)}"
+    if marks is not None:
+        plan = _close(plan)
+    heading = f"{'Chladni figures' if marks is None else marks.heading}: {drawable(sheet.title)}"
     size = min(14.0, 14.0 * _LONGEST_HEADING / len(heading))
     _text(figure, A4[0] / 2, A4[1] - 0.45, heading, fontsize=size, weight="bold")
     held = f"setup: {sheet.setup}; {sheet.theory} plate; Hz {sheet.basis}"
@@ -95,11 +118,28 @@ def chladni_sheet(sheet: Sheet) -> Figure:
         in_row = min(plan.n_columns, len(sheet.modes) - row * plan.n_columns)
         panel = _panel(figure, plan, _left(plan, column, in_row), top - row * plan.cell[1], sheet)
         draw_sand(panel, mode.shape)
+        if marks is not None:
+            _draw_marks(panel, marks)
         _caption(panel, *_mode_caption(mode))
     if sheet.combined:
         _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
-    _legend(figure, sheet)
+    _legend(figure, sheet, marks)
     return figure
+
+
+def _close(plan: Layout) -> Layout:
+    """The same panels with no more room below each than its caption takes."""
+    height = min(plan.cell[1], plan.panel[1] + _CAPTION + _GAP + _AIR)
+    return replace(plan, cell=(plan.cell[0], height))
+
+
+def _draw_marks(panel: Axes, marks: Marks) -> None:
+    """Sensor, hammer, and where to tap."""
+    style: Any = {"ls": "none", "clip_on": False, "zorder": 6, "mec": "black"}
+    if marks.taps:
+        panel.plot(*np.transpose(marks.taps), ".", ms=4, color=GREEN, **{**style, "mec": GREEN})
+    panel.plot(*marks.sensor, "o", ms=8, color=BLUE, mew=0.8, **style)
+    panel.plot(*marks.hammer, "X", ms=9, color=VERMILLION, mew=0.8, **style)
 
 
 def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> None:
@@ -186,7 +226,7 @@ def _caption(panel: Axes, first: str, second: str) -> None:
     panel.annotate(second, (0.5, 0.0), (0, -18), fontsize=8, color="0.25", **common)
 
 
-def _legend(figure: Figure, sheet: Sheet) -> None:
+def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:
     """What the drawing means, at the foot of the page."""
     drawn = {"clamped": "hatched", "supported": "dashed", "free": "thin"}
     edges = ", ".join(f"{drawn[word]} = {word}" for word in dict.fromkeys(sheet.edges.values()))
@@ -196,9 +236,11 @@ def _legend(figure: Figure, sheet: Sheet) -> None:
         "A name counts the lines crossed on the way along the grain, then on the way across it; "
         f"here the counts begin at {sheet.first_label}.",
     )
-    told = (f"Likely: two times in three, {sheet.likely}.",) if sheet.likely else ()
+    told = [f"Likely: two times in three, {sheet.likely}."] if sheet.likely else []
+    if marks is not None:
+        told.append("Disc: the sensor. Cross: the hammer. Small dots: tap there to tell the figures apart.")
     for i, line in enumerate((*lines, *told)):
-        _text(figure, A4[0] / 2, 0.64 - 0.17 * i, line, fontsize=8)
+        _text(figure, A4[0] / 2, 0.68 - 0.15 * i, line, fontsize=8)
 
 
 def _text(figure: Figure, x: float, y: float, text: str, **style: Any) -> None:

@@ -14,6 +14,8 @@ from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.sheet import Sheet
+from bayesplate.planning.assembled import Bench
+from bayesplate.planning.plan import Plan
 from bayesplate.plate.material import MODULI
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.posterior.draws import Draws
@@ -156,6 +158,26 @@ class DiagnosePlots(FitPlots):
         if found is None:
             raise InputError(Fault("plot.before_after", "a diagnosis that adds an effect", self.diagnosis.verdict))
         return found.figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanPlots:
+    """The figures of a plan."""
+
+    plan: Plan
+    benches: Sequence[Bench]
+
+    def gains(self) -> Figure:
+        """What each proposal is expected to give."""
+        from bayesplate.report.gains import gains_picture
+
+        return gains_picture(self.plan).figure
+
+    def bench(self, setup: str | None = None) -> Figure:
+        """The sheet for the bench of a setup, the first unless named."""
+        from bayesplate.report.bench import bench_sheet
+
+        return bench_sheet(self.benches[_place("setup", setup, [one.entry.setup for one in self.benches])])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

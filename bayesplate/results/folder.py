@@ -30,8 +30,9 @@ BEFORE_AFTER = ("before-after.csv", "before-after.tex")
 KNOWN_EFFECTS = ("known-effects.csv", "known-effects.tex")
 RESULTS = (SUMMARY, ARCHIVE, DIAGNOSIS, PAGE, *CONSTANTS, *BEFORE_AFTER, *KNOWN_EFFECTS)
 """What a run leaves besides its figures, and the next one in the same folder replaces."""
-BESIDE = ("compare.json", "modes.png", "modes.svg")
+BESIDE = ("compare.json", "modes.png", "modes.svg", "plan.json")
 """Files of commands that share the folder with a fit: they do not make it a used one."""
+_DRAWN_BESIDE = ("modes-", "plan.", "plan-bench")
 
 
 class OutputFolder:
@@ -174,7 +175,7 @@ def run_of_its_own() -> Iterator[None]:
 
 
 def _is_of_a_run(name: str) -> bool:
-    return name not in BESIDE and not (name.startswith("modes-") and name.endswith((".png", ".svg")))
+    return name not in BESIDE and not (name.startswith(_DRAWN_BESIDE) and name.endswith((".png", ".svg")))
 
 
 def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:

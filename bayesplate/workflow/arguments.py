@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from numbers import Integral, Real
 from typing import TypeGuard, get_args
@@ -15,6 +16,7 @@ from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
+from bayesplate.planning.proposals import GOALS, Costs
 from bayesplate.plate.board import Board
 from bayesplate.recordings.reading import CHANNELS
 from bayesplate.recordings.signals import MOTIONS
@@ -31,7 +33,7 @@ def require_arguments(**given: object) -> None:
     **given
         Any of card, prior, setup, out, seed, effects, law, robust, coefficients, report, force, resume, n_null,
         progress; for recordings files, card_or_none, rate, places (hammer, sensor and the number of files),
-        sensor_mass, channels, motion, polarity, band (lowest and highest), sand.
+        sensor_mass, channels, motion, polarity, band (lowest and highest), sand; for plans goal, costs, between.
 
     Raises
     ------
@@ -99,6 +101,20 @@ def _word(words: tuple[str, ...]) -> Check:
 def _callable(name: str, value: object) -> Iterator[Fault]:
     if value is not None and not callable(value):
         yield Fault(name, "a function or None", _shown(value))
+
+
+def _costs(name: str, value: object) -> Iterator[Fault]:
+    if value is None:
+        return
+    if not isinstance(value, Mapping):
+        yield Fault(name, f"minutes by class: {', '.join(Costs.names())}", _shown(value))
+        return
+    for key, minutes in value.items():
+        if key not in Costs.names():
+            near = did_you_mean(key, Costs.names()) if isinstance(key, str) else ""
+            yield Fault(f"{name} {key}", f"one of {', '.join(Costs.names())}", _shown(key), near)
+        elif isinstance(minutes, bool) or not isinstance(minutes, Real) or not 0.0 < float(minutes) < math.inf:
+            yield Fault(f"{name} {key}", "a positive number of minutes", _shown(minutes))
 
 
 def _effects(name: str, value: object) -> Iterator[Fault]:
@@ -205,4 +221,7 @@ _CHECKS: dict[str, Check] = {
     "polarity": _word(("same", "opposite")),
     "band": _band,
     "sand": _sand,
+    "goal": _word(GOALS),
+    "costs": _costs,
+    "between": _effects,
 }

@@ -12,21 +12,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.advice import recommendation
+from bayesplate.cards import PriorCard
 from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
-from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answer_words, answers, decide
-from bayesplate.diagnosis.evidence.joint import with_joint_pairs
+from bayesplate.diagnosis.decision.verdict import Verdict, answer_words, decide
+from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
-from bayesplate.diagnosis.evidence.peaks import with_own_labels
-from bayesplate.diagnosis.evidence.search import Found, prepare_search, search
+from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
+from bayesplate.planning.drawn_up import drawn_up
+from bayesplate.planning.survivors import survivors
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     from bayesplate.workflow.campaign_diagnose import CampaignDiagnoseResult
 
 _NULL_LINE = 7
-_MOST_ASKED = 4
 _MOST_FINALISTS = 3
 _FIT, _SEARCH, _KNOWN, _CONTROL = 3.0, 3.0, 0.5, 1.0
 """How long the parts take beside each other, for the time that is left."""
@@ -175,11 +175,7 @@ def diagnose(
 
     before = run(problem, BEFORE, "fit without further effects")
     stages.begin("search for effects", _SEARCH)
-    ground = prepare_search(baseline_of(before.inference.problem), tell=stages.reached)
-    found = search(with_own_labels(ground))
-    together = with_joint_pairs(found, ground)
-    if together is not ground:
-        ground, found = together, search(with_own_labels(together))
+    ground, found = full_search(baseline_of(before.inference.problem), tell=stages.reached)
     stages.begin("effects that are known", _KNOWN)
     solved = {name: one.laws[0] for name, one in ground.candidates.items()}
     known = known_fits(before.inference.problem, solved, stages.reached)
@@ -236,7 +232,7 @@ def _case(
         before=Side(0, before.summary, before.draws, _measured(before)),
         after=Side(verdict.index if is_refitted else 0, after.summary, after.draws, _measured(after)),
         claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
-        recommendation=advice(found, verdict),
+        recommendation=advice(found, verdict, before.problem.prior, before.summary.seed),
         known=known,
         finalists=[(one, refits[one.index].summary) for one in verdict.stands_for if one.index in refits],
         drawn={index: one.draws for index, one in refits.items()},
@@ -249,18 +245,9 @@ def _measured(one: Fitted) -> NDArray[np.float64]:
     return np.concatenate([setup.measured for setup in one.inference.problem.board.setups])
 
 
-def advice(found: Found, verdict: Verdict) -> str:
-    """What to do next: read a wrong reading again, or measure what would tell more; empty if nothing would help."""
+def advice(found: Found, verdict: Verdict, prior: PriorCard, seed: int) -> str:
+    """What to do next: read a wrong reading again, or the first line of the plan; empty if nothing would help."""
     if verdict.word == "unexplained":
         return wrong_reading(found)
-    return recommendation(found, asked_about(found, verdict))
-
-
-def asked_about(found: Found, verdict: Verdict) -> tuple[str, ...]:
-    """Effects that the next measurement should tell apart: the alternatives, or what is most probable so far."""
-    ranked = answers(found)
-    near = dict.fromkeys((*verdict.stands_for, *alternatives(found, ranked))) if verdict.index else ranked[:3]
-    if verdict.index and len(near) == 1:
-        return ()
-    names = dict.fromkeys(name for one in near for name in one.members if name in found.ground.candidates)
-    return tuple(names)[:_MOST_ASKED]
+    left = survivors(found, [one.members for one in verdict.stands_for])
+    return drawn_up(found, prior, seed, among=left, with_sequences=False).first

@@ -12,6 +12,8 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
 from bayesplate.diagnosis.wording.told import alike_sentence, verdict_sentence, warnings
+from bayesplate.planning.plan import Plan
+from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.checking import CheckReport
@@ -42,7 +44,16 @@ __all__ = [
     "show_diagnosis",
     "show_fit",
     "show_modes",
+    "show_plan",
 ]
+
+
+PLAN_REMARK = (
+    "gain: nats, the drop of the doubt between explanations and the mean logarithm by which the intervals shrink, or "
+    "what was asked for"
+)
+SEEN_REMARK = "seen: residue of a mode between hammer and sensor, of the largest that its figure could give"
+NOTHING_HELPS = "nothing that was looked at would help by a twentieth"
 
 
 @dataclass(frozen=True)
@@ -126,6 +137,12 @@ def show_modes(report: ModesReport) -> Shown:
     """The report of `bayesplate.workflow.modes.modes` for a person."""
     files = f"; sheet to print: {', '.join(report.files)}" if report.files else ""
     return Shown(sheet_tables(report), proposal_remarks(report), report.notes, f"Frequencies {report.basis}{files}")
+
+
+def show_plan(plan: Plan) -> Shown:
+    """The result of `bayesplate.workflow.plan.plan` for a person."""
+    remarks = (PLAN_REMARK, SEEN_REMARK) if plan.bench else (PLAN_REMARK,) if plan.proposals else ()
+    return Shown(plan_tables(plan), remarks, plan.notes, plan.first or NOTHING_HELPS)
 
 
 def progress_text(progress: Progress, seconds: float = 0.0) -> str:

@@ -94,7 +94,7 @@ def control_of(setting: Setting) -> NullControl:
 @cache
 def _laws(design: str) -> Mapping[str, FormLaw]:
     """By the form's title."""
-    baseline = baseline_of_card(_median_board(_plain(design)))
+    baseline = median_baseline(design)
     every = [form for each in forms(baseline.board).values() for form in each]
     return {form.title: form_law(baseline, form, HALF_WIDTH) for form in every}
 
@@ -108,6 +108,11 @@ def _bare_models(design: str) -> tuple[SetupModel, ...]:
     covariance = np.eye(parameters.n_dim)
     covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.diag([HALF_WIDTH**2 / 9.0] * 2 + [0.0])
     return exact_models(board, estimate.models, centre, covariance)
+
+
+def median_baseline(design: str) -> Baseline:
+    """The noiseless board of a design's median constants, fitted."""
+    return baseline_of_card(_median_board(_plain(design)))
 
 
 def _plain(design: str) -> Setting:

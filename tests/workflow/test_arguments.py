@@ -40,6 +40,10 @@ BAD = [
     ({"force": True, "resume": True}, "force and resume: wanted one of them, got both"),
     ({"coefficients": "trained"}, "(did you mean training?)"),
     ({"progress": "yes"}, "progress: wanted a function or None"),
+    ({"goal": "E_z"}, "(did you mean E_y?)"),
+    ({"costs": 3}, "costs: wanted minutes by class: reading, clamping, board, got 3"),
+    ({"costs": {"reading": -1.0}}, "costs reading: wanted a positive number of minutes"),
+    ({"between": ["grain_angel"]}, "(did you mean grain_angle?)"),
 ]
 GOOD = [
     {"law": None, "seed": 0, "effects": None, "out": None, "progress": None, "coefficients": None},
@@ -47,12 +51,15 @@ GOOD = [
     {"law": "exact", "effects": ["air_loading", "grain_angle"], "card": Path("x.toml"), "n_null": 1},
     {"coefficients": "published", "force": True, "resume": False},
     {"resume": True, "out": "results/x"},
+    {"goal": "constants", "costs": {"board": 45}, "between": ["air_loading"]},
+    {"goal": None, "costs": None, "between": None},
 ]
 FUNCTIONS = {
     "fit": (bayesplate.fit, "seed law robust effects report force resume out progress"),
     "diagnose": (bayesplate.diagnose, "seed effects report force resume out n_null progress"),
     "compare": (bayesplate.compare, "seed effects coefficients out force progress"),
     "modes": (bayesplate.modes, "seed effects force out"),
+    "plan": (bayesplate.plan, "goal costs between seed effects force out progress"),
     "check": (bayesplate.check, "effects"),
     "cite": (bayesplate.cite, "effects"),
 }

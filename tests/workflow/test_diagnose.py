@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from runs import files_in, read_json
 
 from bayesplate.cli import main
-from bayesplate.diagnosis.evidence.search import prepare_search
+from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.errors import InputError
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
@@ -50,7 +50,7 @@ def diagnose(folder: Path, *arguments: str) -> runs.Run:
 def quickly(patch: pytest.MonkeyPatch, *, page: bool = False) -> None:
     """Two candidates, and a sampler whose first judgement passes; a page only where it is asked for."""
     patch.setattr("bayesplate.workflow.fitting.SamplerSettings", partial(SamplerSettings, gate=LOOSE_GATE))
-    patch.setattr("bayesplate.workflow.diagnose.prepare_search", partial(prepare_search, tried=TRIED))
+    patch.setattr("bayesplate.workflow.diagnose.full_search", partial(full_search, tried=TRIED))
     if not page:
         patch.setattr("bayesplate.workflow.diagnose.write_page", lambda *_: None)
 
@@ -166,7 +166,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, qu
 def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_path, quick, with_shear, monkeypatch):
     """What is computed besides is left out: known effects, and advice."""
     monkeypatch.setattr("bayesplate.workflow.diagnose.known_fits", lambda *_: ())
-    monkeypatch.setattr("bayesplate.workflow.diagnose.recommendation", lambda *_: "")
+    monkeypatch.setattr("bayesplate.workflow.diagnose.advice", lambda *_: "")
     folder = tmp_path / "out"
     for name, content in with_shear.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -263,7 +263,7 @@ def test_there_is_nothing_to_resume(tmp_path):
     assert "none to resume" in run.stderr
 
 
-@pytest.mark.parametrize("place", [pytest.param("prepare_search", marks=pytest.mark.slow), "_case"])
+@pytest.mark.parametrize("place", [pytest.param("full_search", marks=pytest.mark.slow), "_case"])
 def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, monkeypatch, with_shear, place):
     """Stopped after the first fit, and after both; what is computed between the two is of the resumed run."""
 

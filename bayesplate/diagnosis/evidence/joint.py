@@ -5,6 +5,7 @@ Pairs with transverse shear are left to the sampler, which fits whatever is name
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.draws import members_of
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.search import Found, Ground
+from bayesplate.diagnosis.evidence.peaks import with_own_labels
+from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
 from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve, joint_law, joint_table
 
@@ -22,6 +25,31 @@ PLAUSIBLE = 0.05
 _MOST_PAIRS = 3
 _WORTH = 0.05
 """Share of a pair's probability below which two of its forms keep the sum of their shifts."""
+
+
+def full_search(
+    baseline: Baseline, tried: Sequence[str] | None = None, tell: Callable[[float], None] | None = None
+) -> tuple[Ground, Found]:
+    """The search of a diagnosis: every candidate, each hypothesis with its own labels, plausible pairs solved together.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    tried : sequence of str, optional
+        Effects to try; by default all that can act.
+    tell : callable, optional
+        Told which share of the effects is done.
+
+    Returns
+    -------
+    ground : Ground
+        With the labels of the board.
+    found : Found
+    """
+    ground = prepare_search(baseline, tried=tried, tell=tell)
+    found = search(with_own_labels(ground))
+    together = with_joint_pairs(found, ground)
+    return (ground, found) if together is ground else (together, search(with_own_labels(together)))
 
 
 def with_joint_pairs(found: Found, ground: Ground, solve: Solve = form_law) -> Ground:

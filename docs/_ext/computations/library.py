@@ -22,6 +22,7 @@ from bayesplate.diagnosis.evidence.sensitivity import NOISES, WIDTHS
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
+from bayesplate.planning import gains, places
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
@@ -41,6 +42,12 @@ CHECKS = (
         "python examples/closing_the_loop.py --out docs/validation",
         "Shipped boards through `diagnose`: the verdict, whether an improvement is claimed, errors in cents before and "
         "after, and the shift of each constant in standard deviations.",
+    ),
+    (
+        "plans",
+        "make plans",
+        "Simulated boards with two surviving explanations, measured as the plan says, at random, and by the next modes "
+        "up: how often that settles which is true, and whether expected gains are realised.",
     ),
     (
         "campaign",
@@ -135,6 +142,11 @@ def references(folder: Path) -> str:
     for group in ((cited.THIN,), *(effect.references for effect in EFFECTS.values()), cited.COMPUTATION):
         entries += group
     return "\n".join(f"- {_unquoted(entry)}" for entry in dict.fromkeys(entries)) + "\n"
+
+
+def planning_references(folder: Path) -> str:
+    """What the plan rests on."""
+    return "\n".join(f"- {_unquoted(entry)}" for entry in (*gains.REFERENCES, *places.REFERENCES)) + "\n"
 
 
 def _unquoted(entry: str) -> str:

@@ -1,0 +1,253 @@
+"""What to measure next in a campaign: a reading on one of its boards, weighing what is shared, or one more board."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.campaigns.shared import Shared
+from bayesplate.cards import PriorCard
+from bayesplate.planning.inputs_read import measurements
+from bayesplate.planning.joint import BoardInJoint, Joint, board_in_joint
+from bayesplate.planning.plan import GainEntry, ProposalEntry, SequenceEntry
+from bayesplate.planning.proposals import CONSTANTS, FAINT, Costs
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.plate.setup import AttachedItem
+
+Floats = NDArray[np.float64]
+
+BEST = 3
+SHORT = 0.5
+"""Of the length of a board that is cut for the purpose: what bends on a shorter wave gives way more in shear."""
+_WEIGHED_TO = 1e-5
+"""Standard deviation of a small mass on a laboratory's scale, kg."""
+_WITHOUT = ("thickness_profile", "outline_profile")
+_CUT = 2
+"""Boards of which a shorter one is looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One thing that could be measured next in a campaign.
+
+    Attributes
+    ----------
+    what, board, setup, sentence : str
+        See `bayesplate.planning.plan.ProposalEntry`.
+    cost : float
+        Minutes.
+    labels : tuple of str
+    rows : (n, n_u) array
+    variance : (n,) array
+    """
+
+    what: str
+    board: str
+    setup: str
+    sentence: str
+    cost: float
+    labels: tuple[str, ...]
+    rows: Floats
+    variance: Floats
+
+
+def joint_of(
+    boards: Sequence[Board], priors: Sequence[PriorCard], shared: Sequence[Shared],
+    tell: Callable[[float], None] | None = None,
+) -> Joint:  # fmt: skip
+    """All boards of a campaign, each solved once.
+
+    Parameters
+    ----------
+    boards : sequence of Board
+        The shared effects declared.
+    priors : sequence of PriorCard
+        One per board.
+    shared : sequence of Shared
+    tell : callable, optional
+        Told after every board which share of them is done.
+    """
+    made = []
+    for board, prior in zip(boards, priors, strict=True):
+        made.append(board_in_joint(board, prior, shared))
+        if tell is not None:
+            tell(len(made) / len(boards))
+    return Joint(tuple(made), len(shared))
+
+
+def readings(
+    joint: Joint, priors: Sequence[PriorCard], shared: Sequence[Shared], costs: Costs, goal: str | None
+) -> tuple[Reading, ...]:
+    """Everything that could be measured next, the most promising first."""
+    listed = [one for i in range(len(joint.boards)) for one in _of_board(joint, i, costs, goal)]
+    listed += list(_of_shared(joint, shared, costs))
+    listed += list(_boards(joint, priors, shared, costs))
+    ranked = sorted(((worth(joint, (one,), goal), i) for i, one in enumerate(listed)), key=lambda pair: -pair[0])
+    return tuple(listed[i] for value, i in ranked if value > FAINT)
+
+
+def worth(joint: Joint, some: Sequence[Reading], goal: str | None) -> float:
+    """What readings are worth, nats: the mean shrinkage of what is shared, of the constants, or of one of them."""
+    of_shared, of_moduli, _ = _ratios(joint, some)
+    if goal in MODULI:
+        return float(-np.log(of_moduli[MODULI.index(goal)]))
+    wanted = of_moduli if goal == CONSTANTS or not joint.n_shared else of_shared
+    return float(-np.mean(np.log(wanted)))
+
+
+def _ratios(joint: Joint, some: Sequence[Reading]) -> tuple[Floats, Floats, float]:
+    rows, variance = np.concatenate([one.rows for one in some]), np.concatenate([one.variance for one in some])
+    return joint.ratios(rows, variance)
+
+
+def _of_board(joint: Joint, place: int, costs: Costs, goal: str | None) -> Iterator[Reading]:
+    """Further modes of one board, its modes again, and readings of its sizes."""
+    one = joint.boards[place]
+    name = one.board.name
+    for i, law in enumerate(one.laws):
+        setup, read, variance = law.station.base.name, one.was_read(i), one.variance(i)
+        rows = joint.rows(place, one.own[i], one.shared[i])
+        labels = [str(label) for label in law.station.setup.labels]
+
+        def some(chosen: Sequence[int]) -> Reading:
+            told = ", ".join(labels[j] for j in chosen)  # noqa: B023
+            sentence = f"Measure modes {told} of board {name} as well"
+            kept = list(chosen)
+            cost = len(kept) * costs.reading
+            those = tuple(labels[j] for j in kept)  # noqa: B023
+            return Reading("modes", name, setup, sentence, cost, those, rows[kept], variance[kept])  # noqa: B023
+
+        new = [int(j) for j in np.flatnonzero(~read)]
+        best: list[int] = []
+        for _ in range(min(BEST, len(new))):
+            best.append(max(set(new) - set(best), key=lambda j: worth(joint, (some([*best, j]),), goal)))
+        if best:
+            yield some(sorted(best))
+        old = [int(j) for j in np.flatnonzero(read)]
+        if old:
+            again = f"Measure all {len(old)} modes of board {name} again on another day"
+            cost = costs.clamping + len(old) * costs.reading
+            those = tuple(labels[j] for j in old)
+            yield Reading("again", name, setup, again, cost, those, rows[old], variance[old])
+    columns = {column.removeprefix("z[").removesuffix("]"): i for i, column in enumerate(one.names)}
+    for measured in measurements(one.board):
+        if measured.parameter.name in columns:
+            own = np.zeros((1, one.moduli.shape[1]))
+            own[0, columns[measured.parameter.name]] = 1.0
+            row = joint.rows(place, own, np.zeros((1, joint.n_shared)))
+            words = f"{measured.sentence}, board {name}"
+            cost = measured.n * costs.reading
+            yield Reading("size", name, "", words, cost, (), row, np.array([1.0 / measured.precision]))
+
+
+def _of_shared(joint: Joint, shared: Sequence[Shared], costs: Costs) -> Iterator[Reading]:
+    """Weighing the thing that all boards carry."""
+    for i, one in enumerate(shared):
+        if one.effect == "attached_mass" and not one.to:
+            row = np.zeros((1, joint.starts[-1] + joint.n_shared))
+            row[0, joint.starts[-1] + i] = 1.0
+            sd = _WEIGHED_TO / one.prior.median / max(one.prior.log_sd, 1e-12)
+            yield Reading("size", "", "", "Weigh what is attached to every board", costs.reading, (), row,
+                          np.array([sd**2]))  # fmt: skip
+
+
+def _boards(joint: Joint, priors: Sequence[PriorCard], shared: Sequence[Shared], costs: Costs) -> Iterator[Reading]:
+    """One more board: like each that was measured, and like the two that tell most but cut to half their length."""
+    if not shared:
+        return
+    listed = []
+    for one in joint.boards:
+        read = sum(int(one.was_read(i).sum()) for i in range(len(one.laws)))
+        sentence = f"Measure one more board like {one.board.name}, {read} modes"
+        labels = tuple(
+            str(label)
+            for i, law in enumerate(one.laws)
+            for label, was_read in zip(law.station.setup.labels, one.was_read(i), strict=True)
+            if was_read
+        )
+        listed.append(_board(joint, one, one.of_shared, sentence, labels, costs))
+    yield from listed
+    order = sorted(range(len(listed)), key=lambda i: -worth(joint, (listed[i],), None))
+    for i in order[:_CUT]:
+        other = _cut(joint.boards[i], priors[i], shared)
+        labels = tuple(str(label) for label in other.laws[0].station.setup.labels[: other.laws[0].station.n_old])
+        name = other.board.name
+        sentence = f"Measure one more board half as long as {name}, its {len(labels)} lowest modes"
+        yield _board(joint, other, other.of_shared, sentence, labels, costs)
+
+
+def _board(
+    joint: Joint, one: BoardInJoint, precision: Floats, sentence: str, labels: tuple[str, ...], costs: Costs
+) -> Reading:
+    rows = joint.of_shared(precision)
+    cost = costs.board + len(labels) * costs.reading
+    return Reading("board", "", one.board.setups[0].name, sentence, cost, labels, rows, np.ones(len(rows)))
+
+
+def _cut(one: BoardInJoint, prior: PriorCard, shared: Sequence[Shared]) -> BoardInJoint:
+    """A board of the same stuff and width but half as long, as many of its lowest modes read, without profiles."""
+    board = one.board.without(_WITHOUT)
+    known = {name: board.inputs[name] for name in ("length_x", "mass") if name in board.inputs}
+    cut = {
+        name: replace(q, mean=SHORT * q.mean, sd=SHORT * q.sd, readings=(), at_x=(), at_y=())
+        for name, q in known.items()
+    }
+    values = {**one.values, **{name: np.asarray(SHORT * float(one.values[name])) for name in known}}
+    first = replace(board.setups[0], readings=(), peaks=(), attached=_moved(board))
+    bare = replace(board.with_priors(cut), setups=(first,), chosen=())
+    values = {name: value for name, value in values.items() if name in bare.inputs or name in RIGIDITIES}
+    empty = board_in_joint(bare, prior, shared, values)
+    law = empty.laws[0]
+    n = min(one.laws[0].station.n_old, len(law.station.setup.readings))
+    read = replace(law, station=replace(law.station, n_old=n))
+    return replace(empty, laws=(read,), noise=one.noise[:1])
+
+
+def _moved(board: Board) -> tuple[AttachedItem, ...]:
+    """What is attached, at the same fraction of the shorter board."""
+    return tuple(
+        replace(item, places=tuple((SHORT * x, y) for x, y in item.places)) for item in board.setups[0].attached
+    )
+
+
+def entry(joint: Joint, one: Reading, shared: Sequence[Shared], goal: str | None) -> ProposalEntry:
+    """A reading as it is written."""
+    gain = _gain(joint, (one,), shared, goal, one.cost)
+    return ProposalEntry(one.what, one.board, one.setup, one.sentence, one.cost, one.labels, gain)
+
+
+def _gain(joint: Joint, some: Sequence[Reading], shared: Sequence[Shared], goal: str | None, cost: float) -> GainEntry:
+    of_shared, of_moduli, information = _ratios(joint, some)
+    E_x, E_y, G_xy = (float(value) for value in of_moduli)
+    value = worth(joint, some, goal)
+    return GainEntry(
+        E_x=E_x,
+        E_y=E_y,
+        G_xy=G_xy,
+        constants=float(-np.mean(np.log(of_moduli))),
+        constants_error=0.0,
+        explanations=None,
+        explanations_error=None,
+        information=information,
+        shared={one.name: float(value) for one, value in zip(shared, of_shared, strict=True)},
+        score=value,
+        score_per_minute=value / cost,
+    )
+
+
+def joined(
+    joint: Joint, listed: Sequence[Reading], shared: Sequence[Shared], goal: str | None, longest: int = 3
+) -> tuple[SequenceEntry, ...]:
+    """The best two and the best three together, found one by one: each goes with those found before it."""
+    chosen, result = list(listed[:1]), []
+    while chosen and len(chosen) < min(longest, len(listed)):
+        left = [one for one in listed if one not in chosen]
+        chosen.append(max(left, key=lambda one: worth(joint, (*chosen, one), goal)))
+        cost = sum(one.cost for one in chosen)
+        steps = tuple(one.sentence for one in chosen)
+        result.append(SequenceEntry(steps, cost, _gain(joint, chosen, shared, goal, cost)))
+    return tuple(result)

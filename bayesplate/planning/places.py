@@ -1,0 +1,108 @@
+"""Where to put sensor and hammer so that the wanted modes are seen, and where to tap to tell their figures apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.frequencies.residues import NODAL_LINE
+
+Floats = NDArray[np.float64]
+Place = tuple[float, float]
+
+REFERENCES = (
+    "D. J. Ewins: Modal Testing: Theory, Practice and Application. 2nd ed., Research Studies Press (2000). "
+    "[the residue at the driving point, by which places are chosen]",
+    "D. C. Kammer: Sensor placement for on-orbit modal identification and correlation of large space structures. "
+    "J. Guid. Control Dyn. 14, 251-259 (1991), doi:10.2514/3.20635. [effective independence]",
+)
+_APART = 0.25
+"""Least distance between sensor and hammer, as a fraction of a side."""
+_MARGIN = 0.03
+"""Of the sides that is left free at the rim: nobody hits an edge."""
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where to put sensor and hammer on what vibrates, as fractions of its sides.
+
+    Attributes
+    ----------
+    sensor, hammer : (float, float)
+    seen : tuple of float
+        Residue of each mode between the two, over the largest that its figure could give: 0 on a nodal line.
+    taps : tuple of (float, float)
+        Where to tap to tell the figures apart, as many as there are modes: the set of effective independence.
+    """
+
+    sensor: Place
+    hammer: Place
+    seen: tuple[float, ...]
+    taps: tuple[Place, ...]
+
+    @property
+    def are_all_seen(self) -> bool:
+        """Whether no mode has a nodal line at sensor or hammer."""
+        return min(self.seen) > NODAL_LINE
+
+
+def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placing:
+    """Sensor and hammer for some modes.
+
+    The sensor stands where the smallest residue at the driving point is largest, the hammer where the smallest residue
+    between the two is.
+
+    Parameters
+    ----------
+    shapes : (n_modes, n, n) array
+        Deflections on the grid, x first.
+    grid : (n,) array
+        Fractions of a side.
+    sensor : (float, float), optional
+        Where it stands already.
+
+    Returns
+    -------
+    Placing
+    """
+    inner = (grid >= _MARGIN) & (grid <= 1.0 - _MARGIN)
+    at = grid[inner]
+    kept = shapes[:, inner][:, :, inner]
+    relative = kept / np.abs(shapes).max(axis=(1, 2))[:, None, None]
+    flat = relative.reshape(len(shapes), -1)
+    places = [(float(x), float(y)) for x in at for y in at]
+    if sensor is None:
+        first = int(np.argmax((flat**2).min(axis=0)))
+    else:
+        first = int(np.argmin([np.hypot(x - sensor[0], y - sensor[1]) for x, y in places]))
+    apart = np.array([max(abs(x - places[first][0]), abs(y - places[first][1])) >= _APART for x, y in places])
+    residues = np.abs(flat * flat[:, [first]])
+    second = int(np.argmax(np.where(apart, residues.min(axis=0), -1.0)))
+    taps = tuple(places[i] for i in effective_independence(flat.T, len(shapes)))
+    seen = tuple(float(one) for one in residues[:, second])
+    return Placing(places[first], places[second], seen, taps)
+
+
+def effective_independence(shapes: Floats, n: int) -> tuple[int, ...]:
+    """The places that keep figures most independent: one that adds least is taken out after the other.
+
+    Parameters
+    ----------
+    shapes : (n_places, n_modes) array
+    n : int
+        Places that are left, at least as many as modes.
+
+    Returns
+    -------
+    tuple of int
+        Their indices.
+    """
+    left = np.arange(len(shapes))
+    while len(left) > n:
+        rows = shapes[left]
+        leverages = np.einsum("ij,ij->i", rows @ np.linalg.pinv(rows.T @ rows), rows)
+        few = max(1, (len(left) - n) // 4) if len(left) > 8 * n else 1
+        left = np.delete(left, np.argsort(leverages)[:few])
+    return tuple(int(i) for i in left)

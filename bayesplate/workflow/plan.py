@@ -1,0 +1,263 @@
+"""`plan`: what to measure next, by what it is expected to give and what it costs."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesplate.cards import is_campaign
+from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
+from bayesplate.diagnosis.evidence.joint import full_search
+from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.errors import NotIdentifiableError
+from bayesplate.planning.assembled import (
+    Bench,
+    benches,
+    explanation_entries,
+    proposal_entry,
+    sequence_entry,
+)
+from bayesplate.planning.drawn_up import DrawnUp, begun, drawn_up
+from bayesplate.planning.plan import FORMAT, Plan
+from bayesplate.planning.proposals import Costs
+from bayesplate.planning.survivors import asked, surviving
+from bayesplate.posterior.sampling import Progress
+from bayesplate.report.plots import PlanPlots
+from bayesplate.results.folder import DIAGNOSIS, json_text, make_folder, require_new, write_text, writing
+from bayesplate.workflow.arguments import require_arguments
+from bayesplate.workflow.campaign import Campaign, problem_or_campaign
+from bayesplate.workflow.prepare import Card, Prepared, prepare
+from bayesplate.workflow.problem import Problem, as_problem
+from bayesplate.workflow.shown import show_plan
+from bayesplate.workflow.stages import Stages
+
+PLAN = "plan.json"
+_GAINS, _BENCH = "plan", "plan-bench"
+_POSE, _SEARCH, _PLAN = 1.0, 12.0, 4.0
+"""How long the parts take beside each other."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanResult:
+    """What `plan` leaves.
+
+    Attributes
+    ----------
+    summary : Plan
+        What plan.json holds.
+    benches : tuple of Bench
+        Figures of the modes to look for, with the places of sensor and hammer.
+    files : tuple of Path
+        Those that were written.
+    """
+
+    summary: Plan
+    benches: tuple[Bench, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def plot(self) -> PlanPlots:
+        """The figures: `result.plot.gains()`, `result.plot.bench()`."""
+        return PlanPlots(self.summary, self.benches)
+
+    def __repr__(self) -> str:
+        return repr(self.summary).replace("<Plan", "<PlanResult", 1)
+
+    def _repr_html_(self) -> str:
+        """The tables as a notebook shows them."""
+        return show_plan(self.summary).html(self.summary.title or self.summary.name)
+
+
+def plan(
+    card: Problem | Card | Campaign,
+    *,
+    goal: str | None = None,
+    costs: Mapping[str, float] | None = None,
+    between: Sequence[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    effects: Sequence[str] | None = None,
+    seed: int = 1,
+    force: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> PlanResult:
+    """Rank what could be measured next by what it is expected to give.
+
+    Parameters
+    ----------
+    card : Problem, str, path, Board or Campaign
+        A problem, the name of a shipped board or campaign card, the path of a card, or a board made in Python. A board
+        without frequencies is planned from its prior.
+    goal : str, optional
+        "E_x", "E_y", "G_xy": the interval of this constant; "constants": those of all three; "explanations": the doubt
+        between them. By default both together.
+    costs : dict of float, optional
+        Minutes of a "reading" (1), a "clamping" (10), a "board" (30).
+    between : sequence of str, optional
+        Effects that are to be told apart, no effect being one more possibility; by default those that survive the
+        search of `diagnose`.
+    out : path, optional
+        Folder of plan.json, the figure of gains and the sheets for the bench; nothing is written without it. A
+        diagnosis of the same card that is there is not made again.
+    effects : sequence of str, optional
+        Declared effects in place of the card's.
+    seed : int
+        Everything random follows from it.
+    force : bool
+        Replace files that are there.
+    progress : callable, optional
+        Told when a part begins.
+
+    Returns
+    -------
+    PlanResult
+
+    Raises
+    ------
+    InputError
+        If the card, an argument or the folder cannot be used; then nothing is written.
+    """
+    require_arguments(
+        card=card, goal=goal, costs=costs, between=between, out=out, effects=effects, seed=seed, force=force,
+        progress=progress,
+    )  # fmt: skip
+    classes = Costs(**(costs or {}))
+    given = _given(card, effects)
+    files = () if out is None else require_new(Path(out), _names(), force=force)
+    if isinstance(given, Campaign):
+        from bayesplate.workflow.campaign_plan import plan_campaign
+
+        made, drawn = plan_campaign(given, goal, classes, seed, progress)
+    else:
+        found = _drawn_up(given, goal, classes, between, seed, out, progress)
+        made, drawn = _plan_of(given, found, goal, classes, seed)
+    if out is not None:
+        _write(made, drawn, Path(out), files)
+    return PlanResult(made, drawn, tuple(path for path in files if path.exists()))
+
+
+def _given(card: Problem | Card | Campaign, effects: Sequence[str] | None) -> Prepared | Campaign:
+    """What was given; a board that was not measured yet will do."""
+    if isinstance(card, Problem):
+        return as_problem(card, effects=effects).prepared
+    if isinstance(card, Campaign) or (isinstance(card, str | os.PathLike) and is_campaign(card)):
+        campaign = problem_or_campaign(card, effects=effects)
+        assert isinstance(campaign, Campaign)
+        return campaign
+    return prepare(card, effects, may_lack_frequencies=True)
+
+
+def _names() -> list[str]:
+    """Files that a plan may write."""
+    return [PLAN, *(f"{stem}.{ending}" for stem in (_GAINS, _BENCH, f"{_BENCH}-2") for ending in ("png", "svg"))]
+
+
+def _drawn_up(
+    prepared: Prepared,
+    goal: str | None,
+    costs: Costs,
+    between: Sequence[str] | None,
+    seed: int,
+    out: str | os.PathLike[str] | None,
+    progress: Callable[[Progress], None] | None,
+) -> DrawnUp:
+    """The plan of a board: from a search, from a finished one, or from the prior."""
+    stages = Stages(progress, _POSE + _SEARCH + _PLAN)
+    stages.begin("estimate", _POSE)
+    problem = Problem(prepared)
+    if not any(setup.readings or setup.peaks for setup in prepared.board.setups):
+        return begun(prepared.board, prepared.prior, seed, goal=goal, costs=costs)
+    try:
+        baseline = baseline_of(problem.posed)
+    except NotIdentifiableError as error:
+        found = begun(prepared.board, prepared.prior, seed, goal=goal, costs=costs)
+        return replace(found, notes=(f"planned from the prior alone: {error}",))
+    finished = None if out is None or between else _finished(Path(out), prepared)
+    tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
+    stages.begin("search for effects", _SEARCH)
+    _, searched = full_search(baseline, tried, stages.reached)
+    among = _among(searched, between, finished)
+    stages.begin("gains of further readings", _PLAN)
+    return drawn_up(searched, prepared.prior, seed, goal=goal, costs=costs, among=among)
+
+
+@dataclass(frozen=True)
+class _Finished:
+    """What a finished diagnosis says: probabilities of the answers that may survive, and that of no effect."""
+
+    support: Mapping[tuple[str, ...], float]
+    none: float
+    rivals: frozenset[tuple[str, ...]]
+
+
+def _finished(folder: Path, prepared: Prepared) -> _Finished | None:
+    """The diagnosis of the same card in a folder; None if there is none, or it explains nothing."""
+    try:
+        told: dict[str, Any] = json.loads((folder / DIAGNOSIS).read_text(encoding="utf-8"))
+        same = told["card_sha256"] == prepared.card.sha256 and tuple(told["declared"]) == prepared.board.effects
+        if not same or told["verdict"] == "unexplained":
+            return None
+        support = {tuple(one["effects"]): float(one["probability"]) for one in told["answers"]}
+        none = float(told["probability_of_none"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    highest = max(support.values(), default=0.0)
+    listed = told["effects"] if told["verdict"] == "indistinguishable group" else ()
+    rivals = frozenset(members for members in support if members and set(members) <= set(listed))
+    near = {one: p for one, p in support.items() if one and p > 0.0 and (WITHIN * p >= highest or one in rivals)}
+    return _Finished(near, none, rivals) if near else None
+
+
+def _among(found: Found, between: Sequence[str] | None, finished: _Finished | None) -> tuple[Answer, ...] | None:
+    """The explanations to tell apart, if not those that survive the search at hand."""
+    if between:
+        return asked(found, between)
+    return None if finished is None else surviving(found, finished.support, finished.none, finished.rivals)
+
+
+def _plan_of(
+    prepared: Prepared, found: DrawnUp, goal: str | None, costs: Costs, seed: int
+) -> tuple[Plan, tuple[Bench, ...]]:
+    """A board's plan as it is written, and its sheets."""
+    beliefs, board = found.beliefs, prepared.board
+    steps = found.together[-1][0] if found.together else found.proposals[:1]
+    drawn = benches(beliefs, steps or found.proposals, found.values, np.random.default_rng([seed, 18]))
+    is_measured = any(setup.readings for setup in board.setups)
+    made = Plan(
+        format=FORMAT,
+        name=board.name,
+        title=board.title,
+        seed=seed,
+        card_sha256=prepared.card.sha256,
+        basis="readings" if is_measured else "prior",
+        goal=goal,
+        costs=asdict(costs),
+        explanations=explanation_entries(beliefs),
+        entropy=beliefs.entropy,
+        first=found.first,
+        proposals=tuple(proposal_entry(one, goal, beliefs) for one in found.proposals),
+        sequences=tuple(sequence_entry(*one, goal, beliefs) for one in found.together),
+        bench=tuple(one.entry for one in drawn),
+        notes=(*found.notes, *board.notes),
+    )
+    return made, drawn
+
+
+def _write(made: Plan, drawn: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:
+    from bayesplate.report.bench import bench_sheet
+    from bayesplate.report.gains import gains_picture
+    from bayesplate.report.saving import save_figure
+
+    make_folder(folder)
+    write_text(files[0], json_text(made))
+    figures = [gains_picture(made).figure, *(bench_sheet(one) for one in drawn)]
+    for i, figure in enumerate(figures):
+        for path in files[1 + 2 * i : 3 + 2 * i]:
+            with writing(path):
+                save_figure(figure, path)

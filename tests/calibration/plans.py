@@ -1,0 +1,320 @@
+"""Boards with two surviving explanations: does what a plan proposes settle them, and as often as it expects?
+
+A board is asked about two effects of the library, no effect being the third possibility, all three equally probable
+beforehand. Which of them is true, the effect's size and the noise are drawn from the very priors of the search, and the
+generator, another discretisation, makes the frequencies; boards on which not just two explanations survive, the truth
+among them, are passed over. Then
+three things are measured, each by the generator: the plan's first proposal, one drawn at random from its list, and the
+next three modes up. Explanations are settled where the true one is left alone: ten times as probable as the other.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from calibration.planted import drawn
+from generator import effects as planted_effects
+from generator.boards import PlantedBoard, plant
+from generator.designs import DESIGNS, MEDIANS, POISSON
+from generator.designs import Setup as Held
+from generator.naming import LEAST_CORRELATION, frequencies, named
+from generator.plate import solve
+from generator.recipes import RECIPES
+from trial.cells import KINDS, SENSORS, UNKNOWN
+from trial.shared import baseline_of_card, median_baseline, shared_law
+
+from bayesplate.cards import load_prior
+from bayesplate.diagnosis.decision.verdict import WITHIN
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
+from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.errors import BayesplateError
+from bayesplate.planning.beliefs import Beliefs
+from bayesplate.planning.drawn_up import drawn_up
+from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
+from bayesplate.planning.looks import LOOKS
+from bayesplate.planning.proposals import EXPLANATIONS, Proposal
+from bayesplate.planning.stations import known_mass
+from bayesplate.planning.survivors import survivors
+from bayesplate.plate.board import Board
+
+Record = dict[str, Any]
+
+NOISE_CENTS = 5.0
+CHOSEN = ("cantilever-6", "cantilever-6", "clamped-9")
+"""Designs of the boards, in turn."""
+ASKED = {
+    "cantilever-6": (
+        "transverse_shear", "air_loading", "attached_mass", "clamp_rotation", "clamp_translation", "density_gradient",
+        "stiffness_gradient", "thickness_profile", "grain_angle",
+    ),
+    "clamped-9": (
+        "transverse_shear", "air_loading", "attached_mass", "clamp_rotation", "clamp_translation", "support_mass",
+        "grain_angle",
+    ),
+}  # fmt: skip
+"""Effects of which a board is asked about two."""
+NEXT = 3
+_MOST_BOARDS = 60
+_SEARCHED = 34
+WAYS = ("first", "random", "next")
+EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 1.01)
+"""Of bins of the expected drop, as a share of the entropy."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How boards are made.
+
+    Attributes
+    ----------
+    base_seed : int
+    """
+
+    base_seed: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A board with two surviving explanations.
+
+    Attributes
+    ----------
+    planted : PlantedBoard
+    found : Found
+    true : tuple of str
+        Effects that it has: one, or none.
+    """
+
+    planted: PlantedBoard
+    found: Found
+    true: tuple[str, ...]
+
+
+def simulate_one(settings: Settings, index: int) -> Record:
+    """One board with two surviving explanations, and what measuring in three ways tells of them."""
+    started = time.perf_counter()
+    rng = np.random.default_rng(np.random.SeedSequence([settings.base_seed, 21, index]))
+    record: Record = {"simulation": index}
+    try:
+        asked, n_boards = _asked(rng, CHOSEN[index % len(CHOSEN)])
+        record |= {"boards": n_boards, "design": asked.planted.design.name, "true": list(asked.true)}
+        record |= _measured(asked, rng)
+    except (BayesplateError, RuntimeError, np.linalg.LinAlgError) as error:
+        record |= {"error": f"{type(error).__name__}: {error}"}
+    return record | {"seconds": round(time.perf_counter() - started, 2)}
+
+
+def _asked(rng: np.random.Generator, design: str) -> tuple[Asked, int]:
+    """Boards until two explanations survive on one, the true one among them; and how many it took."""
+    for n_boards in range(1, _MOST_BOARDS + 1):
+        pair = tuple(str(one) for one in rng.choice(ASKED[design], size=2, replace=False))
+        which = int(rng.integers(3))
+        true = () if which == 0 else (pair[which - 1],)
+        try:
+            planted = _planted(rng, design, true)
+        except (RuntimeError, ValueError):
+            continue
+        found = search(_as_planted(prepare_search(baseline_of_card(planted), shared_law, pair)))
+        left = survivors(found)
+        if len(left) == 2 and left[0].support < WITHIN * left[1].support and true in [one.members for one in left]:
+            return Asked(planted, found, true), n_boards
+    raise RuntimeError(f"{design}: wanted two surviving explanations, got none in {_MOST_BOARDS} boards")
+
+
+def _as_planted(ground: Ground) -> Ground:
+    """The search without pairs and exchanged labels, neither of which is planted."""
+    kept: tuple[Hypothesis, ...] = tuple(one for one in ground.hypotheses if len(one.members) < 2 and one.swap is None)
+    return replace(ground, hypotheses=kept)
+
+
+def _planted(rng: np.random.Generator, design: str, true: Sequence[str]) -> PlantedBoard:
+    """A board whose effect has a size drawn from the prior of the search."""
+    constants = {name: float(m * np.exp(np.log(f) * rng.standard_normal())) for name, (m, f) in MEDIANS.items()}
+    fixed = {name: _size(name, design, constants, rng) for name in true}
+    (setup,), acting = DESIGNS[design].setups, [RECIPES[name].make(dict(values)) for name, values in fixed.items()]
+    plate = DESIGNS[design].plate(setup, {**constants, "nu_xy": POISSON})
+    if frequencies(plate, acting, setup.beams)[1] < LEAST_CORRELATION:
+        raise RuntimeError("a label is in doubt")  # nothing is left to be drawn: it would be in doubt again
+    return plant(
+        rng, design, true, noise_cents=NOISE_CENTS, fixed=fixed, sensor=SENSORS[design], noise_factor=UNKNOWN,
+        constants=constants, noise_is_drawn=True,
+    )  # fmt: skip
+
+
+def _size(effect: str, design: str, constants: Mapping[str, float], rng: np.random.Generator) -> dict[str, Any]:
+    """Parameters of the generator's effect, from one draw of the prior that the search has of them."""
+    board = _board(design)
+    every = forms(board)[effect]
+    form = every[int(rng.integers(len(every)))]
+    values = {one.key: one.prior.mean for one in form.board.parameters if one.effect == effect}
+    values |= {one.key: drawn(one.prior, rng) for one in form.free}
+    plate = DESIGNS[design].plate(DESIGNS[design].setups[0], {**constants, "nu_xy": POISSON})
+    if effect == "clamp_rotation":
+        return {"stiffness": plate.D_x / (values["compliance"] * plate.L_x)}
+    if effect == "clamp_translation":
+        return {"stiffness": plate.D_x / (values["compliance"] * plate.L_x**3)}
+    if effect == "attached_mass":
+        diameter = (4.0 * values["mass"] / (np.pi * 5000.0)) ** (1.0 / 3.0)
+        is_solid = KINDS[design] == "accelerometer"
+        radius = diameter * (1.0 / 16.0 + 1.0 / 3.0) ** 0.5 if is_solid else 0.0
+        return {"mass": values["mass"], "places": (SENSORS[design],), "rotary_radius": radius}
+    return values
+
+
+@cache
+def _board(design: str) -> Board:
+    """The board of a design as its card states it: of it only the priors of the effects are asked."""
+    return median_baseline(design).board
+
+
+def _measured(asked: Asked, rng: np.random.Generator) -> Record:
+    """What is expected and what comes of the three ways to go on."""
+    prior = load_prior("weakly-informative")
+    seed = int(rng.integers(2**31))
+    plan = drawn_up(asked.found, prior, seed, goal=EXPLANATIONS, with_sequences=False)
+    listed = plan.proposals
+    chosen = {
+        "first": listed[0],
+        "random": listed[int(rng.integers(len(listed)))],
+        "next": _next_up(plan.beliefs, listed, rng),
+    }
+    names = [list(one.members) for one in plan.beliefs.explanations]
+    record: Record = {"explanations": names, "before": [round(float(p), 5) for p in plan.beliefs.probabilities]}
+    for way in WAYS:
+        one = chosen[way]
+        read = _read(asked, one, rng)
+        after = probabilities_after(plan.beliefs, one.readings, read[None, :])[:, 0]
+        own = float(after[[tuple(name) for name in names].index(asked.true)])
+        record[way] = {
+            "what": one.what,
+            "cost": one.cost,
+            "expected": round(one.gain.explanations, 5),
+            "error": round(one.gain.explanations_error, 5),
+            "realised": round(plan.beliefs.entropy - float(entropy(after[:, None])[0]), 5),
+            "true": round(own, 5),
+        }
+    return record
+
+
+def _next_up(beliefs: Beliefs, listed: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
+    """The next modes up in the session that goes on, as a proposal."""
+    of_modes = [one for one in listed if one.what == "modes" and one.further is not None]
+    best = max(of_modes, key=lambda one: len(one.rows))
+    assert best.further is not None
+    every: Readings = best.further
+    rows = list(range(min(NEXT, every.n)))
+    readings = every.some(rows)
+    first = best.every_row[0]
+    kept = tuple(best.every_row[i] for i in rows)
+    assert first == min(best.every_row)
+    return replace(best, readings=readings, rows=kept, gain=expected_gain(beliefs, readings, rng))
+
+
+def _read(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
+    """What the generator's board shows: ln f (Hz) of the modes, or the sizes that are looked at."""
+    if one.law is None:
+        return _looked_at(asked, one, rng)
+    station, design, truth = one.law.station, asked.planted.design, asked.planted.truth
+    setup = station.setup
+    beams = tuple(setup.readings[i].beams for i in one.rows)
+    covered = design.setups[0].covered if not station.is_new else 0.0
+    held = Held(setup.name, setup.edges, beams, covered=covered)
+    acting = [RECIPES[name].make(dict(values)) for name, values in truth.effects.items() if RECIPES[name].acts(held)]
+    if one.what == "mass":
+        board = asked.found.ground.baseline.board
+        place = station.places(board)[one.spot]
+        acting.append(planted_effects.AttachedMass(known_mass(board), (place,)))
+    plate = design.plate(held, truth.constants)
+    found = named(solve(plate, acting, _SEARCHED), plate.edges)
+    if any(b not in found for b in beams):
+        raise RuntimeError(f"{one.sentence}: a mode was not found on the true board")
+    exact = np.log([found[b][0] for b in beams])
+    name = design.setups[0].name
+    stays = one.what in ("modes", "mass")
+    noise = truth.drawn_noise[name] * np.log(2.0) / 1200.0 if stays else drawn(setup.noise, rng)
+    return np.asarray(exact + noise * rng.standard_normal(len(exact)))
+
+
+def _looked_at(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
+    """The sizes of an effect as they are, zero where the board does not have it, with the error of the look."""
+    effect = next(name for name, look in LOOKS.items() if look.sentence == one.sentence)
+    keys = [free.key for free in asked.found.ground.candidates[effect].laws[0].form.free]
+    true = asked.planted.truth.effects.get(effect, {})
+    sd = LOOKS[effect].sd(asked.found.ground.baseline.board)
+    return np.array([float(true.get(key, 0.0)) + sd * rng.standard_normal() for key in keys])
+
+
+def is_group(record: Record) -> bool:
+    """Whether both survivors are effects, so that it is known that something is lacking."""
+    return [] not in record["explanations"]
+
+
+def settled(record: Record, way: str) -> bool:
+    """Whether the true explanation is left alone."""
+    true = record[way]["true"]
+    return bool(true >= WITHIN * (1.0 - true))
+
+
+def wrongly(record: Record, way: str) -> bool:
+    """Whether the false explanation is left alone."""
+    true = record[way]["true"]
+    return bool(1.0 - true >= WITHIN * true)
+
+
+def judged(records: Sequence[Record]) -> list[Record]:
+    """Records of boards that could be asked and measured."""
+    return [one for one in records if "error" not in one]
+
+
+def shares(records: Sequence[Record]) -> dict[str, float]:
+    """Share of the boards that each way settles."""
+    every = judged(records)
+    return {way: float(np.mean([settled(one, way) for one in every])) for way in WAYS}
+
+
+def calibration(records: Sequence[Record]) -> list[Record]:
+    """By bins of the expected drop, as a share of the entropy: its mean, the realised one, and its standard error.
+
+    Where nearly all doubt should go, rare misses make the mean, and a few boards may have none: the standard error is
+    at least that of a share which is all or nothing.
+    """
+    rows = []
+    for record in judged(records):
+        before = np.array(record["before"])
+        whole = float(-(before * np.log(before)).sum())
+        rows += [(one["expected"] / whole, one["realised"] / whole) for one in (record["first"], record["random"])]
+    pairs = np.array(rows)
+    table = []
+    for low, high in pairwise(EDGES):
+        inside = pairs[(pairs[:, 0] >= low) & (pairs[:, 0] < high)]
+        if len(inside) >= 5:
+            expected, realised = inside.mean(axis=0)
+            mean = float(np.clip(expected, 0.0, 1.0))
+            sd = max(float(inside[:, 1].std(ddof=1)), (mean * (1.0 - mean)) ** 0.5) / len(inside) ** 0.5
+            table.append({"low": low, "high": high, "n": len(inside), "expected": float(expected),
+                          "realised": float(realised), "sd": sd})  # fmt: skip
+    return table
+
+
+def is_calibrated(records: Sequence[Record]) -> bool:
+    """Whether the realised drop of every bin lies within three standard errors of the expected one."""
+    return all(abs(row["realised"] - row["expected"]) <= 3.0 * row["sd"] for row in calibration(records))
+
+
+def bars(records: Sequence[Record]) -> dict[str, bool]:
+    """What must hold."""
+    found = shares(records)
+    return {
+        "the first proposal settles at least 20 points more of the boards than a random one": (
+            found["first"] >= found["random"] + 0.20
+        ),
+        "and at least as many as the next modes up": found["first"] >= found["next"],
+        "expected gains are realised within three standard errors": is_calibrated(records),
+    }

@@ -1,0 +1,146 @@
+"""Expected gains against closed forms: information, shrinkage, and the entropy between normal explanations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesplate.planning.beliefs import Beliefs, Explanation
+from bayesplate.planning.gains import Readings, expected_gain, probabilities_after, together
+
+SIGMA = 0.3
+
+
+def explanation(mean=0.0, probability=1.0, variance=(4.0, 1.0, 0.25), n_terms=1, words="made"):
+    """The three constants themselves, normal about a mean of the first one."""
+    means = np.zeros((n_terms, 3))
+    means[:, 0] = mean
+    return Explanation(
+        members=(words,), words=words, probability=probability, mean=means,
+        covariance=np.tile(np.diag(variance), (n_terms, 1, 1)), noise=np.full((n_terms, 1), SIGMA),
+        log_moduli=np.zeros((n_terms, 3)), to_moduli=np.tile(np.eye(3), (n_terms, 1, 1)),
+        cells=np.zeros(n_terms, dtype=np.intp),
+    )  # fmt: skip
+
+
+def beliefs(*explanations):
+    return Beliefs(None, explanations, 0)
+
+
+def reading(of, row, variance=SIGMA**2, shift=0.0):
+    """One reading that sees the constants along a row."""
+    return Readings(
+        tuple(np.full((one.n_terms, 1), shift) for one in of.explanations),
+        tuple(np.tile(np.array([row], dtype=float), (one.n_terms, 1, 1)) for one in of.explanations),
+        tuple(np.full((one.n_terms, 1), variance) for one in of.explanations),
+    )
+
+
+def test_what_is_linear_and_normal_is_exact():
+    """E_x of variance 4 read with variance 0.09 keeps 1 / (1/4 + 1/0.09); the other two keep theirs."""
+    now = beliefs(explanation())
+
+    gain = expected_gain(now, reading(now, [1, 0, 0]), np.random.default_rng(1))
+
+    after = 1.0 / (1.0 / 4.0 + 1.0 / SIGMA**2)
+    assert gain.E_x == pytest.approx(np.sqrt(after / 4.0), rel=1e-10)
+    assert (gain.E_y, gain.G_xy) == (pytest.approx(1.0), pytest.approx(1.0))
+    assert gain.information == pytest.approx(0.5 * np.log(4.0 / after), rel=1e-10)
+    assert gain.constants == pytest.approx(gain.information / 3.0, rel=1e-10)
+    assert (gain.constants_error, gain.explanations_error) == (0.0, 0.0)
+
+
+def test_readings_together_have_half_the_log_determinant_of_what_all_say():
+    now = beliefs(explanation())
+    rows = np.array([[1.0, 0.5, 0.0], [0.2, 1.0, 0.3], [0.4, 0.0, 1.0]])
+
+    gain = expected_gain(now, together([reading(now, row) for row in rows]), np.random.default_rng(1))
+
+    prior = np.diag([1 / 4.0, 1.0, 4.0])
+    told = prior + rows.T @ rows / SIGMA**2
+    assert gain.information == pytest.approx(0.5 * (np.linalg.slogdet(told)[1] - np.linalg.slogdet(prior)[1]))
+
+
+def drop_by_quadrature(distance, share):
+    """Expected drop of the entropy between two normals of unit variance that far apart, by Gauss and Hermite."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(80)
+    weights = weights / weights.sum()
+    left = 0.0
+    for p, middle in ((share, 0.0), (1.0 - share, distance)):
+        y = middle + nodes
+        logs = np.stack([np.log(share) - 0.5 * y**2, np.log(1.0 - share) - 0.5 * (y - distance) ** 2])
+        after = np.exp(logs - np.logaddexp(*logs))
+        left += p * weights @ -(after * np.log(np.maximum(after, 1e-300))).sum(axis=0)
+    return -(share * np.log(share) + (1 - share) * np.log(1 - share)) - left
+
+
+@pytest.mark.parametrize(("distance", "share"), [(0.7, 0.5), (2.0, 0.8), (4.0, 0.3)])
+def test_drop_of_the_entropy_is_that_of_quadrature(distance, share):
+    """And half the distance is not: the control."""
+    variance = (0.36, 1e-8, 1e-8)  # with a noise of 0.64 the reading has unit variance
+    now = beliefs(explanation(0.0, share, variance), explanation(distance, 1.0 - share, variance))
+    one = reading(now, [1, 0, 0], 0.64)
+
+    gain = expected_gain(now, one, np.random.default_rng(3), n_draws=6000)
+
+    assert abs(gain.explanations - drop_by_quadrature(distance, share)) < 4.0 * gain.explanations_error
+    assert abs(gain.explanations - drop_by_quadrature(0.5 * distance, share)) > 8.0 * gain.explanations_error
+
+
+def test_explanations_that_expect_the_same_are_not_told_apart_and_distant_ones_for_sure():
+    now = beliefs(explanation(0.0, 0.4), explanation(0.0, 0.6))
+    alike = expected_gain(now, reading(now, [0, 1, 0]), np.random.default_rng(1))
+    far = beliefs(explanation(0.0, 0.4), explanation(100.0, 0.6))
+    apart = expected_gain(far, reading(far, [1, 0, 0]), np.random.default_rng(1))
+
+    assert alike.explanations == pytest.approx(0.0, abs=1e-12)
+    assert apart.explanations == pytest.approx(far.entropy, abs=1e-12)
+    # half the spread of E_x lies between the two, and goes as well
+    assert apart.E_x == pytest.approx(0.3 / np.sqrt(4.0 + 0.24 * 100.0**2), rel=0.02)
+
+
+def test_probabilities_after_a_reading_follow_the_two_densities():
+    now = beliefs(explanation(0.0, 0.5), explanation(3.0, 0.5))
+    one = reading(now, [1, 0, 0])
+
+    after = probabilities_after(now, one, np.array([[0.0], [3.0], [1.5]]))
+
+    odds = np.exp(0.5 * 3.0**2 / (4.0 + SIGMA**2))
+    assert after[0] == pytest.approx([odds / (1 + odds), 1 / (1 + odds), 0.5])
+
+
+def test_an_explanation_that_expects_more_scatter_pays_for_it():
+    """Standard deviations 1 and 3 about the same mean: at the mean the odds are 3 to 1."""
+    narrow, wide = ((1.0 - SIGMA**2, 1.0, 1.0), (9.0 - SIGMA**2, 1.0, 1.0))
+    now = beliefs(explanation(0.0, 0.5, narrow), explanation(0.0, 0.5, wide))
+
+    after = probabilities_after(now, reading(now, [1, 0, 0]), np.array([[0.0]]))
+
+    assert after[:, 0] == pytest.approx([0.75, 0.25])
+
+
+def test_what_stays_undecided_keeps_its_spread():
+    """Two explanations two standard deviations apart: the variance left is that within and that between, averaged."""
+    variance = (0.36, 1.0, 1.0)
+    now = beliefs(explanation(0.0, 0.5, variance), explanation(2.0, 0.5, variance))
+
+    gain = expected_gain(now, reading(now, [1, 0, 0], 0.64), np.random.default_rng(5), n_draws=20000)
+
+    y = np.linspace(-8.0, 10.0, 4001)
+    density = np.stack([np.exp(-0.5 * (y - middle) ** 2) for middle in (0.0, 2.0)])
+    shares = density / density.sum(axis=0)
+    means = np.array([0.0, 2.0])[:, None] + 0.36 * (y - np.array([[0.0], [2.0]]))
+    between = (shares * means**2).sum(axis=0) - (shares * means).sum(axis=0) ** 2
+    weights = density.sum(axis=0) / density.sum()
+    left = 0.36 * 0.64 + weights @ between
+    assert gain.E_x == pytest.approx(np.sqrt(left / (0.36 + 1.0)), rel=0.01)
+    assert weights @ between > 0.1 * left
+
+
+def test_a_known_constant_added_to_a_reading_changes_nothing():
+    now = beliefs(explanation(0.0, 0.5), explanation(3.0, 0.5))
+    plain = expected_gain(now, reading(now, [1, 0, 0]), np.random.default_rng(1))
+    moved = expected_gain(now, reading(now, [1, 0, 0], shift=7.0), np.random.default_rng(1))
+
+    assert moved.explanations == pytest.approx(plain.explanations, abs=1e-9)
+    assert moved.E_x == pytest.approx(plain.E_x, abs=1e-9)

@@ -1,0 +1,62 @@
+"""What more readings of the board leave of an input, worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_boards import setup_of
+
+from bayesplate.planning.inputs_read import MORE, measurements
+from bayesplate.plate.board import made_board
+from bayesplate.quantities import Quantity
+
+FREE = dict.fromkeys(("x0", "x1", "y0", "y1"), "free")
+
+
+def board(**inputs):
+    setup = setup_of(FREE, {(1, 1): 50.0, (2, 0): 70.0, (0, 2): 150.0})
+    stated = {"length_x": 0.58, "length_y": 0.217, "thickness": 4.7e-3, "mass": 0.257, "poisson_xy": 0.4}
+    quantities = {name: Quantity.exact(value) for name, value in stated.items()} | inputs
+    return made_board("made", quantities, (setup,))
+
+
+def sd_of(found, words):
+    return next(one.sd for one in found if words in one.sentence)
+
+
+def test_more_readings_narrow_the_scatter_and_leave_the_rounding():
+    readings = (4.7e-3, 4.5e-3, 4.8e-3, 4.6e-3)
+    found = measurements(board(thickness=Quantity.from_readings(readings, resolution=1e-4)))
+
+    scatter = np.var(readings, ddof=1)
+    assert sd_of(found, "5 more times") == pytest.approx(np.sqrt(scatter / (4 + MORE) + 1e-8 / 12))
+    alone = scatter / MORE + 1e-10 / 12
+    now = scatter / 4 + 1e-8 / 12
+    assert sd_of(found, "10 times finer") == pytest.approx((1 / now + 1 / alone) ** -0.5)
+    assert {one.n for one in found} == {MORE}
+    assert all(one.precision > 0 for one in found)
+
+
+def test_a_stated_uncertainty_is_halved_in_variance_by_one_more_measurement():
+    found = measurements(board(mass=Quantity.from_mean(0.257, 0.003)))
+
+    assert [(one.n, one.parameter.name) for one in found] == [(1, "mass")]
+    assert found[0].sd == pytest.approx(0.003 / np.sqrt(2))
+    assert found[0].precision == pytest.approx(1.0)
+
+
+def test_what_is_exact_and_what_cannot_be_read_is_not_proposed():
+    assert measurements(board()) == ()
+    assert measurements(board(poisson_xy=Quantity.from_mean(0.4, 0.08, "normal"))) == ()
+
+
+def test_more_places_narrow_the_mean_of_a_field():
+    x = (0.0, 0.145, 0.29, 0.435, 0.58) * 2
+    y = (0.0,) * 5 + (0.217,) * 5
+    readings = (4.7e-3, 4.5e-3, 4.8e-3, 4.8e-3, 4.6e-3, 4.5e-3, 4.5e-3, 4.9e-3, 4.9e-3, 4.7e-3)
+    thickness = Quantity.from_readings(readings, resolution=1e-4, at_x=x, at_y=y, place_sd=0.02)
+    one = board(thickness=thickness)
+    found = [each for each in measurements(one) if "more places" in each.sentence]
+
+    assert [each.n for each in found] == [12]
+    assert found[0].sd < 0.8 * one.inputs["thickness"].sd

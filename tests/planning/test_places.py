@@ -1,0 +1,61 @@
+"""Where sensor and hammer go, on shapes whose nodal lines are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesplate.planning.places import effective_independence, placing
+
+GRID = np.linspace(0.0, 1.0, 25)
+
+
+def shape(m, n):
+    """A supported plate: sin(m pi x) sin(n pi y)."""
+    return np.outer(np.sin(m * np.pi * GRID), np.sin(n * np.pi * GRID))
+
+
+def test_one_mode_is_sensed_at_its_antinode_and_struck_at_another():
+    found = placing(shape(2, 1)[None], GRID)
+
+    assert found.sensor[0] in (pytest.approx(0.25), pytest.approx(0.75))
+    assert found.sensor[1] == pytest.approx(0.5)
+    assert abs(found.hammer[0] - found.sensor[0]) == pytest.approx(0.5)
+    assert found.seen == (pytest.approx(1.0),)
+    assert found.are_all_seen
+
+
+def test_no_nodal_line_runs_through_sensor_or_hammer():
+    shapes = np.stack([shape(1, 1), shape(2, 1), shape(1, 2), shape(2, 2), shape(3, 1)])
+
+    found = placing(shapes, GRID)
+
+    assert min(found.seen) > 0.2
+    for x, y in (found.sensor, found.hammer):
+        assert min(abs(x - node) for node in (1 / 3, 1 / 2, 2 / 3)) > 0.04
+        assert abs(y - 0.5) > 0.04
+
+
+def test_a_sensor_that_stands_on_a_nodal_line_is_told():
+    found = placing(np.stack([shape(1, 1), shape(2, 1)]), GRID, sensor=(0.5, 0.5))
+
+    assert found.sensor == (pytest.approx(0.5), pytest.approx(0.5))
+    assert found.seen[1] == pytest.approx(0.0, abs=1e-12)
+    assert not found.are_all_seen
+
+
+def test_effective_independence_keeps_places_that_tell_figures_apart():
+    """Of five places two see the first figure alone, two the second alone, and one sees them both alike."""
+    shapes = np.array([[1.0, 0.0], [0.3, 0.0], [0.0, 1.0], [0.0, 0.3], [0.2, 0.2]])
+
+    assert set(effective_independence(shapes, 2)) == {0, 2}
+
+
+def test_taps_tell_all_figures_apart():
+    shapes = np.stack([shape(1, 1), shape(2, 1), shape(1, 2)])
+
+    found = placing(shapes, GRID)
+
+    at = [[np.sin(m * np.pi * x) * np.sin(n * np.pi * y) for m, n in ((1, 1), (2, 1), (1, 2))] for x, y in found.taps]
+    assert len(found.taps) == 3
+    assert np.linalg.cond(at) < 5.0
