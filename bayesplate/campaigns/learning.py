@@ -81,11 +81,9 @@ class Learnt:
             others = together.log_density(z, (index,))
             return np.asarray(others - own.at(z) if is_left_out else others)
 
+        aim = together.moments((index,) if is_left_out else ())
+        drawn = _drawn(member, drawn, log_reference, aim, seed)
         weights = drawn.weights_under(log_reference)
-        if drawn.effective(weights) < FEWEST_WEIGHTED_DRAWS:
-            aim = together.moments((index,) if is_left_out else ())
-            drawn = member.anew(log_reference, drawn, aim, seed)
-            weights = drawn.weights
         return *member.posterior_of(drawn, weights, rng, seed), drawn.effective(weights)
 
 
@@ -96,7 +94,7 @@ def learn(
 
     A likelihood is first found from a board's own draws, then from the same draws weighted to be halfway to where all
     boards together are: there it matters, and a polynomial of low order follows it the better. A board that has too few
-    draws there is walked anew.
+    draws there is walked anew; one that still has too few keeps the likelihood that its own draws gave.
 
     Parameters
     ----------
@@ -116,11 +114,24 @@ def learn(
     for _ in range(_ROUNDS):
         for i, member in enumerate(members):
             near = _halfway(together, i)
-            if samples[i].effective(samples[i].weights_under(near)) < FEWEST_WEIGHTED_DRAWS:
-                samples[i] = member.anew(near, samples[i], together.moments(), settings.seed)
-            found[i] = member.likelihood(samples[i], near)
+            drawn = _drawn(member, samples[i], near, together.moments(), settings.seed)
+            if drawn.effective(drawn.weights_under(near)) >= FEWEST_WEIGHTED_DRAWS:
+                samples[i], found[i] = drawn, member.likelihood(drawn, near)
         together = Together.of(together.shared, names, found, pulls)
     return Learnt(tuple(members), tuple(samples), together, *walk(together, settings, progress))
+
+
+def _drawn(member: Member, before: Sample, log_reference: LogDensity, aim: tuple[Floats, Floats], seed: int) -> Sample:
+    """Draws of a board where the shared parameters have another density: those at hand if they serve, else anew.
+
+    Of the two the one with more draws there: far from what a board likes, a walk on the surrogate of its law may be
+    worth less than the few of its own draws.
+    """
+    effective = before.effective(before.weights_under(log_reference))
+    if effective >= FEWEST_WEIGHTED_DRAWS:
+        return before
+    anew = member.anew(log_reference, before, aim, seed)
+    return anew if anew.effective(anew.weights) > effective else before
 
 
 def _halfway(together: Together, board: int) -> LogDensity:
