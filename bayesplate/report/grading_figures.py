@@ -41,7 +41,7 @@ Floats = NDArray[np.float64]
 MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
 _ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.25, 16
-_MOST_PAIRS = 15
+_MOST_PAIRS, _MOST_LABELLED = 15, 12
 _COLOURS = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
@@ -78,6 +78,7 @@ def sorted_picture(graded: Grading) -> Picture:
             panel.set(ylim=(n - 0.5, -0.5), ylabel="rank")
             panel.yaxis.label.set_fontsize(SMALL)
             panel.grid(axis="x", color="0.9", lw=0.6)
+        panel.locator_params(axis="x", nbins=6)
         panel.set_title(modulus_title(name), fontsize=WORDS, loc="left", weight="bold")
         panel.set_xlabel(f"GPa{'; shaded: the specification' if name in graded.request.limits else ''}", fontsize=SMALL)
         told.append(f"{name} from {middle.min():.3g} to {middle.max():.3g} GPa, half of the boards above "
@@ -94,7 +95,10 @@ def speed_picture(graded: Grading) -> Picture:
         density[0], speed[0], xerr=_ends(density), yerr=_ends(speed), fmt="o", color=BLUE, mec="black", mew=0.5, ms=4,
         elinewidth=0.9, ecolor=GREY, zorder=3,
     )  # fmt: skip
-    if len(graded.names) <= _LONGEST:
+    width = max(float(np.ptp(density[0])), 0.05 * float(density[0].mean()))
+    middle = 0.5 * float(density[0].min() + density[0].max())
+    panel.set_xlim(middle - 0.65 * width, middle + 0.65 * width)
+    if len(graded.names) <= _MOST_LABELLED:
         for name, x, y in zip(graded.names, density[0], speed[0], strict=True):
             panel.annotate(short(drawable(name), _LONGEST), (x, y), (4, 4), textcoords="offset points", fontsize=SMALL,
                            parse_math=False)  # fmt: skip
@@ -138,7 +142,7 @@ def pairs_picture(graded: Grading) -> Picture:
     """The proposed pairs: by how much the constants of the partner differ, and the tolerance."""
     shown = graded.pairs[:_MOST_PAIRS]
     names = [name for name in MODULI if name in graded.request.match_percent] or list(MODULI)
-    figure, (panel,) = stacked([0.36 * len(shown) + 0.1], left=1.9, bottom=0.95)
+    figure, (panel,) = stacked([0.36 * len(shown) + 0.1], left=1.9, bottom=0.8)
     for row, pair in enumerate(shown):
         both = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
@@ -158,7 +162,7 @@ def pairs_picture(graded: Grading) -> Picture:
         for p in shown
     ]
     _named_rows(panel, titles, longest=40)
-    panel.set_xlabel("the partner's constant over the board's, % (logarithm)", fontsize=SMALL)
+    panel.set_xlabel("the partner's constants over the board's, ln, %", fontsize=SMALL)
     legend_below(figure, [_handle(*_COLOURS[name], in_figure(name)) for name in names], 3)
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)
     caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where all its bars lie in the grey."

@@ -16,7 +16,8 @@ Rows = NDArray[np.intp]
 
 _NEAREST = 12
 """Partners that are looked at for each board."""
-_ROWS = 256
+_AT_ONCE = 200_000
+"""Pairs that are looked at together, so that the memory does not grow with the number of boards."""
 LEAST_PROBABILITY = 0.05
 """Pairs that match with less are not proposed."""
 
@@ -75,8 +76,9 @@ def _candidates(mean: Floats, variance: Floats, width: Floats) -> tuple[Rows, Ro
 
     n = len(mean)
     first, second = [], []
-    for start in range(0, n, _ROWS):
-        rows = np.arange(start, min(start + _ROWS, n))
+    step = max(1, _AT_ONCE // n)
+    for start in range(0, n, step):
+        rows = np.arange(start, min(start + step, n))
         apart = mean[rows, None, :] - mean[None]
         sd = np.sqrt(np.maximum(variance[rows, None, :] + variance[None], 1e-24))
         within = ndtr((width - apart) / sd) - ndtr((-width - apart) / sd)

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import closing, contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -212,6 +212,7 @@ class _Run:
     folder: Path
     folders: bool
     report: bool
+    versions: Mapping[str, str] = field(default_factory=versions)
 
     def fitted(self, by: Workers, journal: Journal, progress: Callable[[Progress], None] | None) -> list[str]:
         """Fit the boards that the journal does not hold; the keys of all, in the order of their names."""
@@ -266,7 +267,7 @@ class _Run:
         request = replace(self.request, seed=seed, tables=dict(named.tables))
         tables = {name: repr(one) for name, one in sorted(named.tables.items())}
         asked = {**asdict(replace(request, tables={})), "tables": tables}
-        key = _hash(FORMAT, versions(), card.name, card.sha256, named.prior.to_card(), asked)
+        key = _hash(FORMAT, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
         arguments = (card, named.prior, request)
         call = Call(fit_board, arguments)
         if self.folders:
@@ -344,4 +345,4 @@ def _summary(run: _Run, seed: int, journal: Journal, keys: Sequence[str]) -> Bat
         if not row.is_fitted:
             failures.append(Failure(row.name, row.outcome, row.message))
     n = len(keys)
-    return BatchSummary(FORMAT, seed, versions(), n, n_fitted, n - n_fitted, tuple(failures), tuple(run.boards.aside))
+    return BatchSummary(FORMAT, seed, run.versions, n, n_fitted, n - n_fitted, tuple(failures), tuple(run.boards.aside))
