@@ -18,7 +18,7 @@ def card_text(name: str, factor: float = 1.0) -> str:
     return text
 
 
-def write_cards(folder: Path, names: str = "abc", bad: bool = True) -> Path:
+def write_cards(folder: Path, names: str = "ab", bad: bool = True) -> Path:
     """Boards of one letter each, and a card with a fault and one that is not TOML."""
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:

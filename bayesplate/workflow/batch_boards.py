@@ -69,9 +69,9 @@ class Folder:
         for at, file in enumerate(self._paths):
             content = _content_of(file)
             if not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys():
-                aside.append(file.name)
+                aside.append(plain(file.name))
             else:
-                entries.append(Entry(file.stem, at, _alike(content)))
+                entries.append(Entry(plain(file.stem), at, _alike(content)))
         if not entries:
             raise InputError(Fault(plain(str(path)), "a folder with board cards (NAME.toml)", "none in it"))
         self.entries: Sequence[Entry] = entries
@@ -103,7 +103,7 @@ class Table:
         self._columns = Columns(Template(template), header, file)
         if not self._rows:
             raise InputError(Fault(file, "a row for each board", "no row"))
-        named = [(self._columns.name_of(row) or f"row-{i}", i) for i, row in enumerate(self._rows, start=1)]
+        named = [(plain(self._columns.name_of(row)) or f"row-{i}", i) for i, row in enumerate(self._rows, start=1)]
         self.entries: Sequence[Entry] = [Entry(name, i) for name, i in sorted(named)]
         self.aside: Sequence[str] = ()
 

@@ -18,6 +18,8 @@ _AHEAD = 2
 """Boards that wait for each worker."""
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PATIENCE = "20s"
+_PRELOADED = ("bayesplate.workflow.fit_board", "scipy.stats", "scipy.sparse.linalg", "emcee", "skfem")
+"""What every fit imports, loaded once for all workers."""
 
 Key = TypeVar("Key")
 Left = TypeVar("Left")
@@ -84,7 +86,7 @@ def _context() -> Any:
     methods = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if "forkserver" in methods:
-        context.set_forkserver_preload(["bayesplate.workflow.fit_board"])
+        context.set_forkserver_preload(list(_PRELOADED))
     return context
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bayesplate.cards import BoardCard, CoefficientCard, NamedCards, PriorCard
-from bayesplate.errors import NotConvergedError
+from bayesplate.errors import Fault, NotConvergedError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.posterior.inference import Inference
@@ -34,7 +34,7 @@ class FitRequest:
     robust : bool
         Student's distribution for the noise.
     tables : dict of CoefficientCard
-        The published coefficients that the setups of a card name.
+        The published coefficients that the setups of a card name, by setup.
     """
 
     seed: int = 1
@@ -85,7 +85,17 @@ def _problem(board: Board | BoardCard, prior: PriorCard, request: FitRequest) ->
 def _prepared(board: Board | BoardCard, prior: PriorCard, request: FitRequest) -> Prepared:
     if isinstance(board, Board):
         return prepare(board, request.effects, prior=prior)
-    return prepared_card(board, NamedCards(prior, request.tables, ()), request.effects)
+    lacking = tuple(
+        Fault(
+            f"request tables {setup.name}",
+            "the published coefficients that the card names",
+            "none",
+            f'tables={{"{setup.name}": ...}} of the FitRequest',
+        )
+        for setup in board.setups
+        if setup.published_coefficients is not None and setup.name not in request.tables
+    )
+    return prepared_card(board, NamedCards(prior, request.tables, lacking), request.effects)
 
 
 def _refuse(inference: Inference) -> None:
