@@ -41,7 +41,10 @@ Floats = NDArray[np.float64]
 MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
 _ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.25, 16
-_MOST_PAIRS, _MOST_LABELLED = 15, 12
+_MOST_PAIRS, _MOST_LABELLED, _MOST_BARS = 15, 12, 60
+_MOST_VECTORS = 1000
+"""Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
+_NINETY = 1.645
 _COLOURS = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
@@ -60,7 +63,7 @@ def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
 def sorted_picture(graded: Grading) -> Picture:
     """The boards sorted by each constant, the largest on top, with their 90 % intervals."""
     n = len(graded.names)
-    is_named = n <= MOST_NAMED
+    is_named, as_pixels = n <= MOST_NAMED, n > _MOST_VECTORS
     height = _ROW * n + 0.1 if is_named else _CROWD
     figure, panels = stacked([height] * 3, left=_LEFT if is_named else 0.75, top=0.3, bottom=0.5, gap=0.75)
     told = []
@@ -69,9 +72,10 @@ def sorted_picture(graded: Grading) -> Picture:
         order = np.argsort(-middle, kind="stable")
         _limit_band(panel, graded, name)
         rows = np.arange(n)
-        panel.hlines(rows, low[order], high[order], color=BLUE, lw=1.8 if is_named else 0.8)
+        panel.hlines(rows, low[order], high[order], color=BLUE if is_named else SKY, lw=1.8 if is_named else 0.8,
+                     rasterized=as_pixels)  # fmt: skip
         panel.plot(middle[order], rows, "o", color=BLUE, mec="black", mew=0.5 if is_named else 0.0,
-                   ms=5 if is_named else 2)  # fmt: skip
+                   ms=5 if is_named else 1.5, zorder=3, rasterized=as_pixels)  # fmt: skip
         if is_named:
             _named_rows(panel, [graded.names[i] for i in order])
         else:
@@ -91,9 +95,12 @@ def speed_picture(graded: Grading) -> Picture:
     """Density against the wave speed along the grain, with lines of equal radiation ratio."""
     figure, (panel,) = stacked([3.0], left=0.75, bottom=0.6)
     density, speed = graded.spread(FIGURES["density"]), graded.spread(FIGURES["wave_speed_x"])
+    is_crowd = len(graded.names) > _MOST_BARS
+    bars: dict[str, Any] = {} if is_crowd else {"xerr": _ends(density), "yerr": _ends(speed)}
     panel.errorbar(
-        density[0], speed[0], xerr=_ends(density), yerr=_ends(speed), fmt="o", color=BLUE, mec="black", mew=0.5, ms=4,
+        density[0], speed[0], **bars, fmt="o", color=BLUE, mec="black", mew=0.5, ms=4,
         elinewidth=0.9, ecolor=GREY, zorder=3,
+        rasterized=len(graded.names) > _MOST_VECTORS,
     )  # fmt: skip
     width = max(float(np.ptp(density[0])), 0.05 * float(density[0].mean()))
     middle = 0.5 * float(density[0].min() + density[0].max())
@@ -111,8 +118,8 @@ def speed_picture(graded: Grading) -> Picture:
         f"{speed[0].max():.0f} m/s, radiation ratio {ratio.min():.1f} to {ratio.max():.1f} m⁴/(kg s)."
     )
     caption = (
-        "Light and stiff boards are at the upper left. Grey lines: equal radiation ratio, wave speed over density. "
-        "Bars: 90 % intervals."
+        "Light and stiff boards are at the upper left. Grey lines: equal radiation ratio, wave speed over density."
+        + ("" if is_crowd else " Bars: 90 % intervals.")
     )
     return Picture("density-speed", "Light and stiff", alt, caption, figure)
 
@@ -121,20 +128,24 @@ def limits_picture(graded: Grading) -> Picture:
     """How probably the boards meet all limits, the most probable first."""
     assert graded.meets_all is not None
     order = best_first(graded)
-    shown = order[:MOST_NAMED]
-    figure, (panel,) = stacked([_ROW * len(shown) + 0.1], left=_LEFT, bottom=0.5)
-    for row, i in enumerate(shown):
-        value = 100.0 * float(graded.meets_all[i])
-        colour = GREEN if value >= 90.0 else VERMILLION if value < 10.0 else SKY
-        panel.barh(row, value, height=0.65, color=colour, edgecolor="black", lw=0.5)
-    _named_rows(panel, [graded.names[i] for i in shown])
+    is_named = len(order) <= MOST_NAMED
+    values = 100.0 * graded.meets_all[order]
+    figure, (panel,) = stacked([_ROW * len(order) + 0.1 if is_named else _CROWD], left=_LEFT, bottom=0.5)
+    if is_named:
+        colours = [GREEN if value >= 90.0 else VERMILLION if value < 10.0 else SKY for value in values]
+        panel.barh(np.arange(len(order)), values, height=0.65, color=colours, edgecolor="black", lw=0.5)
+        _named_rows(panel, [graded.names[i] for i in order])
+    else:
+        panel.plot(values, np.arange(1, len(order) + 1), color=BLUE, lw=1.6)
+        panel.set(ylim=(len(order), 0))
+        panel.set_ylabel("boards, the likeliest on top", fontsize=SMALL)
+        panel.grid(axis="x", color="0.9", lw=0.6)
     panel.set_xlim(0, 100)
     panel.axvline(90, color=DARK, lw=0.8, ls="--")
     panel.set_xlabel("probability that the board meets all limits, %", fontsize=SMALL)
     n_sure = int((graded.meets_all >= 0.9).sum())
     alt = f"{n_sure} of {len(order)} boards meet all limits with 90 % or more."
-    rest = f" The {len(shown)} likeliest of {len(order)}." if len(shown) < len(order) else ""
-    caption = f"{alt}{rest} Green: 90 % and more; red: less than 10 %."
+    caption = f"{alt}{' Green: 90 % and more; red: less than 10 %.' if is_named else ''}"
     return Picture("limits", "Which boards meet the specification", alt, caption, figure)
 
 
@@ -147,14 +158,14 @@ def pairs_picture(graded: Grading) -> Picture:
         both = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
             mean, sd = FIGURES[name].log(graded.log_mean[both], graded.log_covariance[both])
-            middle, spread = 100.0 * (mean[1] - mean[0]), 164.5 * float(np.sqrt((sd**2).sum()))
+            apart, spread = float(mean[1] - mean[0]), _NINETY * float(np.sqrt((sd**2).sum()))
+            low, middle, high = (100.0 * np.expm1(apart + at * spread) for at in (-1.0, 0.0, 1.0))
             colour, marker = _COLOURS[name]
-            panel.hlines(row + step, middle - spread, middle + spread, color=colour, lw=1.6)
+            panel.hlines(row + step, low, high, color=colour, lw=1.6)
             panel.plot(middle, row + step, marker, color=colour, mec="black", mew=0.5, ms=4.5)
     widths = sorted({graded.request.match_percent.get(name, 0.0) for name in names})
     for width in widths:
-        reach = 100.0 * np.log1p(width / 100.0)
-        panel.axvspan(-reach, reach, color=LIGHT, zorder=0)
+        panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)
     panel.axvline(0, color=DARK, lw=0.8)
     titles = [
         f"{short(drawable(graded.names[p.first]), 9)} & {short(drawable(graded.names[p.second]), 9)}, "
@@ -162,7 +173,7 @@ def pairs_picture(graded: Grading) -> Picture:
         for p in shown
     ]
     _named_rows(panel, titles, longest=40)
-    panel.set_xlabel("the partner's constants over the board's, ln, %", fontsize=SMALL)
+    panel.set_xlabel("constants of the partner over the board's, %", fontsize=SMALL)
     legend_below(figure, [_handle(*_COLOURS[name], in_figure(name)) for name in names], 3)
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)
     caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where all its bars lie in the grey."

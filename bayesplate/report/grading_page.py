@@ -74,7 +74,7 @@ def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
         limits = ", ".join(limit_told(name, limit) for name, limit in graded.request.limits.items())
         n_sure, n_maybe = int((graded.meets_all >= 0.9).sum()), int((graded.meets_all >= 0.5).sum())
         told.append(
-            f"{limits}: {n_sure} boards meet this with 90 % or more, {n_maybe} more likely than not; "
+            f"{limits}: {n_sure} boards meet this with 90 % or more, {n_maybe} with 50 % or more; "
             f"{float(graded.meets_all.sum()):.1f} are to be expected."
         )
     if graded.pairs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -104,8 +105,8 @@ def _apart(graded: Grading, first: int, second: int, name: str) -> str:
     """By how much a constant of the second board differs from the first one's, with the standard deviation."""
     both = [first, second]
     mean, sd = FIGURES[name].log(graded.log_mean[both], graded.log_covariance[both])
-    ratio, spread = 100.0 * (float(mean[1] - mean[0])), 100.0 * float((sd**2).sum()) ** 0.5
-    return f"{ratio:+.0f} ± {spread:.0f} %"
+    ratio = math.exp(mean[1] - mean[0])
+    return f"{100.0 * (ratio - 1.0):+.0f} ± {100.0 * ratio * math.hypot(*sd):.0f} %"
 
 
 def write_grading(folder: Path, graded: Grading) -> Path:
