@@ -25,6 +25,7 @@ from bayesplate.cards import load_named, load_prior, read_board_text
 from bayesplate.cli import main
 from bayesplate.errors import BatchError, CheckpointError, InputError
 from bayesplate.results.folder import json_text
+from bayesplate.workflow.batch_boards import boards_of
 from bayesplate.workflow.batch_pool import Call, WorkerDied, computed, processes
 
 WHY = "mend their cards: --resume then fits these alone"
@@ -104,7 +105,7 @@ def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_ag
     (again / "a.toml").unlink()
     (again / "m.toml").write_text(card_text("m", 1.02), encoding="utf-8")
     submitted = []
-    monkeypatch.setattr("bayesplate.workflow.batch.computed", counted(submitted))
+    monkeypatch.setattr("bayesplate.workflow.batch_run.computed", counted(submitted))
 
     result = bayesplate.batch(again, out, workers=1, resume=True, report=False)
 
@@ -232,8 +233,6 @@ def table(tmp_path) -> Path:
 
 
 def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
-    from bayesplate.workflow.batch_boards import boards_of
-
     boards = boards_of(table, table.parent / "template.toml")
     one, two = (boards.card(entry) for entry in boards.entries if entry.name in ("top-1", "top-2"))
 
@@ -247,7 +246,9 @@ def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
 
 def test_bad_rows_are_rows_of_the_table_and_no_name_leaves_the_folder(table, tmp_path, monkeypatch):
     """Nothing is computed here: what the good rows give is another test's. Names are cells that no sheet executes."""
-    monkeypatch.setattr("bayesplate.workflow.batch.computed", lambda workers, calls: (one for one in list(calls)[:0]))
+    monkeypatch.setattr(
+        "bayesplate.workflow.batch_run.computed", lambda workers, calls: (one for one in list(calls)[:0])
+    )
     (tmp_path / "tops.csv").write_text("\n".join(TABLE.splitlines()[:1] + TABLE.splitlines()[3:]))
     result = bayesplate.batch(table, tmp_path / "deep" / "out", template=tmp_path / "template.toml", folders=True)
 
@@ -263,6 +264,23 @@ def test_bad_rows_are_rows_of_the_table_and_no_name_leaves_the_folder(table, tmp
     assert not (result.folder / "boards").exists()
     page = (result.folder / "grading.html").read_text(encoding="utf-8")
     assert "Boards that were not fitted" in page
+
+
+def test_a_table_in_parquet_says_the_same(table, tmp_path):
+    """Numbers as numbers, nothing where there is nothing."""
+    reason = "pyarrow is not installed: pip install 'bayesplate[parquet]'"
+    arrow, parquet = (pytest.importorskip(name, reason=reason) for name in ("pyarrow", "pyarrow.parquet"))
+    rows = list(csv.DictReader(io.StringIO(TABLE)))[:2]
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    hertz = {name: [float(one) if one else None for one in columns[name]] for name in columns if "(" in name}
+    parquet.write_table(arrow.table(columns | hertz), tmp_path / "tops.parquet")
+    kinds = (boards_of(tmp_path / file, tmp_path / "template.toml") for file in ("tops.csv", "tops.parquet"))
+
+    one, two = (
+        [boards.card(entry) for entry in boards.entries if entry.name.startswith("top-")][:2] for boards in kinds
+    )
+
+    assert [card.text for card in one] == [card.text for card in two]
 
 
 HEADERS = [
