@@ -64,7 +64,7 @@ def measured(cards: Path, out: Path, workers: Sequence[str], told: str) -> Measu
     cpu: dict[int, float] = {}
     peak: dict[int, float] = {}
     while not (ended := os.wait4(run.pid, os.WNOHANG))[0]:
-        for pid, seconds, bytes_held in _session(run.pid):
+        for pid, seconds, bytes_held in _descendants(os.getpid()):
             cpu[pid], peak[pid] = seconds, max(bytes_held, peak.get(pid, 0.0))
         time.sleep(0.1)
     run.returncode = os.waitstatus_to_exitcode(ended[1])
@@ -84,17 +84,22 @@ def measured(cards: Path, out: Path, workers: Sequence[str], told: str) -> Measu
     )
 
 
-def _session(session: int) -> Iterator[tuple[int, float, float]]:
-    """Every process of a session: its id, processor seconds, and bytes in memory."""
+def _descendants(ancestor: int) -> Iterator[tuple[int, float, float]]:
+    """Every process that comes from one: its id, processor seconds, and bytes in memory."""
     page = os.sysconf("SC_PAGE_SIZE")
+    found: dict[int, list[str]] = {}
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
             try:
-                fields = (folder / "stat").read_text().rpartition(")")[2].split()
-            except (OSError, IndexError):
+                found[int(folder.name)] = (folder / "stat").read_text().rpartition(")")[2].split()
+            except OSError:
                 continue
-            if int(fields[3]) == session:
-                yield int(folder.name), (int(fields[11]) + int(fields[12])) / _TICKS, float(fields[21]) * page
+    family = {ancestor}
+    while more := {pid for pid, fields in found.items() if int(fields[1]) in family} - family:
+        family |= more
+    for pid in family - {ancestor}:
+        fields = found[pid]
+        yield pid, (int(fields[11]) + int(fields[12])) / _TICKS, float(fields[21]) * page
 
 
 def main() -> None:
