@@ -8,6 +8,7 @@
     modes(card)      the lowest modes and their Chladni figures
     cite(card)       references of exactly what a fit uses
     pick(files)      recordings of hits, taps or sweeps to frequencies
+    batch(folder)    many boards to one table, on all cores or on a cluster
     new(path)        a first card, to be completed
 
 `card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
@@ -60,8 +61,10 @@ if TYPE_CHECKING:
     from bayesplate.recordings.contract import PickReport
     from bayesplate.results.checking import CheckReport
     from bayesplate.results.comparison import Comparison
+    from bayesplate.results.grading import Grading, GradingRequest
     from bayesplate.results.sheets import ModesReport
     from bayesplate.results.summary import Summary
+    from bayesplate.workflow.batch import BatchResult, batch
     from bayesplate.workflow.campaign import Campaign
     from bayesplate.workflow.campaign_diagnose import CampaignDiagnoseResult
     from bayesplate.workflow.campaign_result import CampaignFitResult
@@ -70,6 +73,7 @@ if TYPE_CHECKING:
     from bayesplate.workflow.compare import CompareResult, compare
     from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
     from bayesplate.workflow.fit import FitResult, fit
+    from bayesplate.workflow.fit_board import FitRequest, fit_board
     from bayesplate.workflow.modes import ModesResult, modes
     from bayesplate.workflow.new import new
     from bayesplate.workflow.pick import PickResult, pick
@@ -79,6 +83,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AttachedItem",
     "BatchError",
+    "BatchResult",
     "BayesplateError",
     "Board",
     "Campaign",
@@ -96,7 +101,10 @@ __all__ = [
     "DiagnoseResult",
     "Diagnosis",
     "Fault",
+    "FitRequest",
     "FitResult",
+    "Grading",
+    "GradingRequest",
     "InputError",
     "Label",
     "ModesReport",
@@ -114,11 +122,13 @@ __all__ = [
     "Reading",
     "Setup",
     "Summary",
+    "batch",
     "check",
     "cite",
     "compare",
     "diagnose",
     "fit",
+    "fit_board",
     "modes",
     "new",
     "pick",
@@ -128,6 +138,7 @@ __all__ = [
 _HOMES = {
     "AttachedItem": "bayesplate.plate.setup",
     "BatchError": "bayesplate.errors",
+    "BatchResult": "bayesplate.workflow.batch",
     "BayesplateError": "bayesplate.errors",
     "Board": "bayesplate.plate.board",
     "Campaign": "bayesplate.workflow.campaign",
@@ -145,7 +156,10 @@ _HOMES = {
     "DiagnoseResult": "bayesplate.workflow.diagnose",
     "Diagnosis": "bayesplate.diagnosis.wording.diagnosis",
     "Fault": "bayesplate.errors",
+    "FitRequest": "bayesplate.workflow.fit_board",
     "FitResult": "bayesplate.workflow.fit",
+    "Grading": "bayesplate.results.grading",
+    "GradingRequest": "bayesplate.results.grading",
     "InputError": "bayesplate.errors",
     "Label": "bayesplate.labels",
     "ModesReport": "bayesplate.results.sheets",
@@ -163,11 +177,13 @@ _HOMES = {
     "Reading": "bayesplate.plate.measured",
     "Setup": "bayesplate.plate.setup",
     "Summary": "bayesplate.results.summary",
+    "batch": "bayesplate.workflow.batch",
     "check": "bayesplate.workflow.check",
     "cite": "bayesplate.workflow.cite",
     "compare": "bayesplate.workflow.compare",
     "diagnose": "bayesplate.workflow.diagnose",
     "fit": "bayesplate.workflow.fit",
+    "fit_board": "bayesplate.workflow.fit_board",
     "new": "bayesplate.workflow.new",
     "pick": "bayesplate.workflow.pick",
     "plan": "bayesplate.workflow.plan",

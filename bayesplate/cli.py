@@ -454,5 +454,58 @@ def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug
             say(cite_text(sections), nl=False)
 
 
+@main.command()
+@click.argument("source")
+@click.option("--template", metavar="CARD", help="With a table: the card of what is common to its boards.")
+@click.option("--workers", type=click.IntRange(1), help="Processes (default: one for each core).")
+@click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster that computes in their place.")
+@click.option("--folders", is_flag=True, help="Write the files of fit for each board too, into boards/NAME.")
+@click.option("--table", type=click.Choice(["csv", "parquet"]), default="csv", show_default=True)
+@click.option("--match", metavar="PERCENT", help="Boards match within this: 10 (default), or E_x=10,E_y=15.")
+@click.option("--limit", multiple=True, metavar="NAME=LEAST:GREATEST", help="A specification: E_x=10:14, density=:420.")
+@click.option("--rigidity", type=float, metavar="NM", help="D_x for which each board's thickness is wanted.")
+@_options("out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
+def batch(
+    source: str,
+    out: str | None,
+    linear: bool,
+    exact: bool,
+    match: str | None,
+    limit: tuple[str, ...],
+    rigidity: float | None,
+    as_json: bool,
+    quiet: bool,
+    debug: bool,
+    **asked: Any,
+) -> None:
+    """Fit the cards of the folder SOURCE, or the rows of the table SOURCE: one table, and a page that grades them."""
+    _refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
+    _refuse_both(linear, exact, "--linear and --exact force different laws")
+    _refuse_both(asked["workers"] is not None, asked["dask"] is not None, "--workers are processes here, --dask others")
+    with reporting(as_json=as_json, debug=debug):
+        with progress_line(shown=not quiet and not as_json) as tell:
+            from bayesplate.workflow.batch import batch as run
+            from bayesplate.workflow.batch import default_batch_folder
+            from bayesplate.workflow.batch_grading import grading_request
+
+            result = run(
+                source,
+                default_batch_folder(source) if out is None else out,
+                law="linear" if linear else "exact" if exact else None,
+                grading=grading_request(match, limit, rigidity),
+                progress=tell,
+                **asked,
+            )
+        if as_json:
+            print_json(result.summary)
+        elif not quiet:
+            from bayesplate.workflow.shown import show_batch
+
+            print_shown(show_batch(result.summary, result.grading))
+            say(f"written to {result.folder}")
+    with reporting(as_json=False, debug=debug):
+        result.require_all()
+
+
 if __name__ == "__main__":
     main()

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from bayesplate.results.contract import Elastic, Rigidity, Spread
+from bayesplate.results.joint import JOINT, Joint
 from bayesplate.results.modes import ModeRow, Prediction, over
 from bayesplate.results.peaks import AssignedPeak, Assignment, PredictedMode, Spectrum
 from bayesplate.results.summary import (
@@ -67,6 +68,7 @@ SUMMARY = Summary(
     noise={"bench": spread(0.005, 0.001, "1")},
     inputs={"thickness": spread(3e-3, 5e-5, "m")},
     derived={name: spread(value, value / 50, "1") for name, value in DERIVED.items()},
+    joint=Joint(JOINT, (0.0,) * 7, ((0.0,) * 7,) * 7),
     least_squares=POINT,
     weighted_least_squares=WEIGHTED,
     percentile=Percentile(

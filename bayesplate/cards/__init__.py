@@ -14,6 +14,7 @@ from bayesplate.cards.named import NamedCards, load_named
 from bayesplate.cards.physical import physical_faults, plate_mass_g
 from bayesplate.cards.prior import PriorCard, StatedPrior, load_prior
 from bayesplate.cards.remarks import remarks
+from bayesplate.cards.rows import Columns, Template
 from bayesplate.cards.setup import (
     MISSED,
     SPURIOUS,
@@ -24,8 +25,8 @@ from bayesplate.cards.setup import (
     PeakSection,
     SetupSection,
 )
-from bayesplate.cards.shelf import card_names
-from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
+from bayesplate.cards.shelf import card_names, find
+from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES, plain
 
 __all__ = [
     "DEFAULT_POISSON",
@@ -39,6 +40,7 @@ __all__ = [
     "BoardCard",
     "CampaignCard",
     "CoefficientCard",
+    "Columns",
     "Edges",
     "HammerSection",
     "MaterialSection",
@@ -49,7 +51,9 @@ __all__ = [
     "SetupSection",
     "SharedSection",
     "StatedPrior",
+    "Template",
     "card_names",
+    "find",
     "is_campaign",
     "load_board",
     "load_campaign",
@@ -57,6 +61,7 @@ __all__ = [
     "load_named",
     "load_prior",
     "physical_faults",
+    "plain",
     "plate_mass_g",
     "read_board_text",
     "remarks",

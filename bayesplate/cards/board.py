@@ -165,12 +165,21 @@ def load_board(
 
 
 def read_board_text(
-    text: str, name: str, *, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
+    text: str,
+    name: str,
+    *,
+    may_lack_frequencies: bool = False,
+    setup: str | os.PathLike[str] | None = None,
+    beside: Path | None = None,
 ) -> BoardCard:
-    """Read a board card from a text, as if it stood in NAME.toml; raises InputError like `load_board`."""
+    """Read a board card from a text, as if it stood in NAME.toml; raises InputError like `load_board`.
+
+    The cards that it names by a relative path are looked for in the folder `beside`, by default the working directory.
+    """
     stem = name.removesuffix(".toml")
     data = text.encode("utf-8", "surrogatepass")
-    return _read_board(data, f"{plain(stem)}.toml", stem, None, may_lack_frequencies, setup)
+    path = None if beside is None else beside / f"{plain(stem)}.toml"
+    return _read_board(data, f"{plain(stem)}.toml", stem, path, may_lack_frequencies, setup)
 
 
 def _read_board(

@@ -23,6 +23,8 @@ Group = tuple[Rows, Rows, Floats]
 
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""
+_DRAWS_AT_ONCE = 512
+"""Enough for the arithmetic to be done in compiled code; thousands at once would hold gigabytes."""
 _SIGNS = {"+": 1, "-": -1, "": 0}
 
 
@@ -142,18 +144,23 @@ class PeakLikelihood:
         (n_draws,) array
             -inf where a mode has no frequency.
         """
+        there = every_log_frequency[:, self.columns]
+        has_all = np.flatnonzero(np.isfinite(there).all(axis=1))
+        result = np.full(len(there), -np.inf)
+        for start in range(0, has_all.size, _DRAWS_AT_ONCE):
+            some = has_all[start : start + _DRAWS_AT_ONCE]
+            result[some] = self._log_sum(there[some], noise[some])
+        return result
+
+    def _log_sum(self, there: Floats, noise: Floats) -> Floats:
+        """`log_likelihood` of a few draws that have all modes: each takes peaks times modes times orders of memory."""
         from scipy.special import logsumexp
 
-        there = every_log_frequency[:, self.columns]
-        has_all = np.isfinite(there).all(axis=1)
-        result = np.full(len(there), -np.inf)
-        if has_all.any():
-            by_order = self._assignments(there[has_all], noise[has_all])
-            total = logsumexp([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
-            # A mode in two orders was counted as missed in one of them at least.
-            twice = self._missed(there[has_all], noise[has_all])[:, self.shared]
-            result[has_all] = total - np.log(np.maximum(twice, LEAST)).sum(axis=1)
-        return result
+        by_order = self._assignments(there, noise)
+        total = logsumexp([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
+        # A mode in two orders was counted as missed in one of them at least.
+        twice = self._missed(there, noise)[:, self.shared]
+        return np.asarray(total - np.log(np.maximum(twice, LEAST)).sum(axis=1))
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
         """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes) array; the rest: it is none.

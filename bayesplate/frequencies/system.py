@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from bayesplate.frequencies.fabric import fabric_of, over_fields
 from bayesplate.frequencies.shear_terms import shear_term_weights
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes.hermite import Hold, Holds
+from bayesplate.modes.keeping import kept
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.modes.plate import PlateMatrices, Weights
@@ -23,6 +24,9 @@ from bayesplate.modes.thin import assemble, thin_masses, thin_terms
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.setup import Ends, Setup
+
+_MOST_BYTES = 250_000_000
+"""Of the matrices that are kept: those of hundreds of bare plates, or of a few with fields and fine meshes."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +136,11 @@ def _only_projects(effect: Effect) -> bool:
     )
 
 
-@lru_cache(maxsize=16)
+def _n_bytes(plate: PlateMatrices) -> int:
+    return sum(one.nbytes for b in plate.blocks for one in (b.terms, b.masses, b.indices, b.indptr))
+
+
+@kept(_MOST_BYTES, _n_bytes)
 def _assembled(
     ends_x: Ends, ends_y: Ends, theory: Theory, effects: tuple[Effect, ...], n_x: int, n_y: int
 ) -> PlateMatrices:

@@ -28,7 +28,8 @@ FIGURES = "figures"
 CONSTANTS = ("constants.csv", "constants.tex")
 BEFORE_AFTER = ("before-after.csv", "before-after.tex")
 KNOWN_EFFECTS = ("known-effects.csv", "known-effects.tex")
-RESULTS = (SUMMARY, ARCHIVE, DIAGNOSIS, PAGE, *CONSTANTS, *BEFORE_AFTER, *KNOWN_EFFECTS)
+BATCH = ("batch.json", "boards.jsonl", "boards.csv", "boards.parquet", "grading.csv", "grading.html")
+RESULTS = (SUMMARY, ARCHIVE, DIAGNOSIS, PAGE, *CONSTANTS, *BEFORE_AFTER, *KNOWN_EFFECTS, *BATCH)
 """What a run leaves besides its figures, and the next one in the same folder replaces."""
 BESIDE = ("compare.json", "modes.png", "modes.svg", "plan.json")
 """Files of commands that share the folder with a fit: they do not make it a used one."""

@@ -19,6 +19,7 @@ from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
+from bayesplate.results.joint import Joint
 from bayesplate.results.modes import mode_rows
 from bayesplate.results.peaks import assigned_peaks
 from bayesplate.results.summary import (
@@ -102,6 +103,7 @@ def summarise(
             one.name: Spread.of(draws.inputs[one.name], one.unit) for one in board.uncertain if not one.is_of_effect
         },
         derived={name: Spread.of(item.values, item.unit) for name, item in draws.derived.items()},
+        joint=Joint.of(draws),
         least_squares=_paper_least_squares(system),
         weighted_least_squares=_weighted(problem),
         percentile=_percentile(system),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from html import escape
 
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
+from bayesplate.results.joint import Joint
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.peaks import AssignedPeak, Spectrum
 from bayesplate.results.words import GPA, constant_name, interval, plus_minus
@@ -142,6 +143,8 @@ class Summary(Run):
         Relative, by setup.
     inputs, derived : dict of Spread
         Uncertain inputs of the card, and what makers derive from the constants, by name.
+    joint : Joint
+        How the constants and the density vary together.
     least_squares, weighted_least_squares : PointEstimate
         The paper's, and that of relative errors.
     percentile : Percentile or None
@@ -164,6 +167,7 @@ class Summary(Run):
     noise: Mapping[str, Spread]
     inputs: Mapping[str, Spread]
     derived: Mapping[str, Spread]
+    joint: Joint
     least_squares: PointEstimate
     weighted_least_squares: PointEstimate
     percentile: Percentile | None

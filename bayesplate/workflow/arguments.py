@@ -11,7 +11,7 @@ from typing import TypeGuard, get_args
 
 import numpy as np
 
-from bayesplate.cards import CampaignCard, PriorCard
+from bayesplate.cards import BoardCard, CampaignCard, PriorCard
 from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
@@ -20,6 +20,8 @@ from bayesplate.planning.proposals import GOALS, Costs
 from bayesplate.plate.board import Board
 from bayesplate.recordings.reading import CHANNELS
 from bayesplate.recordings.signals import MOTIONS
+from bayesplate.results.board_table import TableKind
+from bayesplate.workflow.batch_grading import grading_faults
 from bayesplate.workflow.prepare import Prepared
 
 Check = Callable[[str, object], Iterator[Fault]]
@@ -31,9 +33,7 @@ def require_arguments(**given: object) -> None:
     Parameters
     ----------
     **given
-        Any of card, prior, setup, out, seed, effects, law, robust, coefficients, report, force, resume, n_null,
-        progress; for recordings files, card_or_none, rate, places (hammer, sensor and the number of files),
-        sensor_mass, channels, motion, polarity, band (lowest and highest), sand; for plans goal, costs, between.
+        Any of those of `_CHECKS`.
 
     Raises
     ------
@@ -62,6 +62,35 @@ def _prior(name: str, value: object) -> Iterator[Fault]:
     if value is not None and not isinstance(value, PriorCard):
         for fault in _path(name, value):
             yield replace(fault, wanted="a name, a path or a PriorCard")
+
+
+def _board(name: str, value: object) -> Iterator[Fault]:
+    if not isinstance(value, Board | BoardCard):
+        yield Fault(name, "a Board or a BoardCard", _shown(value))
+
+
+def _prior_card(name: str, value: object) -> Iterator[Fault]:
+    if not isinstance(value, PriorCard):
+        yield Fault(name, "a PriorCard", _shown(value))
+
+
+def _request(name: str, value: object) -> Iterator[Fault]:
+    """What a fit is asked for: its own entries, checked as the arguments of that name are."""
+    for key in ("seed", "effects", "law", "robust"):
+        if not hasattr(value, key):
+            yield Fault(name, "a FitRequest", _shown(value))
+            return
+        yield from _CHECKS[key](f"{name} {key}", getattr(value, key))
+
+
+def _workers(name: str, value: object) -> Iterator[Fault]:
+    if value is not None:
+        yield from _whole(1)(name, value)
+
+
+def _table(name: str, value: object) -> Iterator[Fault]:
+    if value not in get_args(TableKind):
+        yield Fault(name, " or ".join(map(quoted, get_args(TableKind))), _shown(value))
 
 
 def _path(name: str, value: object) -> Iterator[Fault]:
@@ -224,4 +253,13 @@ _CHECKS: dict[str, Check] = {
     "goal": _word(GOALS),
     "costs": _costs,
     "between": _effects,
+    "board": _board,
+    "prior_card": _prior_card,
+    "request": _request,
+    **dict.fromkeys(("source", "out_folder"), _path),
+    **dict.fromkeys(("template", "dask"), _path_or_none),
+    "workers": _workers,
+    "table": _table,
+    "grading": grading_faults,
+    "folders": _switch,
 }

@@ -68,7 +68,7 @@ class Prepared:
 
     def with_effects(self, effects: Sequence[str]) -> Prepared:
         """The same cards, not read again, with other declared effects; raises InputError as `prepare`."""
-        return _prepared(self.card, self.named, effects)
+        return prepared_card(self.card, self.named, effects)
 
 
 def default_folder(card: str | os.PathLike[str]) -> Path:
@@ -121,17 +121,19 @@ def prepare(
     given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
     if not isinstance(card, Board):
         read = load_board(card, may_lack_frequencies=may_lack_frequencies, setup=setup)
-        return _prepared(read, load_named(read, given), effects)
+        return prepared_card(read, load_named(read, given), effects)
     read = read_board_text(card_text(card), card.name, may_lack_frequencies=may_lack_frequencies, setup=setup)
     found = ((setup.name, setup.published_coefficients) for setup in card.setups)
-    prepared = _prepared(read, load_named(read, given, {name: one for name, one in found if one is not None}), effects)
+    named = load_named(read, given, {name: one for name, one in found if one is not None})
+    prepared = prepared_card(read, named, effects)
     lost = list(_lost(card, prepared.board)) if setup is None else []
     if lost:
         raise InputError(lost)
     return prepared
 
 
-def _prepared(read: BoardCard, named: NamedCards, effects: Sequence[str] | None) -> Prepared:
+def prepared_card(read: BoardCard, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:
+    """The same of cards that were read already: no file is looked at; raises as `prepare`."""
     stated = board_from_card(read, named.prior, named.tables)
     listed = (*stated.effects, *implied_effects(stated)) if effects is None else effects
     board = replace(stated, effects=tuple(dict.fromkeys(listed)))

@@ -16,6 +16,7 @@ from bayesplate.planning.plan import Plan
 from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
+from bayesplate.results.batch_summary import BatchSummary
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.command_tables import (
     METHODS_REMARK,
@@ -27,6 +28,8 @@ from bayesplate.results.command_tables import (
 )
 from bayesplate.results.comparison import Comparison
 from bayesplate.results.folder import json_text
+from bayesplate.results.grading import Grading
+from bayesplate.results.grading_table import MOST_ON_TERMINAL, grading_tables
 from bayesplate.results.notebook import html
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
@@ -39,6 +42,7 @@ __all__ = [
     "Table",
     "json_text",
     "progress_text",
+    "show_batch",
     "show_check",
     "show_compare",
     "show_diagnosis",
@@ -108,6 +112,14 @@ def _show_campaign_fit(summary: CampaignSummary) -> Shown:
     pooled = (sum(error**2 for error in errors) / len(errors)) ** 0.5
     closing = f"{len(errors)} boards; error rms {pooled:.1f} cents in sample, each board counted once."
     return Shown(campaign_tables(summary), (), (*summary.warnings, *told), closing)
+
+
+def show_batch(summary: BatchSummary, grading: Grading) -> Shown:
+    """The result of `bayesplate.workflow.batch.batch` for a person."""
+    aside = tuple(f"{file} is a card of another kind and was left aside" for file in summary.aside)
+    closing = f"{summary.n_fitted} of {summary.n_boards} boards fitted."
+    tables = tuple(table for name, table in grading_tables(grading, MOST_ON_TERMINAL).items() if name != "makers")
+    return Shown(tables, aside, (), closing)
 
 
 def show_compare(comparison: Comparison) -> Shown:

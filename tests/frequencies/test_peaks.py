@@ -247,3 +247,19 @@ def test_sure_readings_alone_take_no_part() -> None:
     assert PeakLikelihood.of(model_of(sure)) is None
     assert takes_part(setup_of([reading((1, 1), 100.0, confidence=0.99)]))
     assert takes_part(replace(sure, peaks=(Peak(exact(130.0)),)))
+
+
+def test_draws_are_judged_a_few_at_a_time_and_say_the_same(monkeypatch):
+    """To the last bit, a draw without a frequency among them."""
+    setup = setup_of([reading((1, 1), 100.0)], [Peak(exact(130.0)), Peak(exact(181.0))])
+    likelihood = PeakLikelihood.of(model_of(setup))
+    rng = np.random.default_rng(3)
+    every = every_of(setup, MODES[rng.integers(0, 3, 50)] + 0.01 * rng.standard_normal((50, 5)))
+    every[7, 3] = np.nan
+    noise = np.exp(0.3 * rng.standard_normal(50)) * 0.01
+    together = likelihood.log_likelihood(every, noise)
+    monkeypatch.setattr("bayesplate.frequencies.peaks._DRAWS_AT_ONCE", 4)
+
+    np.testing.assert_array_equal(likelihood.log_likelihood(every, noise), together)
+    assert together[7] == -np.inf
+    assert np.isfinite(np.delete(together, 7)).all()

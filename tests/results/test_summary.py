@@ -21,13 +21,13 @@ MEANS = [*ELASTIC, *RIGIDITY, "effective_draws"]
 
 CONTRACT = {
     "": ["format", "name", "seed", "versions", "card_sha256", "model", "converged", "elastic", "rigidity", "effects",
-         "noise", "inputs", "derived", "least_squares", "weighted_least_squares", "percentile", "linear_means",
+         "noise", "inputs", "derived", "joint", "least_squares", "weighted_least_squares", "percentile", "linear_means",
          "exact_means", "modes", "peaks", "spectra", "error", "sampler", "identifiability", "warnings"],
     "model": ["theory", "law", "effects", "robust", "prior"],
     "elastic": ELASTIC, "elastic/E_x": SPREAD,
     "rigidity": RIGIDITY, "rigidity/D_x": SPREAD,
     "effects/bench/attached_mass/mass": SPREAD, "noise/bench": SPREAD, "inputs/thickness": SPREAD,
-    "derived/anisotropy": SPREAD,
+    "derived/anisotropy": SPREAD, "joint": ["names", "log_mean", "log_covariance"],
     "least_squares": POINT, "weighted_least_squares": POINT,
     "percentile": [*ELASTIC, "n_subsets"], "percentile/E_x": ["mean", "sd_percent"],
     "linear_means": MEANS, "exact_means": MEANS,

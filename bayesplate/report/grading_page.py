@@ -1,0 +1,107 @@
+"""grading.html: many boards sorted by their constants, makers' figures, a specification, and pairs that match."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from bayesplate.report.grading_figures import every_grading_picture
+from bayesplate.report.page import policy, shown_picture, template
+from bayesplate.report.saving import save_pictures
+from bayesplate.results.batch_summary import BatchSummary
+from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
+from bayesplate.results.grading import TARGET, Grading
+from bayesplate.results.grading_table import MOST_LISTED, best_first, grading_tables
+from bayesplate.results.log_figures import limit_told
+from bayesplate.results.pairs import LEAST_PROBABILITY
+from bayesplate.results.tables import Table
+from bayesplate.results.words import percent
+
+GRADING_PAGE = "grading.html"
+_TABLES = ("constants", "makers", "limits", "pairs")
+
+
+def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, has_pages: bool) -> Path:
+    """Write the page and its figures as PNG and SVG.
+
+    Parameters
+    ----------
+    folder : Path
+        Must be there.
+    graded : Grading
+    summary : BatchSummary
+        Of the same boards.
+    has_pages : bool
+        Whether each board has a page of its own in boards/NAME.
+
+    Returns
+    -------
+    Path
+    """
+    from markupsafe import Markup
+
+    make_folder(folder / FIGURES)
+    groups = every_grading_picture(graded)
+    every = [one for found in groups.values() for one in found]
+    vector = save_pictures(every, folder / FIGURES, "svg")
+    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
+    tables: dict[str, Table | None] = {**dict.fromkeys(_TABLES), **grading_tables(graded)}
+    text = template(
+        "grading.html"
+    ).render(
+        policy=policy(css),
+        css=Markup(css),  # our own file; the policy lets in nothing else
+        title=f"{summary.n_fitted} boards, graded",
+        sentences=sentences(graded, summary),
+        failures=failures_table(summary),
+        pictures={place: [shown_picture(one, vector[one.name]) for one in found] for place, found in groups.items()},
+        tables=tables,
+        matching=matching_sentence(graded),
+        has_target=TARGET in graded.request.figures,
+        links=[(graded.names[i], f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
+        if has_pages
+        else [],
+    )
+    write_text(folder / GRADING_PAGE, text)
+    save_pictures(every, folder / FIGURES, "png")
+    return folder / GRADING_PAGE
+
+
+def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
+    """The page in short."""
+    told = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
+    if graded.meets_all is not None and graded.names:
+        limits = ", ".join(limit_told(name, limit) for name, limit in graded.request.limits.items())
+        n_sure, n_maybe = int((graded.meets_all >= 0.9).sum()), int((graded.meets_all >= 0.5).sum())
+        told.append(
+            f"{limits}: {n_sure} boards meet this with 90 % or more, {n_maybe} with 50 % or more; "
+            f"{float(graded.meets_all.sum()):.1f} are to be expected."
+        )
+    if graded.pairs:
+        best = graded.pairs[0]
+        first, second = graded.names[best.first], graded.names[best.second]
+        told.append(
+            f"{len(graded.pairs)} pairs are proposed; the likeliest match is {first} with {second}, "
+            f"{percent(best.probability)}."
+        )
+    return tuple(told)
+
+
+def matching_sentence(graded: Grading) -> str:
+    """When two boards match."""
+    within = ", ".join(f"{name} within {value:g} %" for name, value in graded.request.match_percent.items())
+    return (
+        f"Two boards match where {within}, all at once. The errors of two boards are taken to be independent. The "
+        f"likeliest pair is taken first, then the likeliest of the boards that are left; pairs below "
+        f"{percent(LEAST_PROBABILITY)} are not proposed."
+    )
+
+
+def failures_table(summary: BatchSummary) -> Table | None:
+    """The boards that were not fitted, with the reason; None where all were."""
+    if not summary.failed:
+        return None
+    some = summary.failed[:MOST_LISTED]
+    which = "" if len(some) == len(summary.failed) else f", the first {MOST_LISTED} of {len(summary.failed)}"
+    rows = tuple((one.name, one.outcome, one.message) for one in some)
+    return Table(f"Boards that were not fitted{which}", ("board", "outcome", "message"), rows)

@@ -1,0 +1,100 @@
+"""The journal of a run over many boards: a line for each board that is done, kept for the next run over them.
+
+A line is written at once and whole; what a killed run left of its last one is cut off. A row is found by a key that
+says all that decides it, so that a card that was changed is another board, and one that was moved is not.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from bayesplate.results.board_rows import BoardRow
+from bayesplate.results.folder import writing
+
+
+class Journal:
+    """Rows of boards on disk, by key; in memory is only where they stand.
+
+    Parameters
+    ----------
+    path : Path
+        Made if it is not there; what it holds is read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._places: dict[str, tuple[int, int]] = {}
+        with writing(path):
+            self._stream = path.open("a+b", buffering=0)
+            self._read()
+
+    def _read(self) -> None:
+        """Where each row stands; the last line of a killed run, and any other that is damaged, are none."""
+        self._stream.seek(0)
+        end = 0
+        with self.path.open("rb") as stream:
+            for line in stream:
+                if line.endswith(b"\n"):
+                    key = _key_of(line)
+                    if key is not None:
+                        self._places[key] = (end, len(line))
+                    end += len(line)
+        self._stream.truncate(end)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._places
+
+    def row(self, key: str) -> BoardRow:
+        """The row of a key that is there."""
+        start, length = self._places[key]
+        self._stream.seek(start)
+        return BoardRow.from_json(json.loads(self._stream.read(length))["row"])
+
+    def append(self, key: str, row: BoardRow) -> None:
+        """Add a row; raises UnwritableError at a full disk."""
+        line = _line(key, row)
+        with writing(self.path):
+            start = os.fstat(self._stream.fileno()).st_size
+            if self._stream.write(line) != len(line):
+                self._stream.truncate(start)
+                raise OSError("no space left")
+            self._places[key] = (start, len(line))
+
+    def rows(self, keys: Iterable[str]) -> Iterator[BoardRow]:
+        """The rows of keys, in their order."""
+        return (self.row(key) for key in keys)
+
+    def keep(self, keys: Iterable[str]) -> None:
+        """Write the journal anew with the rows of these keys alone, in their order; it is closed then."""
+        partial = self.path.with_name(self.path.name + ".partial")
+        with writing(self.path):
+            try:
+                with partial.open("wb") as stream:
+                    stream.writelines(_line(key, self.row(key)) for key in keys)
+                    stream.flush()
+                    os.fsync(stream.fileno())
+                os.replace(partial, self.path)
+            finally:
+                partial.unlink(missing_ok=True)
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._stream.close()
+
+
+def _line(key: str, row: BoardRow) -> bytes:
+    return json.dumps({"key": key, "row": row.to_json()}, allow_nan=False).encode() + b"\n"
+
+
+def _key_of(line: bytes) -> str | None:
+    try:
+        found: Any = json.loads(line)
+        BoardRow.from_json(found["row"])
+        return str(found["key"])
+    except (ValueError, KeyError, TypeError):
+        return None

@@ -1,0 +1,137 @@
+"""A board of many as a row of a table: what became of it, its constants, and what makers derive from them; SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.results.contract import Spread, as_json
+from bayesplate.results.joint import JOINT, Joint
+from bayesplate.results.summary import Summary
+
+FITTED = "fitted"
+MAKERS = (
+    "density",
+    "wave_speed_x",
+    "wave_speed_y",
+    "radiation_ratio_x",
+    "radiation_ratio_y",
+    "impedance_x",
+    "anisotropy",
+)
+"""Which of the derived quantities a table of many boards has."""
+_ENDS = ("mean", "sd", "q05", "q50", "q95")
+_CORRELATED = (*MODULI, "density")
+_PAIRS = tuple((a, b) for i, a in enumerate(_CORRELATED) for b in _CORRELATED[i + 1 :])
+WORDS = ("name", "outcome", "message", "card_sha256", "seed", "theory", "law", "effects", "prior")
+"""Columns of texts, but for the seed."""
+NUMBERS = (
+    *(f"{name}_{end}" for name in MODULI for end in _ENDS),
+    *(f"{name}_{end}" for name in (*RIGIDITIES, *MAKERS) for end in ("mean", "sd")),
+    *(f"correlation_{a}_{b}" for a, b in _PAIRS),
+    "n_modes",
+    "in_sample_rms_cents",
+    "leave_one_out_rms_cents",
+    "n_warnings",
+)
+"""Columns of numbers; correlations are those of logarithms."""
+
+
+@dataclass(frozen=True)
+class BoardRow:
+    """What became of one board of many.
+
+    Attributes
+    ----------
+    name : str
+        Of the board; of a card that could not be read that of its file.
+    outcome : str
+        "fitted", or why there are no constants, in two or three words.
+    message : str
+        Of the error; empty for a fitted board.
+    card_sha256 : str
+        Empty where no card could be read.
+    seed : int or None
+    told : dict of str
+        Theory, law, effects and prior of a fitted board.
+    numbers : dict of float
+        Those of `NUMBERS` that a fitted board has.
+    joint : Joint or None
+        How its constants vary together.
+    """
+
+    name: str
+    outcome: str
+    message: str = ""
+    card_sha256: str = ""
+    seed: int | None = None
+    told: Mapping[str, str] | None = None
+    numbers: Mapping[str, float | None] | None = None
+    joint: Joint | None = None
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether it has constants."""
+        return self.outcome == FITTED
+
+    def cells(self) -> list[str | float | int | None]:
+        """The row, in the order of `WORDS` and `NUMBERS`."""
+        told, numbers = self.told or {}, self.numbers or {}
+        texts = [self.name, self.outcome, self.message, self.card_sha256, self.seed]
+        return [*texts, *(told.get(word) for word in WORDS[5:]), *(numbers.get(name) for name in NUMBERS)]
+
+    def to_json(self) -> dict[str, Any]:
+        """The row as JSON keeps it between two runs."""
+        return as_json(self)
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, Any]) -> BoardRow:
+        """The row again, to the last bit."""
+        joint = entry["joint"]
+        if joint is not None:
+            rows = tuple(tuple(row) for row in joint["log_covariance"])
+            joint = Joint(tuple(joint["names"]), tuple(joint["log_mean"]), rows)
+        return cls(**{**entry, "joint": joint})
+
+
+def row_of(summary: Summary) -> BoardRow:
+    """The row of a fitted board."""
+    model = summary.model
+    return BoardRow(
+        name=summary.name,
+        outcome=FITTED,
+        card_sha256=summary.card_sha256,
+        seed=summary.seed,
+        told={
+            "theory": model.theory,
+            "law": model.law,
+            "effects": " ".join(model.effects),
+            "prior": model.prior,
+        },
+        numbers=_numbers(summary),
+        joint=summary.joint,
+    )
+
+
+def _numbers(summary: Summary) -> dict[str, float | None]:
+    found: dict[str, float | None] = {}
+    for name, entry in summary.elastic.items():
+        found |= {f"{name}_{end}": getattr(entry, end) for end in _ENDS}
+    spreads: dict[str, Spread] = {**dict(summary.rigidity.items()), **{name: summary.derived[name] for name in MAKERS}}
+    for name, entry in spreads.items():
+        found |= {f"{name}_mean": entry.mean, f"{name}_sd": entry.sd}
+    found |= {f"correlation_{a}_{b}": _correlation(summary.joint, a, b) for a, b in _PAIRS}
+    found["n_modes"] = float(len(summary.modes))
+    found["in_sample_rms_cents"] = summary.error.in_sample_rms_cents
+    found["leave_one_out_rms_cents"] = summary.error.leave_one_out_rms_cents
+    found["n_warnings"] = float(len(summary.warnings))
+    return found
+
+
+def _correlation(joint: Joint, a: str, b: str) -> float | None:
+    """Of two logarithms; None where one of them is exact."""
+    i, j = JOINT.index(a), JOINT.index(b)
+    spread = (joint.log_covariance[i][i] * joint.log_covariance[j][j]) ** 0.5
+    return joint.log_covariance[i][j] / spread if spread > 0.0 else None

@@ -1,0 +1,109 @@
+"""The table of many boards as CSV or Parquet, written a row at a time, so that its length costs no memory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import Any, Literal
+
+from bayesplate.errors import Fault, InputError
+from bayesplate.results.board_rows import NUMBERS, WORDS, BoardRow
+from bayesplate.results.exports import csv_text
+from bayesplate.results.folder import writing
+
+TableKind = Literal["csv", "parquet"]
+_AT_ONCE = 1000
+_WHOLE = "seed"
+
+
+def table_name(kind: TableKind) -> str:
+    """The file of the table."""
+    return f"boards.{kind}"
+
+
+def require_table_kind(kind: TableKind) -> None:
+    """Check that such a table can be written here.
+
+    Raises
+    ------
+    InputError
+        If it is Parquet and pyarrow is not installed.
+    """
+    if kind == "parquet":
+        parquet_library("--table parquet")
+
+
+def parquet_library(place: str) -> Any:
+    """pyarrow; an InputError with the command that installs it where it is not there."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        remedy = 'pip install "bayesplate[parquet]", or take CSV'
+        raise InputError(Fault(place, "pyarrow, which reads and writes Parquet", "no such library", remedy)) from None
+    return pyarrow
+
+
+def write_table(folder: Path, kind: TableKind, rows: Iterable[BoardRow]) -> Path:
+    """Write the table of some boards, completely or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+        Must be there.
+    kind : "csv" or "parquet"
+    rows : iterable of BoardRow
+
+    Returns
+    -------
+    Path
+    """
+    path = folder / table_name(kind)
+    with _complete(path) as partial:
+        (_write_csv if kind == "csv" else _write_parquet)(partial, rows)
+    return path
+
+
+def _write_csv(path: Path, rows: Iterable[BoardRow]) -> None:
+    write_rows(path, [*WORDS, *NUMBERS], (row.cells() for row in rows))
+
+
+def write_rows(path: Path, header: list[Any], rows: Iterable[list[Any]]) -> None:
+    """Write CSV row after row; a text that looks like a formula begins with an apostrophe."""
+    with path.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write(csv_text([header]))
+        for row in rows:
+            stream.write(csv_text([row]))
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def _write_parquet(path: Path, rows: Iterable[BoardRow]) -> None:
+    arrow = parquet_library("--table parquet")
+    texts = [(word, arrow.int64() if word == _WHOLE else arrow.string()) for word in WORDS]
+    schema = arrow.schema([*texts, *((name, arrow.float64()) for name in NUMBERS)])
+    with arrow.parquet.ParquetWriter(path, schema) as writer:
+        for some in _in_parts(rows, _AT_ONCE):
+            columns = list(zip(*(row.cells() for row in some), strict=True))
+            writer.write_table(arrow.table(dict(zip(schema.names, map(list, columns), strict=True)), schema=schema))
+
+
+def _in_parts(rows: Iterable[BoardRow], n: int) -> Iterator[list[BoardRow]]:
+    source = iter(rows)
+    while some := list(islice(source, n)):
+        yield some
+
+
+@contextmanager
+def _complete(path: Path) -> Iterator[Path]:
+    """A file beside the wanted one, which takes its place when it is complete."""
+    partial = path.with_name(path.name + ".partial")
+    with writing(path):
+        try:
+            yield partial
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)

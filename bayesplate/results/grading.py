@@ -1,0 +1,141 @@
+"""What fitted boards are good for: figures of makers, limits that they meet, and partners that match them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.plate.material import MODULI
+from bayesplate.results.board_rows import BoardRow
+from bayesplate.results.log_figures import FIGURES, LogFigure, target_thickness
+from bayesplate.results.normal_box import box_probability
+from bayesplate.results.pairs import Pair, proposed_pairs
+
+Floats = NDArray[np.float64]
+
+MATCH_PERCENT = 10.0
+TARGET = "target_thickness"
+SHOWN = ("density", "wave_speed_x", "wave_speed_y", "radiation_ratio_x", "anisotropy")
+"""Figures of makers that every grading has."""
+_NINETY = 1.6448536269514722
+"""Half the width of a normal 90 % interval, standard deviations."""
+
+
+@dataclass(frozen=True)
+class GradingRequest:
+    """What boards are graded by.
+
+    Attributes
+    ----------
+    match_percent : dict of float
+        Within how many per cent each constant of two boards has to be for them to match.
+    limits : dict of (float or None, float or None)
+        A specification: least and greatest value of figures by name, SI units; None where there is no limit.
+    rigidity : float or None
+        D_x in N m for which each board's thickness is wanted.
+    """
+
+    match_percent: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(MODULI, MATCH_PERCENT))
+    limits: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    rigidity: float | None = None
+
+    @property
+    def figures(self) -> dict[str, LogFigure]:
+        """What is shown of each board besides its moduli, by name."""
+        names = dict.fromkeys((*SHOWN, *(name for name in self.limits if name not in MODULI)))
+        target = {} if self.rigidity is None else {TARGET: target_thickness(self.rigidity)}
+        return {**{name: FIGURES[name] for name in names}, **target}
+
+
+@dataclass(frozen=True, eq=False)
+class Grading:
+    """Fitted boards and what they are good for; arrays are in the order of the names.
+
+    Attributes
+    ----------
+    request : GradingRequest
+    names : tuple of str
+    log_mean : (n, 7) array
+        Of the names of `JOINT`.
+    log_covariance : (n, 7, 7) array
+    meets : dict of (n,) array
+        Probability of each limit by the name of its figure.
+    meets_all : (n,) array or None
+        Of all limits together; None where there is none.
+    pairs : tuple of Pair
+    """
+
+    request: GradingRequest
+    names: tuple[str, ...]
+    log_mean: Floats
+    log_covariance: Floats
+    meets: Mapping[str, Floats]
+    meets_all: Floats | None
+    pairs: tuple[Pair, ...]
+
+    def spread(self, figure: LogFigure) -> tuple[Floats, Floats, Floats]:
+        """Median, and the ends of the 90 % interval of each board, in the unit of people: (n,) arrays."""
+        mean, sd = figure.log(self.log_mean, self.log_covariance)
+        middle, low, high = (np.exp(mean + at * sd) / figure.per_unit for at in (0.0, -_NINETY, _NINETY))
+        return middle, low, high
+
+    @property
+    def partners(self) -> dict[int, tuple[int, float]]:
+        """The partner of each board that has one, by place, and the probability that they match."""
+        found = {}
+        for pair in self.pairs:
+            found[pair.first] = (pair.second, pair.probability)
+            found[pair.second] = (pair.first, pair.probability)
+        return found
+
+
+def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:
+    """Grade the boards that were fitted.
+
+    Constants and density of a board are taken to be log-normal together, with the means and the covariance of the
+    logarithms of its draws.
+
+    Parameters
+    ----------
+    rows : iterable of BoardRow
+        Fitted or not.
+    request : GradingRequest
+
+    Returns
+    -------
+    Grading
+    """
+    names: list[str] = []
+    means: list[Floats] = []
+    covariances: list[Floats] = []
+    for row in rows:
+        if row.joint is not None:
+            names.append(row.name)
+            means.append(np.array(row.joint.log_mean))
+            covariances.append(np.array(row.joint.log_covariance))
+    n = len(names)
+    log_mean, log_covariance = np.reshape(means, (n, 7)), np.reshape(covariances, (n, 7, 7))
+    meets, meets_all = _meets(log_mean, log_covariance, request.limits)
+    pairs = proposed_pairs(log_mean, log_covariance, request.match_percent)
+    return Grading(request, tuple(names), log_mean, log_covariance, meets, meets_all, pairs)
+
+
+def _meets(
+    log_mean: Floats, log_covariance: Floats, limits: Mapping[str, tuple[float | None, float | None]]
+) -> tuple[dict[str, Floats], Floats | None]:
+    """The probability of each limit, and of all."""
+    if not limits:
+        return {}, None
+    along = np.stack([FIGURES[name].direction for name in limits])
+    offset = np.log([FIGURES[name].factor for name in limits])
+    low = np.array([-np.inf if one is None else np.log(one) for one, _ in limits.values()])
+    high = np.array([np.inf if one is None else np.log(one) for _, one in limits.values()])
+    mean, covariance = log_mean @ along.T + offset, along @ log_covariance @ along.T
+    each = {
+        name: box_probability(mean[:, i : i + 1], covariance[:, i : i + 1, i : i + 1], low[i : i + 1], high[i : i + 1])
+        for i, name in enumerate(limits)
+    }
+    return each, box_probability(mean, covariance, low, high)

@@ -1,0 +1,142 @@
+"""The grading as tables: makers' figures, the limits that a board meets, its partner; grading.csv, and for people."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from bayesplate.plate.material import MODULI
+from bayesplate.results.board_table import write_rows
+from bayesplate.results.exports import Cell
+from bayesplate.results.folder import writing
+from bayesplate.results.grading import Grading
+from bayesplate.results.log_figures import FIGURES, LogFigure, limit_told
+from bayesplate.results.tables import Table
+from bayesplate.results.words import percent, plus_minus
+
+GRADING = "grading.csv"
+MOST_LISTED, MOST_ON_TERMINAL = 100, 20
+"""Boards that a table for people has; all of them are in grading.csv."""
+
+
+@dataclass(frozen=True)
+class _Number:
+    mean: float
+    sd: float
+
+
+def best_first(graded: Grading) -> list[int]:
+    """Places of the boards: by the probability of meeting the limits, otherwise by E_x, the greatest first."""
+    by = graded.log_mean[:, 0] if graded.meets_all is None else graded.meets_all
+    return sorted(range(len(graded.names)), key=lambda i: (-float(by[i]), graded.names[i]))
+
+
+def grading_tables(graded: Grading, most: int = MOST_LISTED) -> dict[str, Table]:
+    """The tables for people, by what they hold: "constants", "makers", "limits", "pairs"; none that would be empty.
+
+    Parameters
+    ----------
+    graded : Grading
+    most : int
+        Boards, or pairs, in each.
+    """
+    if not graded.names:
+        return {}
+    order = best_first(graded)
+    some, which = order[:most], _which(most, len(order))
+    moduli = {name: FIGURES[name] for name in MODULI}
+    tables = {
+        "constants": _figures_table(graded, some, f"Constants, median ± sd{which}", moduli),
+        "makers": _figures_table(graded, some, f"Figures of makers, median ± sd{which}", graded.request.figures),
+    }
+    if graded.meets_all is not None:
+        tables["limits"] = _limits_table(graded, some, which)
+    if graded.pairs:
+        tables["pairs"] = _pairs_table(graded, most)
+    return tables
+
+
+def _which(most: int, n: int) -> str:
+    return "" if n <= most else f"; the first {most} of {n}"
+
+
+def _figures_table(graded: Grading, some: list[int], title: str, figures: dict[str, LogFigure]) -> Table:
+    columns = [_column(graded, figure) for figure in figures.values()]
+    rows = tuple((graded.names[i], *(column[i] for column in columns)) for i in some)
+    heads = (_head(name, figure) for name, figure in figures.items())
+    return Table(title, ("board", *heads), rows)
+
+
+def _head(name: str, figure: LogFigure) -> str:
+    told = f"{name}, " if name in MODULI else ""
+    return f"{told}{figure.words}" + ("" if figure.unit == "1" else f", {figure.unit}")
+
+
+def _column(graded: Grading, figure: LogFigure) -> list[str]:
+    middle = graded.spread(figure)[0]
+    sd = figure.log(graded.log_mean, graded.log_covariance)[1]
+    return [plus_minus(_Number(float(one), float(one * share))) for one, share in zip(middle, sd, strict=True)]
+
+
+def _limits_table(graded: Grading, some: list[int], which: str) -> Table:
+    assert graded.meets_all is not None
+    limits = [limit_told(name, limit) for name, limit in graded.request.limits.items()]
+    each = list(graded.meets.values())
+    rows = tuple(
+        (graded.names[i], *(percent(float(one[i])) for one in each), percent(float(graded.meets_all[i]))) for i in some
+    )
+    return Table(f"Probability that a board meets the limits{which}", ("board", *limits, "all of them"), rows)
+
+
+def _pairs_table(graded: Grading, most: int) -> Table:
+    some = graded.pairs[:most]
+    rows = []
+    for pair in some:
+        apart = [_apart(graded, pair.first, pair.second, name) for name in MODULI]
+        rows.append((graded.names[pair.first], graded.names[pair.second], percent(pair.probability), *apart))
+    title = f"Pairs that may match{_which(most, len(graded.pairs))}"
+    return Table(title, ("board", "partner", "probability", *MODULI), tuple(rows))
+
+
+def _apart(graded: Grading, first: int, second: int, name: str) -> str:
+    """By how much a constant of the second board differs from the first one's, with the standard deviation."""
+    both = [first, second]
+    mean, sd = FIGURES[name].log(graded.log_mean[both], graded.log_covariance[both])
+    ratio = math.exp(mean[1] - mean[0])
+    return f"{100.0 * (ratio - 1.0):+.0f} ± {100.0 * ratio * math.hypot(*sd):.0f} %"
+
+
+def write_grading(folder: Path, graded: Grading) -> Path:
+    """Write the table of the grading, SI units, completely or not at all."""
+    path = folder / GRADING
+    partial = path.with_name(path.name + ".partial")
+    with writing(path):
+        try:
+            write_rows(partial, _header(graded), _rows(graded))
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
+    return path
+
+
+def _header(graded: Grading) -> list[Cell]:
+    figures = (*MODULI, *graded.request.figures)
+    limits = (f"probability_{name}" for name in graded.meets)
+    whole = [] if graded.meets_all is None else ["probability_all_limits"]
+    ends = (f"{name}_{end}" for name in figures for end in ("q50", "q05", "q95"))
+    return ["name", *ends, *limits, *whole, "partner", "probability_of_match"]
+
+
+def _rows(graded: Grading) -> Iterator[list[Cell]]:
+    figures = [*(FIGURES[name] for name in MODULI), *graded.request.figures.values()]
+    spreads = [[end * one.per_unit for end in graded.spread(one)] for one in figures]
+    partners = graded.partners
+    for i, name in enumerate(graded.names):
+        numbers = [float(end[i]) for one in spreads for end in one]
+        limits = [float(one[i]) for one in graded.meets.values()]
+        whole = [] if graded.meets_all is None else [float(graded.meets_all[i])]
+        partner, probability = partners.get(i, (None, None))
+        yield [name, *numbers, *limits, *whole, None if partner is None else graded.names[partner], probability]

@@ -1,0 +1,185 @@
+"""The boards of a batch: the cards of a folder, or the rows of a table with a card as their template."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from bayesplate.cards import BoardCard, Columns, Template, load_board, plain
+from bayesplate.cards.reading import read_file, read_table
+from bayesplate.cards.rows import Cell, csv_rows
+from bayesplate.errors import Fault, InputError
+from bayesplate.results.board_table import parquet_library
+
+LARGEST_TABLE = 1_000_000_000
+_OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
+"""Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where one board of a batch is to be found; small, for there may be very many.
+
+    Attributes
+    ----------
+    name : str
+        Of the board, before it is known whether it may be one.
+    at : int
+        Which of the source.
+    alike : tuple of str
+        What boards have in common that share their matrices: they are fitted one after another.
+    """
+
+    name: str
+    at: int
+    alike: tuple[str, ...] = ()
+
+
+class Source(Protocol):
+    """Where boards come from."""
+
+    entries: Sequence[Entry]
+    """In the order of their names."""
+    aside: Sequence[str]
+    """Files that were left aside, because they are cards of another kind."""
+
+    def card(self, entry: Entry) -> BoardCard:
+        """The card of a board; raises InputError with all its faults."""
+
+
+class Folder:
+    """The board cards of a folder; priors, campaigns and coefficient tables beside them are left aside.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If there is no board card in it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._paths = sorted(path.glob("*.toml"), key=lambda one: one.name)
+        entries, aside = [], []
+        for at, file in enumerate(self._paths):
+            content = _content_of(file)
+            if not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys():
+                aside.append(plain(file.name))
+            else:
+                entries.append(Entry(plain(file.stem), at, _alike(content)))
+        if not entries:
+            raise InputError(Fault(plain(str(path)), "a folder with board cards (NAME.toml)", "none in it"))
+        self.entries: Sequence[Entry] = entries
+        self.aside: Sequence[str] = aside
+
+    def card(self, entry: Entry) -> BoardCard:
+        """The card of a board; raises InputError with all its faults."""
+        return load_board(self._paths[entry.at])
+
+
+class Table:
+    """The rows of a table, in CSV or Parquet, with a card as the template of what is common.
+
+    Parameters
+    ----------
+    path : Path
+    template : str or path
+        A board card.
+
+    Raises
+    ------
+    InputError
+        If the table or the template cannot be read, a column is no key of a card, or there is no row.
+    """
+
+    def __init__(self, path: Path, template: str | Path) -> None:
+        file = plain(path.name)
+        header, self._rows = _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
+        self._columns = Columns(Template(template), header, file)
+        if not self._rows:
+            raise InputError(Fault(file, "a row for each board", "no row"))
+        named = [(plain(self._columns.name_of(row)) or f"row-{i}", i) for i, row in enumerate(self._rows, start=1)]
+        self.entries: Sequence[Entry] = [Entry(name, i) for name, i in sorted(named)]
+        self.aside: Sequence[str] = ()
+
+    def card(self, entry: Entry) -> BoardCard:
+        """The card of a row; raises InputError with all its faults."""
+        return self._columns.card(self._rows[entry.at - 1], entry.at)
+
+
+def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] | None) -> Source:
+    """The boards of a folder or of a table.
+
+    Raises
+    ------
+    InputError
+        If there are none, or a template is given with a folder or lacks with a table.
+    """
+    path = Path(source)
+    if path.is_dir():
+        if template is not None:
+            raise InputError(Fault("--template", "a table of boards beside it", "a folder of cards"))
+        return Folder(path)
+    if path.suffix not in (".csv", ".parquet"):
+        got = "another file" if path.exists() else "nothing there"
+        raise InputError(Fault(plain(str(path)), "a folder of cards, or a table (.csv or .parquet)", got))
+    if template is None:
+        remedy = "a board card with what all boards have in common"
+        raise InputError(Fault("--template", "a card for the table", "none", remedy))
+    return Table(path, os.fspath(template))
+
+
+def _content_of(file: Path) -> Mapping[str, Any]:
+    """What a card's file holds; nothing where it cannot be read, which is told when the board's turn comes."""
+    try:
+        return read_table(read_file(file), plain(file.name))
+    except InputError:
+        return {}
+
+
+def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
+    """Edges and aspect ratio, as far as they can be seen without reading the card."""
+    plate, setups = content.get("plate"), content.get("setup")
+    sides = [plate.get(f"length_{side}_mm") for side in "xy"] if isinstance(plate, dict) else []
+    told = [side.get("mean") if isinstance(side, dict) else side for side in sides]
+    means = [float(side) for side in told if isinstance(side, int | float) and side > 0]
+    listed = setups if isinstance(setups, list) else [setups]
+    edges = [repr(one.get("edges")) for one in listed if isinstance(one, dict)]
+    if len(means) == 2:
+        edges.append(f"{means[0] / means[1]:.3f}")
+    return tuple(edges)
+
+
+def _read_csv(path: Path) -> tuple[list[str], list[list[Cell]]]:
+    file = plain(path.name)
+    try:
+        if path.stat().st_size > LARGEST_TABLE:
+            raise InputError(Fault(file, f"a table of at most {LARGEST_TABLE:,} bytes", "a larger one"))
+        rows = csv_rows(path.read_bytes(), file)
+    except OSError as error:
+        raise InputError(Fault(plain(str(path)), "a readable table", error.strerror or str(error))) from None
+    header = next(rows, None)
+    if header is None:
+        raise InputError(Fault(file, "a table with a header", "an empty file"))
+    return [name.strip() for name in header], [list(row) for row in rows]
+
+
+def _read_parquet(path: Path) -> tuple[list[str], list[list[Cell]]]:
+    file = plain(path.name)
+    arrow = parquet_library(file)
+    try:
+        found = arrow.parquet.read_table(path)
+    except (OSError, arrow.ArrowException) as error:
+        raise InputError(Fault(file, "a Parquet table", plain(str(error)))) from None
+    columns = [_cells(column.to_pylist()) for column in found.columns]
+    return list(found.column_names), [list(row) for row in zip(*columns, strict=True)]
+
+
+def _cells(values: Sequence[Any]) -> list[Cell]:
+    """A column of Parquet: numbers and texts as they are, nothing where there is nothing or not-a-number."""
+    return [None if value is None or value != value else value for value in values]

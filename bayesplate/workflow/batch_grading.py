@@ -1,0 +1,136 @@
+"""What boards are graded by, from the words of the command line, in the units of people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from bayesplate.cards.words import did_you_mean, plain, quoted
+from bayesplate.errors import Fault, InputError
+from bayesplate.plate.material import MODULI
+from bayesplate.results.grading import GradingRequest
+from bayesplate.results.log_figures import FIGURES
+from bayesplate.results.normal_box import MOST
+
+_MATCHED = tuple(name for name in FIGURES if name[0] in "EG" or name == "density")
+
+
+def grading_request(match: str | None, limits: Sequence[str], rigidity: float | None) -> GradingRequest:
+    """Read what boards are graded by.
+
+    Parameters
+    ----------
+    match : str or None
+        Tolerances in per cent: "10", or "E_x=10,E_y=15,G_xy=15".
+    limits : sequence of str
+        "E_x=10:14", either end may be left away; in the unit that the tables show.
+    rigidity : float or None
+        D_x, N m.
+
+    Returns
+    -------
+    GradingRequest
+
+    Raises
+    ------
+    InputError
+        With everything that cannot be read.
+    """
+    faults: list[Fault] = []
+    percent = _matched(match, faults)
+    found: dict[str, tuple[float | None, float | None]] = {}
+    for one in limits:
+        name, _, ends = one.partition("=")
+        read = _limit(name.strip(), ends, one, faults)
+        if read is not None:
+            found[name.strip()] = read
+    if rigidity is not None and not (math.isfinite(rigidity) and rigidity > 0.0):
+        faults.append(Fault("--rigidity", "a positive number of N m", f"{rigidity:g}"))
+    if faults:
+        raise InputError(faults)
+    request = GradingRequest(limits=found, rigidity=rigidity)
+    return request if percent is None else GradingRequest(percent, found, rigidity)
+
+
+def _matched(match: str | None, faults: list[Fault]) -> dict[str, float] | None:
+    if match is None:
+        return None
+    parts = [part.strip() for part in match.split(",") if part.strip()]
+    if len(parts) == 1 and "=" not in parts[0]:
+        parts = [f"{name}={parts[0]}" for name in MODULI]
+    found = {}
+    for part in parts:
+        name, _, value = part.partition("=")
+        percent = _number(value)
+        if name not in _MATCHED or percent is None or not 0.0 < percent <= 1000.0:
+            remedy = did_you_mean(name, _MATCHED) if name not in _MATCHED else ""
+            wanted = f"per cents, as 10 or E_x=10,E_y=15, of {', '.join(_MATCHED)}"
+            faults.append(Fault("--match", wanted, quoted(part), remedy))
+        else:
+            found[name] = percent
+    return found
+
+
+def _limit(name: str, ends: str, told: str, faults: list[Fault]) -> tuple[float | None, float | None] | None:
+    """The ends of one limit, SI."""
+    place = f"--limit {plain(told)}"
+    if name not in FIGURES:
+        faults.append(Fault(place, f"one of {', '.join(FIGURES)}", quoted(name), did_you_mean(name, FIGURES)))
+        return None
+    low_text, colon, high_text = ends.partition(":")
+    low, high = _number(low_text), _number(high_text)
+    is_read = all(one is not None or not text.strip() for one, text in ((low, low_text), (high, high_text)))
+    if not colon or not is_read or (low is None and high is None):
+        faults.append(
+            Fault(place, f"LEAST:GREATEST in {FIGURES[name].unit}, one of them may be left away", quoted(ends))
+        )
+        return None
+    factor = FIGURES[name].per_unit
+    return (None if low is None else low * factor, None if high is None else high * factor)
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def grading_faults(name: str, value: object) -> Iterator[Fault]:
+    """What is wrong with a request made in Python."""
+    if value is None:
+        return
+    if not isinstance(value, GradingRequest):
+        yield Fault(name, "a GradingRequest or None", type(value).__name__)
+        return
+    for key, percent in value.match_percent.items():
+        if key not in _MATCHED:
+            yield Fault(f"{name} match_percent", f"names of {', '.join(_MATCHED)}", quoted(str(key)))
+        elif not _is_positive(percent):
+            yield Fault(f"{name} match_percent {key}", "a positive number of per cent", repr(percent))
+    for key, limit in value.limits.items():
+        if key not in FIGURES:
+            yield Fault(f"{name} limits", f"names of {', '.join(FIGURES)}", quoted(str(key)))
+        else:
+            yield from _limit_faults(f"{name} limits {key}", limit)
+    if len(value.limits) > MOST:
+        yield Fault(f"{name} limits", f"at most {MOST}", str(len(value.limits)))
+    if value.rigidity is not None and not _is_positive(value.rigidity):
+        yield Fault(f"{name} rigidity", "a positive number of N m, or None", repr(value.rigidity))
+
+
+def _limit_faults(place: str, limit: object) -> Iterator[Fault]:
+    if not isinstance(limit, tuple) or len(limit) != 2:
+        yield Fault(place, "a pair (least, greatest), SI, None for no limit", repr(limit))
+        return
+    given = [one for one in limit if one is not None]
+    if not given or not all(_is_positive(one) for one in given):
+        yield Fault(place, "positive numbers, at least one of them", repr(limit))
+    elif len(given) == 2 and given[0] >= given[1]:
+        yield Fault(place, "the least value before the greatest", f"{given[0]:g} and {given[1]:g}")
+
+
+def _is_positive(value: object) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and math.isfinite(value) and value > 0.0  # type: ignore[arg-type, operator]

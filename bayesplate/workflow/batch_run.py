@@ -1,0 +1,178 @@
+"""The run of a batch: each board to its row, in whatever order they are done; what is there is not done again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import closing
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from bayesplate.cards import load_named
+from bayesplate.errors import (
+    BayesplateError,
+    InputError,
+    NotConvergedError,
+    NotIdentifiableError,
+    UnwritableError,
+)
+from bayesplate.posterior.sampling import Progress
+from bayesplate.results.batch_summary import FORMAT
+from bayesplate.results.board_journal import Journal
+from bayesplate.results.board_rows import BoardRow, row_of
+from bayesplate.results.folder import BOARDS, SUMMARY
+from bayesplate.results.versions import versions
+from bayesplate.workflow.batch_boards import Entry, Source
+from bayesplate.workflow.batch_pool import Call, WorkerDied, Workers, computed
+from bayesplate.workflow.fit_board import FitRequest, fit_board, fit_board_into
+from bayesplate.workflow.prepare import prepared_card
+
+_REFUSED, _INTERNAL, _DIED = "refused", "internal error", "worker died"
+_OUTCOMES: tuple[tuple[type[BaseException], str], ...] = (
+    (InputError, _REFUSED),
+    (NotIdentifiableError, "not identifiable"),
+    (NotConvergedError, "not converged"),
+    (WorkerDied, _DIED),
+)
+_AGAIN = (_INTERNAL, _DIED)
+"""What may end otherwise the next time: these boards are tried again when a run is continued."""
+_TOLD_EVERY = 100
+"""Times that progress is told, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The boards of a batch and what is asked of each."""
+
+    boards: Source
+    request: FitRequest
+    folder: Path
+    folders: bool
+    report: bool
+    versions: Mapping[str, str] = field(default_factory=versions)
+
+    def fitted(self, by: Workers, journal: Journal, progress: Callable[[Progress], None] | None) -> list[str]:
+        """Fit the boards that the journal does not hold; the keys of all, in the order of their names."""
+        keys: dict[int, str] = {}
+        done = _Done(len(self.boards.entries), progress)
+
+        def write(at: int, key: str, row: BoardRow) -> None:
+            keys[at] = key
+            if key not in journal or journal.row(key) != row:
+                journal.append(key, row)
+            done.tell(row.is_fitted)
+
+        def calls() -> Iterator[tuple[tuple[int, str, Entry, str, int], Call]]:
+            twice = _named_twice(self.boards.entries)
+            order = sorted(range(len(self.boards.entries)), key=lambda i: (self.boards.entries[i].alike, i))
+            for at in order:
+                entry = self.boards.entries[at]
+                posed = self._posed(entry, twice)
+                if isinstance(posed, BoardRow):
+                    write(at, _hash("refused", posed.to_json()), posed)
+                elif self._is_done(posed.key, entry, journal):
+                    write(at, posed.key, journal.row(posed.key))
+                else:
+                    yield (at, posed.key, entry, posed.card_sha256, posed.seed), posed.call
+
+        with closing(computed(by, calls())) as answers:
+            for (at, key, entry, card_sha256, seed), future in answers:
+                row = _answer(entry, future)
+                write(at, key, row if row.is_fitted else replace(row, card_sha256=card_sha256, seed=seed))
+        return [keys[at] for at in range(len(self.boards.entries))]
+
+    def _is_done(self, key: str, entry: Entry, journal: Journal) -> bool:
+        if key not in journal:
+            return False
+        row = journal.row(key)
+        is_there = not self.folders or not row.is_fitted or (self.folder / BOARDS / entry.name / SUMMARY).is_file()
+        return row.outcome not in _AGAIN and is_there
+
+    def _posed(self, entry: Entry, twice: frozenset[str]) -> _Posed | BoardRow:
+        """What is to be computed of a board, or the row that says why nothing is."""
+        if entry.name.casefold() in twice:
+            return BoardRow(entry.name, _REFUSED, f"wanted a name of its own, got {entry.name} more than once")
+        try:
+            card = self.boards.card(entry)
+            named = load_named(card)
+            if named.faults or named.prior is None:
+                prepared_card(card, named, self.request.effects)  # which raises with all other faults as well
+        except InputError as error:
+            return BoardRow(entry.name, _REFUSED, _one_line(error))
+        assert named.prior is not None
+        seed = int(_hash(self.request.seed, card.sha256)[:8], 16)
+        request = replace(self.request, seed=seed, tables=dict(named.tables))
+        tables = {name: repr(one) for name, one in sorted(named.tables.items())}
+        asked = {**asdict(replace(request, tables={})), "tables": tables}
+        key = _hash(FORMAT, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
+        arguments = (card, named.prior, request)
+        call = Call(fit_board, arguments)
+        if self.folders:
+            call = Call(fit_board_into, (self.folder.resolve() / BOARDS / card.name, self.report, *arguments))
+        return _Posed(key, call, card.sha256, seed)
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """A board to be computed: the key of its row, the call, and what its row says even if it fails."""
+
+    key: str
+    call: Call
+    card_sha256: str
+    seed: int
+
+
+class _Done:
+    """How many boards are done, told now and then."""
+
+    def __init__(self, n: int, tell: Callable[[Progress], None] | None) -> None:
+        self._n, self._tell, self._n_done, self._n_failed = n, tell, 0, 0
+
+    def tell(self, is_fitted: bool) -> None:
+        """One more is done."""
+        self._n_done += 1
+        self._n_failed += not is_fitted
+        every = max(1, self._n // _TOLD_EVERY)
+        if self._tell is not None and (self._n_done % every == 0 or self._n_done == self._n):
+            failed = f", {self._n_failed} not fitted" if self._n_failed else ""
+            stage = f"{self._n_done} of {self._n} boards{failed}"
+            self._tell(Progress(0, 0, None, stage=stage, done=self._n_done / self._n))
+
+
+def _answer(entry: Entry, future: Future[Any]) -> BoardRow:
+    """The row of a board that was computed."""
+    error = future.exception()
+    if error is None:
+        return row_of(future.result())
+    if isinstance(error, UnwritableError) or not isinstance(error, Exception):
+        raise error  # a full disk is no board's fault
+    outcome = next((word for kind, word in _OUTCOMES if isinstance(error, kind)), _INTERNAL)
+    if type(error).__name__ == "KilledWorker":  # Dask's word for it
+        outcome = _DIED
+    told = "" if isinstance(error, BayesplateError | WorkerDied) else f"{type(error).__name__}: "
+    return BoardRow(entry.name, outcome, told + _one_line(error))
+
+
+def _one_line(error: BaseException) -> str:
+    return "; ".join(str(error).splitlines())
+
+
+def _named_twice(entries: Sequence[Entry]) -> frozenset[str]:
+    """Names that several boards have: none of them is fitted, for nobody could tell whose row or folder it is."""
+    seen: set[str] = set()
+    twice: set[str] = set()
+    for entry in entries:
+        name = entry.name.casefold()
+        (twice if name in seen else seen).add(name)
+    return frozenset(twice)
+
+
+def _hash(*parts: object) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=_plain).encode()).hexdigest()
+
+
+def _plain(part: object) -> object:
+    return dict(part) if isinstance(part, Mapping) else repr(part)

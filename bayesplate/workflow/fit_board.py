@@ -1,0 +1,103 @@
+"""`fit_board`: a board, a prior and a request to the summary of its fit; pure, so that any process may compute it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bayesplate.cards import BoardCard, CoefficientCard, NamedCards, PriorCard
+from bayesplate.errors import Fault, NotConvergedError
+from bayesplate.frequencies.laws import LawName
+from bayesplate.plate.board import Board
+from bayesplate.posterior.inference import Inference
+from bayesplate.results.summary import Summary
+from bayesplate.workflow.arguments import require_arguments
+from bayesplate.workflow.fit import fit
+from bayesplate.workflow.fitting import fitted
+from bayesplate.workflow.prepare import Prepared, prepare, prepared_card
+from bayesplate.workflow.problem import Problem
+
+
+@dataclass(frozen=True)
+class FitRequest:
+    """What is asked of a fit besides its board and its prior.
+
+    Attributes
+    ----------
+    seed : int
+        Everything random follows from it.
+    effects : tuple of str or None
+        Declared effects in place of the card's.
+    law : "linear", "exact" or None
+        None: the linear law where it is good enough.
+    robust : bool
+        Student's distribution for the noise.
+    tables : dict of CoefficientCard
+        The published coefficients that the setups of a card name, by setup.
+    """
+
+    seed: int = 1
+    effects: tuple[str, ...] | None = None
+    law: LawName | None = None
+    robust: bool = False
+    tables: Mapping[str, CoefficientCard] = field(default_factory=dict)
+
+
+def fit_board(board: Board | BoardCard, prior: PriorCard, request: FitRequest | None = None) -> Summary:
+    """Fit one board; nothing is read, written or remembered, and the same arguments give the same bytes anywhere.
+
+    Parameters
+    ----------
+    board : Board or BoardCard
+        Made in Python, or a card that was read.
+    prior : PriorCard
+        Of its constants.
+    request : FitRequest, optional
+
+    Returns
+    -------
+    Summary
+        That of `fit` with the same seed.
+
+    Raises
+    ------
+    InputError, NotIdentifiableError, NotConvergedError
+        As of `fit`.
+    """
+    request = FitRequest() if request is None else request
+    require_arguments(board=board, prior_card=prior, request=request)
+    return fitted(_problem(board, prior, request), request.seed, None, _refuse).summary
+
+
+def fit_board_into(
+    folder: Path, report: bool, board: Board | BoardCard, prior: PriorCard, request: FitRequest
+) -> Summary:
+    """The same with the files of a fit in a folder, in place of what is there; raises as `fit`."""
+    done = fit(_problem(board, prior, request), out=folder, report=report, seed=request.seed, force=True)
+    return done.summary  # type: ignore[return-value]  # a problem is no campaign
+
+
+def _problem(board: Board | BoardCard, prior: PriorCard, request: FitRequest) -> Problem:
+    return Problem(_prepared(board, prior, request), request.law, request.robust)
+
+
+def _prepared(board: Board | BoardCard, prior: PriorCard, request: FitRequest) -> Prepared:
+    if isinstance(board, Board):
+        return prepare(board, request.effects, prior=prior)
+    lacking = tuple(
+        Fault(
+            f"request tables {setup.name}",
+            "the published coefficients that the card names",
+            "none",
+            f'tables={{"{setup.name}": ...}} of the FitRequest',
+        )
+        for setup in board.setups
+        if setup.published_coefficients is not None and setup.name not in request.tables
+    )
+    return prepared_card(board, NamedCards(prior, request.tables, lacking), request.effects)
+
+
+def _refuse(inference: Inference) -> None:
+    reasons = "\n".join(inference.convergence.reasons)
+    raise NotConvergedError(f"the sampler did not converge, so no constants are given:\n{reasons}")

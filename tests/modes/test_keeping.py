@@ -1,0 +1,53 @@
+"""What is kept is bounded by its bytes: the last result stays, what was asked for longest ago goes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesplate.modes.keeping import kept
+
+
+@pytest.fixture
+def made():
+    """A function of arrays of so many kilobytes, and the list of what it was asked for."""
+    asked: list[int] = []
+
+    @kept(100_000, lambda array: array.nbytes)
+    def array(kilobytes: int) -> np.ndarray:
+        asked.append(kilobytes)
+        return np.zeros(kilobytes * 125)
+
+    return array, asked
+
+
+def test_what_was_asked_for_last_stays_within_the_bytes(made):
+    array, asked = made
+    first = array(40)
+    array(50)
+    assert array(40) is first  # asked for again: the other one is older now
+    array(45)
+    array(40)
+    assert asked == [40, 50, 45]
+    array(50)
+    assert asked == [40, 50, 45, 50]
+
+
+def test_one_that_is_larger_than_all_that_is_kept_is_still_kept_alone(made):
+    array, asked = made
+    array(10)
+    large = array(500)
+
+    assert array(500) is large
+    array(10)
+    assert asked == [10, 500, 10]
+
+
+def test_a_plate_is_assembled_once_for_two_boards_of_one_shape():
+    """Whatever their sizes: the matrices stand on the unit square."""
+    from bayesplate.frequencies.system import _plate
+
+    ends = ("free", "free")
+    one, two = (_plate(ends, ends, "thin", (), 4, 5) for _ in range(2))
+
+    assert all(a.terms is b.terms for a, b in zip(one.blocks, two.blocks, strict=True))

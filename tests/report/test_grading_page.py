@@ -1,0 +1,88 @@
+"""The page that grades many boards: what it says, and what names and messages cannot do to it."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from bayesplate.report.grading_figures import MOST_NAMED
+from bayesplate.report.grading_page import write_grading_page
+from bayesplate.results.batch_summary import BatchSummary, Failure
+from bayesplate.results.board_rows import BoardRow
+from bayesplate.results.grading import GradingRequest, grade
+from bayesplate.results.joint import JOINT, Joint
+
+LOG = np.log([12e9, 0.9e9, 0.7e9, 25.0, 2.0, 5.0, 440.0])
+EVIL = "<script>alert(1)</script>"
+
+
+def page_of(folder, n: int, request: GradingRequest, name: str = "top"):
+    """The page of boards made by hand, and its text."""
+    rng = np.random.default_rng(7)
+    rows = []
+    for i in range(n):
+        mean = LOG + 0.05 * rng.standard_normal(7)
+        joint = Joint(JOINT, tuple(mean), tuple(map(tuple, 4e-4 * np.eye(7))))
+        rows.append(BoardRow(f"{name}-{i}", "fitted", joint=joint))
+    failed = (Failure("<b>", "refused", EVIL),)
+    summary = BatchSummary(1, 1, {}, n + 1, n, 1, failed, ())
+    graded = grade(rows, request)
+    path = write_grading_page(folder, graded, summary, has_pages=True)
+    return graded, path.read_text(encoding="utf-8")
+
+
+class Tags(HTMLParser):
+    """The tags of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.seen: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs) -> None:
+        """Note a tag."""
+        self.seen.append(tag)
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("few")
+    limits = {"E_x": (11e9, 13e9), "density": (None, 450.0)}
+    return folder, *page_of(folder, 6, GradingRequest(limits=limits, rigidity=20.0))
+
+
+def test_the_page_says_what_was_found(few):
+    folder, graded, page = few
+    expected = float(graded.meets_all.sum())
+
+    assert "6 of 7 boards were fitted" in page
+    assert f"{expected:.1f} are to be expected" in page
+    assert "Two boards match where" in page
+    assert "wanted rigidity" in page
+    assert {path.name for path in (folder / "figures").iterdir()} == {
+        f"{stem}.{ending}"
+        for stem in ("boards-sorted", "density-speed", "limits", "pairs")
+        for ending in ("png", "svg")
+    }
+    assert not re.search(r'(src|href)="(?!data:|boards/top-\d/report\.html")', page)  # nothing is fetched
+
+
+def test_names_and_messages_are_texts(few):
+    """The negative control: the tags of the page are found by the same reader."""
+    _, _, page = few
+
+    assert "script" not in Tags(page).seen
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+    assert "script" in Tags(f"<p>{EVIL}</p>").seen
+
+
+def test_many_boards_are_drawn_without_names_and_none_at_all_is_a_page_too(tmp_path):
+    n = MOST_NAMED + 80
+    _, page = page_of(tmp_path / "many", n, GradingRequest())
+    assert f"the first 100 of {n}" in page
+    _, page = page_of(tmp_path / "none", 0, GradingRequest(limits={"E_x": (1e9, None)}))
+    assert "Boards that were not fitted" in page
+    assert "<img" not in page

@@ -1,0 +1,75 @@
+"""The journal of many boards: what a killed run leaves of it is used as far as it is sound."""
+
+from __future__ import annotations
+
+import pytest
+from made_summaries import SUMMARY
+
+from bayesplate.results.board_journal import Journal
+from bayesplate.results.board_rows import NUMBERS, WORDS, BoardRow, row_of
+from bayesplate.results.board_table import write_table
+
+ROW, REFUSED = row_of(SUMMARY), BoardRow("bad", "refused", "=cmd|' /C calc'!A0")
+
+
+def test_rows_come_back_to_the_last_bit(tmp_path):
+    journal = Journal(tmp_path / "boards.jsonl")
+    journal.append("one", ROW)
+    journal.append("two", REFUSED)
+    again = Journal(tmp_path / "boards.jsonl")
+
+    assert ("one" in again, "two" in again, "three" in again) == (True, True, False)
+    assert (again.row("one"), again.row("two")) == (ROW, REFUSED)
+    assert len(ROW.cells()) == len(WORDS) + len(NUMBERS) == len(REFUSED.cells())
+    journal.close()
+    again.close()
+
+
+@pytest.mark.parametrize("cut", [1, 7, 100])
+def test_a_line_that_is_half_written_is_cut_off_and_written_anew(tmp_path, cut):
+    path = tmp_path / "boards.jsonl"
+    journal = Journal(path)
+    journal.append("one", ROW)
+    journal.append("two", REFUSED)
+    journal.close()
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-cut])
+    journal = Journal(path)
+    assert "two" not in journal
+
+    journal.append("two", REFUSED)
+    journal.close()
+
+    assert path.read_bytes() == whole
+
+
+def test_a_damaged_line_is_no_row_and_the_others_are(tmp_path):
+    path = tmp_path / "boards.jsonl"
+    path.write_bytes(b'{"key": "x"}\nnonsense\n{"key": "y", "row": {"name": 3}}\n')
+    journal = Journal(path)
+    journal.append("one", ROW)
+    journal.keep(["one"])
+
+    assert not any(key in journal for key in "xy")
+    assert path.read_bytes().count(b"\n") == 1
+    again = Journal(path)
+    assert again.row("one") == ROW
+    again.close()
+
+
+def test_a_cell_that_a_sheet_would_execute_is_a_text(tmp_path):
+    text = write_table(tmp_path, "csv", [ROW, REFUSED]).read_text()
+
+    assert ",'=cmd|" in text
+    assert text.count("\n") == 3
+    assert [path.name for path in tmp_path.iterdir()] == ["boards.csv"]
+
+
+def test_a_table_in_parquet_has_the_same_cells(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: pip install bayesplate[parquet]")
+    rows = [ROW, REFUSED] * 700
+    found = parquet.read_table(write_table(tmp_path, "parquet", rows))
+
+    assert found.column_names == [*WORDS, *NUMBERS]
+    assert [list(one.values()) for one in found.to_pylist()[:2]] == [ROW.cells(), REFUSED.cells()]
+    assert found.num_rows == 1400

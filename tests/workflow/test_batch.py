@@ -1,0 +1,334 @@
+"""Many boards: the same bytes whoever computes them and however often a run is killed; one bad card stops nothing."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import pickle
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from made_batches import TEMPLATE, card_text, write_cards
+from runs import files_in
+
+import bayesplate
+from bayesplate.cards import load_named, load_prior, read_board_text
+from bayesplate.cli import main
+from bayesplate.errors import BatchError, CheckpointError, InputError
+from bayesplate.results.folder import json_text
+from bayesplate.workflow.batch_boards import boards_of
+from bayesplate.workflow.batch_pool import Call, WorkerDied, computed, processes
+
+WHY = "mend their cards: --resume then fits these alone"
+
+
+def rows_of(table: bytes) -> dict[str, dict[str, str]]:
+    """The rows of a CSV table by the name of the board."""
+    return {row["name"]: row for row in csv.DictReader(io.StringIO(table.decode()))}
+
+
+@pytest.fixture(scope="module")
+def cards(tmp_path_factory) -> Path:
+    """Three boards, two bad cards, and a prior card beside them."""
+    folder = write_cards(tmp_path_factory.mktemp("cards") / "tops")
+    (folder / "own-prior.toml").write_text(load_prior("spruce").to_card().replace('"spruce"', '"own-prior"'))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def two(cards, tmp_path_factory) -> bayesplate.BatchResult:
+    """Its batch by two workers."""
+    limits = bayesplate.GradingRequest(limits={"E_x": (5e9, 20e9)}, rigidity=25.0)
+    return bayesplate.batch(cards, tmp_path_factory.mktemp("two") / "out", workers=2, grading=limits)
+
+
+@pytest.fixture(scope="module")
+def one(cards, tmp_path_factory):
+    """The same by one worker and the command line, with each board's own files."""
+    out = tmp_path_factory.mktemp("one") / "out"
+    options = ["--workers", "1", "--limit", "E_x=5:20", "--rigidity", "25", "--folders", "--no-report"]
+    return CliRunner().invoke(main, ["batch", str(cards), "--out", str(out), *options]), out
+
+
+def test_one_board_is_a_pure_function_that_travels(two, one):
+    """What the table says of a board, and its files, are what `fit_board` gives with its seed; nothing is changed by
+    the way to another process."""
+    row = rows_of(two.table.read_bytes())["b"]
+    board, prior = read_board_text(card_text("b", 1.01), "b"), load_prior("weakly-informative")
+    with pytest.raises(InputError, match="request tables clamped: wanted the published coefficients"):
+        bayesplate.fit_board(board, prior)
+    request = bayesplate.FitRequest(seed=int(row["seed"]), tables=load_named(board).tables)
+
+    found = bayesplate.fit_board(*pickle.loads(pickle.dumps((board, prior, request))))
+
+    assert pickle.loads(pickle.dumps(found)) == found
+    assert float(row["E_x_mean"]) == found.elastic.E_x.mean
+    assert float(row["density_mean"]) == found.derived["density"].mean
+    assert row["card_sha256"] == found.card_sha256
+    assert (one[1] / "boards" / "b" / "summary.json").read_text(encoding="utf-8") == json_text(found)
+    assert set(files_in(one[1] / "boards" / "b")) == {"summary.json", "posterior.nc"}
+
+
+def test_the_same_bytes_for_one_worker_and_two_and_a_bad_card_stops_nothing(two, one):
+    """By the command line: exit 7, the reasons on the terminal and in the table, every other board there."""
+    run, out = one
+
+    assert run.exit_code == 7, run.output
+    assert "2 of 4 boards were not fitted" in run.stderr
+    assert "n: refused: n.toml [plate] thickness_mm: wanted a positive number, got -3" in run.stderr
+    assert run.stderr.rstrip().endswith(WHY)
+    assert "own-prior.toml is a card of another kind" in run.stdout
+    for name in ("boards.csv", "boards.jsonl", "batch.json", "grading.csv"):
+        assert (out / name).read_bytes() == (two.folder / name).read_bytes()
+    rows = rows_of(two.table.read_bytes())
+    outcomes = {"a": "fitted", "b": "fitted", "m": "refused", "n": "refused"}
+    assert {name: row["outcome"] for name, row in rows.items()} == outcomes
+    assert "m.toml line 1" in rows["m"]["message"]
+    assert rows["n"]["E_x_mean"] == ""
+    assert "2 of 4 boards were fitted" in (two.folder / "grading.html").read_text(encoding="utf-8")
+    with pytest.raises(BatchError, match="2 of 4"):
+        two.require_all()
+
+
+def test_a_board_has_its_seed_from_its_card_and_only_changed_cards_are_fitted_again(cards, two, tmp_path, monkeypatch):
+    """One more board, one mended, one taken away: the others' rows stay, and so they do in the journal."""
+    out, again = shutil.copytree(two.folder, tmp_path / "out"), shutil.copytree(cards, tmp_path / "cards")
+    (again / "a.toml").unlink()
+    (again / "m.toml").write_text(card_text("m", 1.02), encoding="utf-8")
+    submitted = []
+    monkeypatch.setattr("bayesplate.workflow.batch_run.computed", counted(submitted))
+
+    result = bayesplate.batch(again, out, workers=1, resume=True, report=False)
+
+    before, after = rows_of(two.table.read_bytes()), rows_of(result.table.read_bytes())
+    assert [call.arguments[0].name for call in submitted] == ["m"]
+    assert set(after) == {"b", "m", "n"}
+    assert {name: after[name] for name in "bn"} == {name: before[name] for name in "bn"}
+    assert after["m"]["outcome"] == "fitted"
+    assert len({row["seed"] for row in after.values() if row["seed"]}) == 2
+    assert (out / "boards.jsonl").read_bytes().count(b"\n") == 3
+
+
+def counted(submitted: list[Call]):
+    """`computed` that notes what it is given."""
+
+    def compute(workers, calls):
+        noted = list(calls)
+        submitted.extend(call for _, call in noted)
+        return computed(workers, iter(noted))
+
+    return compute
+
+
+def processes_of(session: int) -> list[int]:
+    """Processes of a session that are alive."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit():
+            try:
+                fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            except OSError:
+                continue
+            if int(fields[3]) == session and fields[0] != "Z":
+                found.append(int(folder.name))
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_killed_at_a_random_moment_and_resumed_the_table_is_the_same(cards, two, tmp_path):
+    """Killed with a board or two in the journal and the next line half written; its workers end with it."""
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "bayesplate.cli", "batch", str(cards), "--workers", "2", "--out", str(out)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    run = subprocess.Popen([*command, "--no-report"], env=environment, start_new_session=True,
+                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+    journal, n_lines = out / "boards.jsonl", int(np.random.default_rng().integers(1, 4))
+    until = time.monotonic() + 120
+    while time.monotonic() < until and run.poll() is None:
+        if journal.exists() and journal.read_bytes().count(b"\n") >= n_lines:
+            break
+        time.sleep(0.01)
+    os.kill(run.pid, signal.SIGKILL)
+    run.wait()
+    with journal.open("ab") as stream:
+        stream.write(b'{"key": "half a li')
+    until = time.monotonic() + 20
+    while processes_of(run.pid) and time.monotonic() < until:
+        time.sleep(0.05)
+
+    assert processes_of(run.pid) == []
+    assert not (out / "boards.csv").exists()
+    result = bayesplate.batch(cards, out, workers=2, resume=True, report=False)
+    assert result.table.read_bytes() == two.table.read_bytes()
+    assert (out / "boards.jsonl").read_bytes() == (two.folder / "boards.jsonl").read_bytes()
+
+
+def test_a_cluster_of_two_processes_gives_the_same_bytes(cards, two, tmp_path):
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'bayesplate[dask]'")
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the cluster's own libraries
+        with distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster:
+            result = bayesplate.batch(cards, tmp_path / "out", dask=cluster.scheduler_address, report=False)
+
+    assert result.table.read_bytes() == two.table.read_bytes()
+
+
+def test_a_worker_that_dies_takes_no_other_board_with_it():
+    """Whose call it was is found by computing those under way again, one at a time."""
+    calls = [(0, Call(abs, (-1,))), (1, Call(os._exit, (1,))), (2, Call(abs, (-3,))), (3, Call(int, ("x",)))]
+    found = dict(computed(processes(2), iter(calls)))
+
+    assert found[0].result() == 1
+    assert isinstance(found[1].exception(), WorkerDied)
+    assert found[2].result() == 3
+    assert isinstance(found[3].exception(), ValueError)
+
+
+def test_few_calls_wait_at_a_time():
+    """The queue is bounded: what is taken from the source is never far ahead of what is done."""
+    taken, ahead = [], []
+
+    def source():
+        for i in range(40):
+            taken.append(i)
+            yield i, Call(abs, (i,))
+
+    for n_done, _ in enumerate(computed(processes(2), source()), start=1):
+        ahead.append(len(taken) - n_done)
+
+    assert len(ahead) == 40
+    assert max(ahead) <= 4
+
+
+TABLE = """name,thickness_mm,mass_g,mass_g sd,"(0,0)","(0,1)","(1,0)","(1,1)","clamped (0,2)"
+top-1,3.1,300,2,57,100,130,162,170
+top-2,2.9;3.0;3.1,,,57,100,130,162,
+"=cmd()",3,300,,57,100,130,162,170
+../../evil,3,300,,57,100,130,162,170
+twice,3,300,,57,100,130,162,170
+Twice,3,300,,58,100,130,162,170
+top-3,thick,300,,57,100,130,162,170
+"""
+
+
+@pytest.fixture
+def table(tmp_path) -> Path:
+    """A table of boards, most of them with faults, and its template."""
+    (tmp_path / "template.toml").write_text(TEMPLATE, encoding="utf-8")
+    (tmp_path / "tops.csv").write_text(TABLE, encoding="utf-8")
+    return tmp_path / "tops.csv"
+
+
+def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
+    boards = boards_of(table, table.parent / "template.toml")
+    one, two = (boards.card(entry) for entry in boards.entries if entry.name in ("top-1", "top-2"))
+
+    assert (one.plate.mass_g.mean, one.plate.mass_g.sd, one.plate.density_kg_m3) == (300.0, 2.0, None)
+    assert one.plate.thickness_mm.mean == 3.1
+    assert [str(label) for label in one.setups[0].frequencies_hz] == ["(0,0)", "(0,1)", "(1,0)", "(1,1)", "(0,2)"]
+    assert two.plate.thickness_mm.readings == (2.9, 3.0, 3.1)
+    assert two.plate.density_kg_m3.mean == 399.0
+    assert len(two.setups[0].frequencies_hz) == 4
+
+
+def test_bad_rows_are_rows_of_the_table_and_no_name_leaves_the_folder(table, tmp_path, monkeypatch):
+    """Nothing is computed here: what the good rows give is another test's. Names are cells that no sheet executes."""
+    monkeypatch.setattr(
+        "bayesplate.workflow.batch_run.computed", lambda workers, calls: (one for one in list(calls)[:0])
+    )
+    (tmp_path / "tops.csv").write_text("\n".join(TABLE.splitlines()[:1] + TABLE.splitlines()[3:]))
+    result = bayesplate.batch(table, tmp_path / "deep" / "out", template=tmp_path / "template.toml", folders=True)
+
+    text = result.table.read_text(encoding="utf-8")
+    rows = rows_of(result.table.read_bytes())
+    assert {row["outcome"] for row in rows.values()} == {"refused"}
+    assert set(rows) == {"'=cmd()", "../../evil", "twice", "Twice", "top-3"}
+    assert "tops.csv row 4 -> Twice.toml" not in text
+    assert "more than once" in rows["twice"]["message"] == rows["twice"]["message"]
+    assert "tops.csv row 5 -> top-3.toml [plate] thickness_mm: wanted a number" in rows["top-3"]["message"]
+    assert {path.name for path in tmp_path.iterdir()} == {"template.toml", "tops.csv", "deep"}
+    assert {path.name for path in (tmp_path / "deep").iterdir()} == {"out"}
+    assert not (result.folder / "boards").exists()
+    page = (result.folder / "grading.html").read_text(encoding="utf-8")
+    assert "Boards that were not fitted" in page
+
+
+def test_a_table_in_parquet_says_the_same(table, tmp_path):
+    """Numbers as numbers, nothing where there is nothing."""
+    reason = "pyarrow is not installed: pip install 'bayesplate[parquet]'"
+    arrow, parquet = (pytest.importorskip(name, reason=reason) for name in ("pyarrow", "pyarrow.parquet"))
+    rows = list(csv.DictReader(io.StringIO(TABLE)))[:2]
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    hertz = {name: [float(one) if one else None for one in columns[name]] for name in columns if "(" in name}
+    parquet.write_table(arrow.table(columns | hertz), tmp_path / "tops.parquet")
+    texts = []
+    for file in ("tops.csv", "tops.parquet"):
+        boards = boards_of(tmp_path / file, tmp_path / "template.toml")
+        texts.append([boards.card(entry).text for entry in boards.entries if entry.name in ("top-1", "top-2")])
+
+    assert texts[0] == texts[1]
+    assert len(texts[0]) == 2
+
+
+HEADERS = [
+    ("name,thicknes_mm", 'column 2: wanted a key of a board card, or the label of a mode, got "thicknes_mm" (did you'),
+    ('name,"side (1,1)"', 'got "side (1,1)" (the setups of the template are "clamped": write the name of one)'),
+    ("thickness_mm", 'wanted a column with the names of the boards, got none (call it "name")'),
+    ("name,name", 'column 2: wanted each column once, got "name" again'),
+]
+
+
+@pytest.mark.parametrize(("header", "said"), HEADERS)
+def test_a_table_whose_columns_are_no_keys_is_refused(table, tmp_path, header, said):
+    table.write_text(f"{header}\nx,3\n", encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(said)):
+        bayesplate.batch(table, tmp_path / "out", template=tmp_path / "template.toml")
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_cannot_be_a_batch_is_refused_and_nothing_is_written(cards, tmp_path):
+    out, empty = tmp_path / "out", tmp_path / "empty"
+    empty.mkdir()
+    table = tmp_path / "x.csv"
+    table.write_text("name\nx\n")
+    for source, options, said in (
+        (empty, {}, r"wanted a folder with board cards \(NAME.toml\), got none in it"),
+        (tmp_path / "nowhere", {}, "wanted a folder of cards, or a table .*, got nothing there"),
+        (table, {}, "--template: wanted a card for the table"),
+        (cards, {"template": "x.toml"}, "--template: wanted a table of boards beside it, got a folder"),
+        (cards, {"workers": 0, "table": "xls"}, "(?s)workers: wanted.*table: wanted"),
+        (cards, {"grading": 3}, "a GradingRequest or None"),
+    ):
+        with pytest.raises(InputError, match=said):
+            bayesplate.batch(source, out, **options)
+    with pytest.raises(CheckpointError, match=re.escape("wanted the boards.jsonl of an earlier run, got none")):
+        bayesplate.batch(cards, out, resume=True)
+    assert not out.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_memory_does_not_grow_with_the_number_of_boards(tmp_path):
+    """Peaks over 10 and over 40 boards, of the command and of its worker: within 5 % and 5 MB of each other."""
+    from benchmarks.batch import measured, write_cards
+
+    few, many = (
+        measured(write_cards(tmp_path / f"cards-{n}", n), tmp_path / f"out-{n}", ["--workers", "1"], "1")
+        for n in (10, 40)
+    )
+
+    assert many.peak_parent < 1.05 * few.peak_parent + 5.0
+    assert many.peak_worker < 1.05 * few.peak_worker + 5.0
