@@ -40,7 +40,7 @@ Floats = NDArray[np.float64]
 
 MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
-_ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.25, 16
+_ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.75, 24
 _MOST_PAIRS, _MOST_LABELLED, _MOST_BARS = 15, 12, 60
 _MOST_VECTORS = 1000
 """Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
@@ -77,7 +77,7 @@ def sorted_picture(graded: Grading) -> Picture:
         panel.plot(middle[order], rows, "o", color=BLUE, mec="black", mew=0.5 if is_named else 0.0,
                    ms=5 if is_named else 1.5, zorder=3, rasterized=as_pixels)  # fmt: skip
         if is_named:
-            _named_rows(panel, [graded.names[i] for i in order])
+            _named_rows(panel, [short(drawable(graded.names[i]), _LONGEST) for i in order])
         else:
             panel.set(ylim=(n - 0.5, -0.5), ylabel="rank")
             panel.yaxis.label.set_fontsize(SMALL)
@@ -106,9 +106,13 @@ def speed_picture(graded: Grading) -> Picture:
     middle = 0.5 * float(density[0].min() + density[0].max())
     panel.set_xlim(middle - 0.65 * width, middle + 0.65 * width)
     if len(graded.names) <= _MOST_LABELLED:
-        for name, x, y in zip(graded.names, density[0], speed[0], strict=True):
-            panel.annotate(short(drawable(name), _LONGEST), (x, y), (4, 4), textcoords="offset points", fontsize=SMALL,
-                           parse_math=False)  # fmt: skip
+        for rank, i in enumerate(np.argsort(speed[0])):
+            is_right = density[0][i] > middle
+            panel.annotate(
+                short(drawable(graded.names[i]), _LONGEST), (density[0][i], speed[0][i]),
+                (-5 if is_right else 5, 4 if rank % 2 else -10), textcoords="offset points", fontsize=SMALL,
+                ha="right" if is_right else "left", parse_math=False,
+            )  # fmt: skip
     _lines_of_equal_ratio(panel, speed[0] / density[0])
     panel.set_xlabel("density, kg/m³", fontsize=SMALL)
     panel.set_ylabel("wave speed along the grain, m/s", fontsize=SMALL)
@@ -134,7 +138,7 @@ def limits_picture(graded: Grading) -> Picture:
     if is_named:
         colours = [GREEN if value >= 90.0 else VERMILLION if value < 10.0 else SKY for value in values]
         panel.barh(np.arange(len(order)), values, height=0.65, color=colours, edgecolor="black", lw=0.5)
-        _named_rows(panel, [graded.names[i] for i in order])
+        _named_rows(panel, [short(drawable(graded.names[i]), _LONGEST) for i in order])
     else:
         panel.plot(values, np.arange(1, len(order) + 1), color=BLUE, lw=1.6)
         panel.set(ylim=(len(order), 0))
@@ -153,7 +157,7 @@ def pairs_picture(graded: Grading) -> Picture:
     """The proposed pairs: by how much the constants of the partner differ, and the tolerance."""
     shown = graded.pairs[:_MOST_PAIRS]
     names = [name for name in MODULI if name in graded.request.match_percent] or list(MODULI)
-    figure, (panel,) = stacked([0.36 * len(shown) + 0.1], left=1.9, bottom=0.8)
+    figure, (panel,) = stacked([0.42 * len(shown) + 0.1], left=_LEFT, bottom=0.8)
     for row, pair in enumerate(shown):
         both = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
@@ -168,11 +172,13 @@ def pairs_picture(graded: Grading) -> Picture:
         panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)
     panel.axvline(0, color=DARK, lw=0.8)
     titles = [
-        f"{short(drawable(graded.names[p.first]), 9)} & {short(drawable(graded.names[p.second]), 9)}, "
-        f"{percent(p.probability)}"
+        f"{short(drawable(graded.names[p.first]), _LONGEST)}\n{short(drawable(graded.names[p.second]), _LONGEST)}"
         for p in shown
     ]
-    _named_rows(panel, titles, longest=40)
+    _named_rows(panel, titles)
+    for row, pair in enumerate(shown):
+        panel.annotate(percent(pair.probability), (1.0, row), xycoords=("axes fraction", "data"), ha="right",
+                       va="center", fontsize=SMALL, weight="bold")  # fmt: skip
     panel.set_xlabel("constants of the partner over the board's, %", fontsize=SMALL)
     legend_below(figure, [_handle(*_COLOURS[name], in_figure(name)) for name in names], 3)
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)
@@ -213,11 +219,10 @@ def _limit_band(panel: Axes, graded: Grading, name: str) -> None:
         )
 
 
-def _named_rows(panel: Axes, names: Sequence[str], longest: int = _LONGEST) -> None:
+def _named_rows(panel: Axes, names: Sequence[str]) -> None:
     """A row for each name, the first on top."""
     panel.set(ylim=(len(names) - 0.5, -0.5))
-    shown = [short(drawable(name), longest) for name in names]
-    panel.set_yticks(range(len(names)), shown, fontsize=SMALL, parse_math=False)
+    panel.set_yticks(range(len(names)), names, fontsize=SMALL, parse_math=False)
     panel.tick_params(axis="y", length=0)
     panel.spines["left"].set_visible(False)
     panel.grid(axis="x", color="0.9", lw=0.6)

@@ -52,7 +52,7 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked, hear
         pictures=[shown_picture(one, vector[one.name]) for one in every],
         modes_table=modes_table(report),
         aside_table=aside_table(aside) if aside else None,
-        fragment=report.fragment,
+        fragment=report.fragment.splitlines(),
     )
     write_text(folder / RECORDINGS_PAGE, text)
     save_pictures(every, folder / FIGURES, "png")

@@ -7,13 +7,9 @@ import pytest
 from linear_boards import exactly_together, linear_boards
 
 from bayesplate.campaigns.agreement import left_out, refusing
-from bayesplate.campaigns.boards import Member
-from bayesplate.campaigns.claim import LEAST_GAIN, TaughtBoard, judge, taught_boards
+from bayesplate.campaigns.claim import LEAST_GAIN, TaughtBoard, judge
 from bayesplate.campaigns.diagnosis import CLEARLY, IMPROBABLE, named
 from bayesplate.campaigns.search import PRIOR, Explanation, explanations
-from bayesplate.workflow.campaign_diagnose import _without_shared
-from bayesplate.workflow.campaign_fit import fit_boards
-from bayesplate.workflow.stages import Stages
 
 N_BOARDS = 8
 
@@ -124,16 +120,3 @@ def test_what_a_search_allows_to_say(found, verdict, effects):
     assert said[:2] == (verdict, effects)
     assert said[2]
     assert CLEARLY > 1.0 > IMPROBABLE
-
-
-def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_campaign):
-    before = fit_boards(_without_shared(campaign), 1, None, Stages(None, 1.0))
-    members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
-    taught = taught_boards(fitted_campaign.learnt, members, 1)
-
-    assert judge(taught).holds
-    for name, one in taught.items():
-        others = fitted_campaign.summary.shared["attached_mass.mass"].others[name]
-        assert one.log_score_gain > 0.0
-        assert one.after_rms_cents < one.before_rms_cents
-        assert one.others["attached_mass.mass"].mean == pytest.approx(others.mean, rel=0.05)

@@ -13,10 +13,14 @@ from scipy.linalg import block_diag
 import bayesplate
 from bayesplate.campaigns import learning
 from bayesplate.campaigns.boards import Member
+from bayesplate.campaigns.claim import judge, taught_boards
 from bayesplate.campaigns.learning import learn
 from bayesplate.cards import load_prior
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import SamplerSettings, sample
+from bayesplate.workflow.campaign_diagnose import _without_shared
+from bayesplate.workflow.campaign_fit import fit_boards
+from bayesplate.workflow.stages import Stages
 
 SHARED = "attached_mass.mass"
 
@@ -93,6 +97,19 @@ def test_the_truth_is_inside_and_sharing_narrows(fitted_campaign):
         alone, under_all = fitted_campaign.alone[board].summary, fitted_campaign.boards[board].summary
         assert under_all.elastic.E_x.sd < alone.elastic.E_x.sd
     assert not any(one.refuses for one in fitted_campaign.summary.left_out_boards.values())
+
+
+def test_a_sensor_on_all_boards_is_claimed_from_those_left_out(campaign, fitted_campaign):
+    before = fit_boards(_without_shared(campaign), 1, None, Stages(None, 1.0))
+    members = {name: Member(one.inference, one.draws, ()) for name, one in before.items()}
+    taught = taught_boards(fitted_campaign.learnt, members, 1)
+
+    assert judge(taught).holds
+    for name, one in taught.items():
+        others = fitted_campaign.summary.shared["attached_mass.mass"].others[name]
+        assert one.log_score_gain > 0.0
+        assert one.after_rms_cents < one.before_rms_cents
+        assert one.others["attached_mass.mass"].mean == pytest.approx(others.mean, rel=0.05)
 
 
 def test_a_board_walked_anew_is_that_of_weights(fitted_campaign, monkeypatch):

@@ -63,6 +63,13 @@ def solved(board, shear_moduli, n_modes, shape=None):
     )
 
 
+def rounding(board, weights):
+    """What rounding may leave of an eigenvalue at worst: the last digit of the stiffest unknown's own."""
+    plate = shear_flexible_plate(*board.ends, *mesh(weights, SHEAR_ELEMENTS_PER_SIDE))
+    stiffest = [(one.stiffness(weights).diagonal() / one.mass(weights).diagonal()).max() for one in plate.blocks]
+    return np.finfo(float).eps * max(stiffest)
+
+
 def cents(first, second):
     """Between the frequencies of two lists of eigenvalues."""
     return 600.0 * np.log2(np.asarray(first) / np.asarray(second))
@@ -249,7 +256,8 @@ def test_softer_shear_lowers_every_frequency():
     assert cents(found[-1].eigenvalues, found[0].eigenvalues)[5] == pytest.approx(-80.5, abs=0.5)
     for G_yz, modes in zip(moduli, found, strict=True):
         weights = weights_of(board, 0.62e9, G_yz)
-        np.testing.assert_allclose(modes.coefficients @ weights.stiffness, modes.eigenvalues, rtol=1e-8)
+        summed = modes.coefficients @ weights.stiffness / modes.eigenvalues
+        assert np.all(np.abs(summed - 1.0) < 0.05 * rounding(board, weights) / modes.eigenvalues)
         np.testing.assert_allclose(modes.mass_coefficients @ weights.mass, 1.0, rtol=1e-12)
 
 

@@ -50,7 +50,7 @@ def test_it_opens_whole_and_quiet(page, reports, which, width):
         wide = page.value("document.documentElement.scrollWidth")
         assert wide <= width
         sizes = page.value("[...document.images].map(one => [one.naturalWidth, one.getBoundingClientRect().right])")
-        assert len(sizes) == {"fit": 10, "diagnosis": 12}[which]
+        assert len(sizes) == {"fit": 10, "diagnosis": 13}[which]
         assert all(natural > 0 and right <= width for natural, right in sizes)
         beyond = "[...document.querySelectorAll('main *')].filter(one => one.getBoundingClientRect().right > %d + 0.5)"
         assert page.value(beyond % width + ".map(one => one.outerHTML.slice(0, 80))") == []
