@@ -51,7 +51,7 @@ class Source(Protocol):
 
 
 class Folder:
-    """The board cards of a folder; priors, campaigns and coefficient tables beside them are left aside.
+    """The board cards of a folder; priors, campaigns, coefficient tables and what `pick` writes are left aside.
 
     Parameters
     ----------
@@ -68,7 +68,8 @@ class Folder:
         entries, aside = [], []
         for at, file in enumerate(self._paths):
             content = _content_of(file)
-            if not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys():
+            is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
+            if is_other or content.keys() == {"setup"}:
                 aside.append(plain(file.name))
             else:
                 entries.append(Entry(plain(file.stem), at, _alike(content)))

@@ -59,6 +59,17 @@ def one(cards, tmp_path_factory):
     return CliRunner().invoke(main, ["batch", str(cards), "--out", str(out), *options]), out
 
 
+def test_what_is_no_board_card_is_left_aside(cards, tmp_path):
+    """A prior card, and what `pick` writes; a card that lacks its plate is a bad card, not another kind."""
+    folder = shutil.copytree(cards, tmp_path / "tops")
+    (folder / "setup.toml").write_text('[setup.frequencies_hz]\n"(1,1)" = 50.0\n')
+    (folder / "unfinished.toml").write_text('format = 1\nname = "unfinished"\n[setup]\n')
+    found = boards_of(folder, None)
+
+    assert set(found.aside) == {"own-prior.toml", "setup.toml"}
+    assert "unfinished" in {entry.name for entry in found.entries}
+
+
 def test_one_board_is_a_pure_function_that_travels(two, one):
     """What the table says of a board, and its files, are what `fit_board` gives with its seed; nothing is changed by
     the way to another process."""
