@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from typing import Any
 
 import click
 
 from bayesplate.asking import asked_answers, given_answers
+from bayesplate.options import costs, mass_kg, names, places, refuse_both, sand_pictures, shared_options
 from bayesplate.terminal import print_json, print_shown, progress_line, reporting, say
 
 
@@ -29,60 +29,6 @@ class Commands(click.Group):
             raise click.UsageError(error.message + hint, ctx) from None
 
 
-def _names(context: click.Context, option: click.Parameter, effects: str | None) -> list[str] | None:
-    """Effects from a comma-separated list; none at all from "none"."""
-    if effects is None:
-        return None
-    names = [name.strip() for name in effects.split(",") if name.strip()]
-    _refuse_both("none" in names, len(names) > 1, "--effects none declares nothing and a name declares an effect")
-    return [] if "none" in names else names
-
-
-def _refuse_both(one: bool, other: bool, why: str) -> None:
-    if one and other:
-        raise click.UsageError(f"{why}: give one of them.")
-
-
-def _options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """The shared options that a command takes, in one order."""
-    known = {
-        "out": click.option("--out", type=click.Path(), help="Output folder (default results/NAME)."),
-        "seed": click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Random seed."),
-        "effects": click.option(
-            "--effects",
-            callback=_names,
-            help="Declared effects, comma separated, in place of the card's; or none.",
-        ),
-        "setup": click.option(
-            "--setup", type=click.Path(), help="File with a [setup] that completes the card: what pick writes."
-        ),
-        "linear": click.option("--linear", is_flag=True, help="Force the linear frequency law."),
-        "exact": click.option("--exact", is_flag=True, help="Force the exact frequency law."),
-        "robust": click.option("--robust", is_flag=True, help="Student-t noise: one wrong mode has less say."),
-        "coefficients": click.option(
-            "--coefficients",
-            type=click.Choice(["sensitivity", "training", "published"]),
-            help="Source of the paper's coefficients (default: the table that the card names, else sensitivity).",
-        ),
-        "write_to": click.option("--out", type=click.Path(), help="Folder for compare.json (default: not written)."),
-        "force": click.option("--force", is_flag=True, help="Replace the results in the output folder."),
-        "report": click.option(
-            "--no-report", "report", is_flag=True, default=True, flag_value=False, help="Write no page and no figures."
-        ),
-        "resume": click.option("--resume", is_flag=True, help="Continue an interrupted run."),
-        "json": click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables."),
-        "quiet": click.option("--quiet", is_flag=True, help="Print nothing but errors."),
-        "debug": click.option("--debug", is_flag=True, help="Show the traceback of an error."),
-    }
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        for name in reversed(wanted):
-            command = known[name](command)
-        return command
-
-    return decorate
-
-
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="bayesplate")
 def main() -> None:
@@ -98,7 +44,7 @@ def main() -> None:
 
 @main.command()
 @click.argument("card")
-@_options("effects", "setup", "json", "quiet", "debug")
+@shared_options("effects", "setup", "json", "quiet", "debug")
 def check(card: str, effects: list[str] | None, setup: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
     """Every fault of CARD, or what would be fitted and what it can identify."""
     with reporting(as_json=as_json, debug=debug):
@@ -114,7 +60,7 @@ def check(card: str, effects: list[str] | None, setup: str | None, as_json: bool
 
 @main.command()
 @click.argument("card")
-@_options(
+@shared_options(
     "out",
     "seed",
     "effects",
@@ -146,8 +92,8 @@ def fit(
     debug: bool,
 ) -> None:
     """Posterior of the elastic constants of CARD: report.html, summary.json, posterior.nc."""
-    _refuse_both(force, resume, "--force starts anew and --resume continues")
-    _refuse_both(linear, exact, "--linear and --exact force different laws")
+    refuse_both(force, resume, "--force starts anew and --resume continues")
+    refuse_both(linear, exact, "--linear and --exact force different laws")
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.fit import fit as run
@@ -177,7 +123,7 @@ def fit(
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "setup", "force", "json", "quiet", "debug")
+@shared_options("out", "seed", "effects", "setup", "force", "json", "quiet", "debug")
 def modes(
     card: str,
     out: str | None,
@@ -205,7 +151,7 @@ def modes(
 
 @main.command()
 @click.argument("card")
-@_options("coefficients", "write_to", "seed", "effects", "force", "json", "quiet", "debug")
+@shared_options("coefficients", "write_to", "seed", "effects", "force", "json", "quiet", "debug")
 def compare(
     card: str,
     coefficients: Any,
@@ -241,7 +187,7 @@ def compare(
 
 @main.command()
 @click.argument("card")
-@_options("out", "seed", "effects", "setup", "report", "force", "resume", "json", "quiet", "debug")
+@shared_options("out", "seed", "effects", "setup", "report", "force", "resume", "json", "quiet", "debug")
 def diagnose(
     card: str,
     out: str | None,
@@ -256,7 +202,7 @@ def diagnose(
     debug: bool,
 ) -> None:
     """Trace the residual of CARD to an effect, add it, and report the error before and after."""
-    _refuse_both(force, resume, "--force starts anew and --resume continues")
+    refuse_both(force, resume, "--force starts anew and --resume continues")
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.diagnose import diagnose as run
@@ -283,18 +229,6 @@ def diagnose(
             say(f"written to {result.folder}")
 
 
-def _costs(context: click.Context, option: click.Parameter, costs: tuple[str, ...]) -> dict[str, Any] | None:
-    """Minutes by class from CLASS=MINUTES, as often as there are classes."""
-    told: dict[str, Any] = {}
-    for one in costs:
-        name, _, minutes = one.partition("=")
-        try:
-            told[name.strip()] = float(minutes)
-        except ValueError:
-            raise click.BadParameter(f"{one!r}: wanted CLASS=MINUTES, as reading=2", context, option) from None
-    return told or None
-
-
 @main.command()
 @click.argument("card")
 @click.option("--for", "goal", metavar="WHAT", help="E_x, E_y, G_xy, constants or explanations.")
@@ -303,11 +237,11 @@ def _costs(context: click.Context, option: click.Parameter, costs: tuple[str, ..
     "costs",
     multiple=True,
     metavar="CLASS=MINUTES",
-    callback=_costs,
+    callback=costs,
     help="Of a reading (1), a clamping (10), a board (30).",
 )
-@click.option("--between", callback=_names, help="Effects to be told apart, comma separated.")
-@_options("out", "seed", "effects", "force", "json", "quiet", "debug")
+@click.option("--between", callback=names, help="Effects to be told apart, comma separated.")
+@shared_options("out", "seed", "effects", "force", "json", "quiet", "debug")
 def plan(
     card: str,
     goal: str | None,
@@ -352,7 +286,7 @@ def plan(
 @click.option("--title", help="A line for people.")
 @click.option("--notes", help="Free text.")
 @click.option("--frequency", multiple=True, metavar="LABEL=HZ", help='As often as there are modes: "(1,1)=35".')
-@_options("json", "quiet", "debug")
+@shared_options("json", "quiet", "debug")
 def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: Any) -> None:
     """Write a first card to PATH, by asking, or from options where there are any."""
     given = {name: value for name, value in answers.items() if value}
@@ -368,61 +302,26 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
             say(f"written to {card}. Next: bayesplate modes {card}, which shows where to tap, and bayesplate check")
 
 
-def _place(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> list[tuple[float, float]]:
-    """Places "X,Y" in mm as m."""
-    found = []
-    for text in given:
-        try:
-            x, y = (1e-3 * float(part) for part in text.split(","))
-        except ValueError:
-            raise click.BadParameter(f"wanted X,Y in mm, got {text!r}: {option.opts[0]} 20,20") from None
-        found.append((x, y))
-    return found
-
-
-def _mass(context: click.Context, option: click.Parameter, given: str | None) -> tuple[float, float] | None:
-    """A mass "G" or "G,SD" in g as kg."""
-    if given is None:
-        return None
-    try:
-        mass, sd = (*(1e-3 * float(part) for part in given.split(",")), 0.0)[:2]
-    except ValueError:
-        raise click.BadParameter(
-            f"wanted a mass in g, or mass and standard deviation, got {given!r}: 0.6,0.1"
-        ) from None
-    return mass, sd
-
-
-def _sand(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[float, str]:
-    """Pictures "HZ=FILE" by their frequency."""
-    found = {}
-    for text in given:
-        hertz, _, path = text.partition("=")
-        try:
-            found[float(hertz)] = path
-        except ValueError:
-            raise click.BadParameter(f"wanted HZ=FILE, got {text!r}: --sand 210=sand-210.png") from None
-    return found
-
-
 @main.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path())
 @click.option("--card", metavar="CARD", help="Board card with sizes and edges: labels are computed for it.")
 @click.option("--rate", type=float, metavar="HZ", help="Samples a second, where a file does not say it.")
 @click.option(
-    "--hammer", multiple=True, callback=_place, metavar="X,Y", help="Where it was hit, mm; once, or per file."
+    "--hammer", multiple=True, callback=places, metavar="X,Y", help="Where it was hit, mm; once, or per file."
 )
-@click.option("--sensor", multiple=True, callback=_place, metavar="X,Y", help="Where the sensor was, mm; likewise.")
-@click.option("--sensor-mass", callback=_mass, metavar="G", help="Of the accelerometer in g, or G,SD.")
+@click.option("--sensor", multiple=True, callback=places, metavar="X,Y", help="Where the sensor was, mm; likewise.")
+@click.option("--sensor-mass", callback=mass_kg, metavar="G", help="Of the accelerometer in g, or G,SD.")
 @click.option("--channels", default="force,response", show_default=True, help="Of a file with two channels.")
 @click.option("--motion", default="acceleration", show_default=True, help="What a response is; pressure: a microphone.")
 @click.option("--polarity", help="same or opposite, of force and response (default: found by the labels).")
 @click.option("--sweep", metavar="F1,F2,S", help="For recordings of an exponential sweep: its parameters, or its file.")
-@click.option("--sand", multiple=True, callback=_sand, metavar="HZ=FILE", help="Picture of sand, cropped to the board.")
+@click.option(
+    "--sand", multiple=True, callback=sand_pictures, metavar="HZ=FILE", help="Picture of sand, cropped to the board."
+)
 @click.option("--lowest", type=float, default=20.0, show_default=True, metavar="HZ")
 @click.option("--highest", type=float, default=1000.0, show_default=True, metavar="HZ")
 @click.option("--out", type=click.Path(), default="results/recordings", show_default=True, help="Output folder.")
-@_options("force", "json", "quiet", "debug")
+@shared_options("force", "json", "quiet", "debug")
 def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bool, debug: bool, **given: Any) -> None:
     """Frequencies of the modes in recordings FILES, and the [setup] that a card takes."""
     with reporting(as_json=as_json, debug=debug):
@@ -440,7 +339,7 @@ def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bo
 
 @main.command()
 @click.argument("card")
-@_options("effects", "json", "quiet", "debug")
+@shared_options("effects", "json", "quiet", "debug")
 def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug: bool) -> None:
     """References of exactly what a fit of CARD uses."""
     with reporting(as_json=as_json, debug=debug):
@@ -464,7 +363,9 @@ def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug
 @click.option("--match", metavar="PERCENT", help="Boards match within this: 10 (default), or E_x=10,E_y=15.")
 @click.option("--limit", multiple=True, metavar="NAME=LEAST:GREATEST", help="A specification: E_x=10:14, density=:420.")
 @click.option("--rigidity", type=float, metavar="NM", help="D_x for which each board's thickness is wanted.")
-@_options("out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug")
+@shared_options(
+    "out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug"
+)
 def batch(
     source: str,
     out: str | None,
@@ -479,9 +380,9 @@ def batch(
     **asked: Any,
 ) -> None:
     """Fit the cards of the folder SOURCE, or the rows of the table SOURCE: one table, and a page that grades them."""
-    _refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
-    _refuse_both(linear, exact, "--linear and --exact force different laws")
-    _refuse_both(asked["workers"] is not None, asked["dask"] is not None, "--workers are processes here, --dask others")
+    refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
+    refuse_both(linear, exact, "--linear and --exact force different laws")
+    refuse_both(asked["workers"] is not None, asked["dask"] is not None, "--workers are processes here, --dask others")
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.batch import batch as run
