@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from functools import wraps
-from threading import Lock
 from typing import ParamSpec, TypeVar
 
 Given = ParamSpec("Given")
@@ -32,7 +32,7 @@ def kept(most_bytes: int, size: Callable[[Found], int]) -> Callable[[Callable[Gi
 
     def decorate(find: Callable[Given, Found]) -> Callable[Given, Found]:
         results: OrderedDict[Hashable, tuple[Found, int]] = OrderedDict()
-        lock = Lock()
+        lock = threading.Lock()
 
         @wraps(find)
         def found(*args: Given.args, **kwargs: Given.kwargs) -> Found:
