@@ -22,7 +22,7 @@ class GivenShared:
     Attributes
     ----------
     posterior : Posterior
-        With a surrogate of its law where there is one: it is evaluated a million times.
+        Of the board by itself, under its law or a surrogate of it.
     shared : tuple of Shared
     """
 

@@ -158,6 +158,8 @@ def told(records: Sequence[Record]) -> list[str]:
         f"modes missed: {sum(r['missed'] for r in records)} of {sum(r['audible'] for r in records)}; of those with a "
         f"neighbour within {100 * LONELY:g} %: {sum(r['close_missed'] for r in records)} of "
         f"{sum(r['close'] for r in records)}",
+        "",
+        *(f"{'met' if is_met else 'MISSED'}: {words}" for words, is_met in bars(records).items()),
     ]
     return lines
 
@@ -190,14 +192,26 @@ def _within(words: str, errors: Sequence[float]) -> str:
     return f"{words:34s} {100 * np.mean(sizes <= 1.0):15.1f} % {100 * np.mean(sizes <= 2.0):6.1f} %"
 
 
-def is_calibrated(records: Sequence[Record], key: str = "z") -> bool:
-    """Whether no share within one or two standard errors lies below the stated one, biases and false peaks as stated.
+def bars(records: Sequence[Record], key: str = "z") -> dict[str, bool]:
+    """Each bar, and whether it is met.
 
     Three Monte Carlo standard errors are allowed each; those of the shares are taken from how recordings differ, for
     the errors of one recording have much in common.
     """
-    inside = all(share >= wanted - 3.0 * sd for wanted, share, sd in _shares(records, key))
     relative = np.array([mode["relative"] for record in records for mode in record["modes"]])
     n_false = sum(len(record["false"]) for record in records)
     stated = sum(sum(record["false"]) + sum(mode["spurious"] for mode in record["modes"]) for record in records)
-    return bool(inside and abs(relative.mean()) < BIAS and n_false <= stated + 3.0 * np.sqrt(max(stated, 1.0)))
+    within = {
+        f"within {size:g} standard error{'s' if size > 1.0 else ''} as many as a normal law has": share
+        >= wanted - 3.0 * sd
+        for size, (wanted, share, sd) in zip(WITHIN, _shares(records, key), strict=True)
+    }
+    return within | {
+        f"bias below {100 * BIAS:g} %": bool(abs(relative.mean()) < BIAS),
+        "false peaks no more than stated": bool(n_false <= stated + 3.0 * np.sqrt(max(stated, 1.0))),
+    }
+
+
+def is_calibrated(records: Sequence[Record], key: str = "z") -> bool:
+    """Whether every one of the bars is met."""
+    return all(bars(records, key).values())

@@ -45,8 +45,10 @@ def main() -> int:
     lines = told(records)
     print("\n".join(lines))
     if options.publish is not None:
-        command = "python tests/calibration/run_recordings.py"
-        publish(options.publish, "recordings", "Picked modes of recordings, calibrated", command, lines)
+        command = "make recordings"
+        publish(
+            options.publish, "recordings", "Picked modes of recordings: are their errors as stated?", command, lines
+        )
     return 0 if is_calibrated(records) else 1
 
 

@@ -36,4 +36,5 @@ def test_more_false_peaks_than_stated_are_found_out(records):
     spoilt[0]["false"] = [0.01] * 25
 
     assert not is_calibrated(spoilt)
+    assert "MISSED: false peaks no more than stated" in told(spoilt)
     assert set(WITHIN) == {1.0, 2.0}
