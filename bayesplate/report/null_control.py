@@ -13,7 +13,8 @@ from bayesplate.report.style import BLUE, DARK, LIGHT, SMALL, VERMILLION, Pictur
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_HEIGHT = 1.15
+_HEIGHT = 1.05
+_FEWEST_TICKS = 4
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ def null_picture(diagnosis: Diagnosis) -> Picture | None:
     rows = _rows(diagnosis.null_control)
     if not rows:
         return None
-    figure, panels = stacked([_HEIGHT] * len(rows), bottom=0.85)
+    figure, panels = stacked([_HEIGHT] * len(rows), top=0.22, gap=0.7, bottom=0.75)
     for panel, row in zip(panels, rows, strict=True):
         _draw(panel, row)
     _as_odds(panels[0])
@@ -65,11 +66,7 @@ def _draw(panel: Axes, row: _Row) -> None:
     panel.stairs(counts, edges, color=DARK, lw=0.6)
     panel.axvline(row.board, color=BLUE, lw=2.0, label="this board")
     panel.axvline(row.limit, color=VERMILLION, lw=1.2, ls="--")
-    side = "left" if row.words == "needed beyond" else "right"
-    panel.annotate(
-        row.words, (row.limit, 1.0), xycoords=("data", "axes fraction"), xytext=(3 if side == "left" else -3, -2),
-        textcoords="offset points", fontsize=SMALL, color=VERMILLION, va="top", ha=side,
-    )  # fmt: skip
+    panel.set_title(f"dashed: {row.words}", loc="right", fontsize=SMALL, color=VERMILLION)
     panel.set_ylabel("boards", fontsize=SMALL)
     panel.set_xlabel(row.axis, fontsize=SMALL)
     panel.set_ylim(0.0, 1.25 * max(counts))
@@ -78,7 +75,9 @@ def _draw(panel: Axes, row: _Row) -> None:
 def _as_odds(panel: Axes) -> None:
     """Natural logarithms as people read odds."""
     low, high = panel.get_xlim()
-    steps = np.arange(np.ceil(low / np.log(10.0)), np.floor(high / np.log(10.0)) + 1.0)
-    steps = steps[:: max(1, len(steps) // 6)]
-    labels = [f"{10.0**step:.0f} : 1" if step >= 0 else f"1 : {10.0**-step:.0f}" for step in steps]
-    panel.set_xticks(steps * np.log(10.0), labels)
+    decades = np.arange(np.ceil(low / np.log(10.0)), np.floor(high / np.log(10.0)) + 1.0)
+    odds = 10.0 ** decades[:: max(1, len(decades) // 6)]
+    if odds.size < _FEWEST_TICKS:
+        odds = np.array([one * power for power in (0.01, 0.1, 1.0, 10.0, 100.0) for one in (1.0, 1.0 / 0.3)])
+        odds = odds[(np.log(odds) >= low) & (np.log(odds) <= high)]
+    panel.set_xticks(np.log(odds), [f"{one:.0f} : 1" if one >= 1.0 else f"1 : {1.0 / one:.0f}" for one in odds])

@@ -131,7 +131,7 @@ def test_the_board_stands_among_simulated_ones(drawn):
 
     assert [line.get_xdata()[0] for line in odds.lines] == [4.5, 3.0]
     assert [line.get_xdata()[0] for line in ratios.lines] == [0.25, 0.75]
-    assert {text.get_text() for text in odds.texts} == {"needed beyond"}
+    assert [one.get_title("right") for one in (odds, ratios)] == ["dashed: needed beyond", "dashed: claimed below"]
     assert [text.get_text() for text in odds.get_xticklabels()] == ["1 : 100", "1 : 10", "1 : 1", "10 : 1", "100 : 1"]
 
 
