@@ -147,8 +147,10 @@ def _constants(
     found: Found, verdict: Verdict, truth: Mapping[str, float], rng: np.random.Generator
 ) -> dict[str, dict[str, Any]]:
     """Intervals of 90 % and whether they hold the truth: without tracing, after it, averaged over all hypotheses."""
-    ways = {"without": [0], "after": traced(found, verdict), "averaged": None}
-    drawn = {way: draw_constants(found, rng, N_DRAWS, among) for way, among in ways.items()}
+    among = traced(found, verdict)
+    drawn = {"without": draw_constants(found, rng, N_DRAWS, [0])}
+    drawn["after"] = drawn["without"] if among == [0] else draw_constants(found, rng, N_DRAWS, among)
+    drawn["averaged"] = draw_constants(found, rng, N_DRAWS)
     return {name: {way: _interval(draws, name, truth[name]) for way, draws in drawn.items()} for name in MODULI}
 
 

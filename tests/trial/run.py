@@ -26,8 +26,8 @@ from trial.cells import CELLS, Cell, identity, jobs
 from trial.judge import Record, judge_one
 from trial.page import write
 
-BASE_SEED = 5
-"""Boards of seeds 1 to 4 were looked at while rules and sizes could still change."""
+BASE_SEED = 6
+"""Boards of seeds 1 to 5 were looked at, or begun with, while rules and sizes could still change."""
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "validation"
 SAME = 1e-3
 """Probabilities that agree to this are the same: refactoring and other processors change the last digits."""
