@@ -20,6 +20,10 @@ WIDTHS = (100.0, 60.0)
 """Hz of the windows in which modes are looked for; the first are those of the final fits."""
 _MARGIN = 40.0
 """Hz on either side of a window that are fitted too."""
+_REACH = 150.0
+"""Hz beyond a window up to which the modes that were found take part in its fit as they are."""
+_NOTED = 2.0
+"""Standard errors from which on the difference of two windows is more than chance."""
 _LEAST_LINES = 40
 _MOST_RECORDS, _MOST_FITTED = 6, 10
 """Combinations of records among which modes are looked for, and to which they are fitted before the last steps."""
@@ -57,7 +61,7 @@ class Mode:
     expected : float
         Of how many modes noise alone would give so much, in all the band.
     shift : float, Hz
-        By which the frequency differs in a window of the other width, beyond what the different lines let expect.
+        By which the frequency differs in a narrower window, where that is more than the fewer lines let expect.
     seen : float
         Share of the widths of windows in which it was found.
     """
@@ -202,6 +206,8 @@ def _modes_of(
     own = start[(start[:, 0] >= ends[0]) & (start[:, 0] <= ends[1])]
     if not len(own):
         return
+    outside = np.maximum(ends[0] - start[:, 0], start[:, 0] - ends[1])
+    window = replace(window, fixed=start[(outside > 0.0) & (outside <= _REACH)])
     strongest = compressed(window, _MOST_FITTED)
     few, gains = _pruned(with_share(refined(strongest, own), _SHARES), _least_gain(window))
     if not len(few.poles):
@@ -276,12 +282,13 @@ def _narrower(fit: Fitted, low: float, high: float) -> Fitted:
 
 
 def _shift(narrow: Fitted, pole: Floats, variance: float) -> float:
-    """By how much a frequency moves in the narrower window, beyond what fewer lines let expect."""
+    """By how much a frequency moves in the narrower window, if that is more than fewer lines let expect."""
     nearest = int(np.argmin(np.abs(narrow.poles[:, 0] - pole[0])))
     _, information = narrow.information()
     inverse = np.linalg.pinv(information.sum(axis=0), hermitian=True)
     expected = max(float(inverse[nearest, nearest]) - variance, 0.0)
-    return float(np.sqrt(max((narrow.poles[nearest, 0] - pole[0]) ** 2 - expected, 0.0)))
+    moved = float(narrow.poles[nearest, 0] - pole[0])
+    return float(np.sqrt(moved**2 - expected)) if moved**2 > _NOTED**2 * expected else 0.0
 
 
 def _residue_sd(fit: Fitted, mode: int) -> Floats:

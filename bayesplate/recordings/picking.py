@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 
 LOWEST, HIGHEST = 20.0, 1000.0
 """Hz between which modes are looked for unless others are given."""
+_BEYOND = 60.0
+"""Hz above the highest in which modes are looked for too: they reach into the band."""
 _PART = 0.5
 """Probability from which on a part of another peak is fitted together with it as one mode."""
 _PRIOR_GROUPS = 8.0
@@ -112,7 +114,7 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
     -------
     Picked
     """
-    by_width, paths = find_modes(spectra, lowest, highest)
+    by_width, paths = find_modes(spectra, lowest, min(highest + _BEYOND, float(spectra.frequency[-1])))
     modes = fit_modes(spectra, joined(by_width, spectra), by_width, lowest, highest)
     answered = answers(spectra, modes)
     judged = verdicts(spectra, modes, answered)

@@ -165,14 +165,19 @@ def told(records: Sequence[Record]) -> list[str]:
 
 
 def _shares(records: Sequence[Record], key: str) -> list[tuple[float, float, float]]:
-    """For one and for two standard errors: the share wanted, the share within, and its Monte Carlo error."""
+    """For one and for two standard errors: the share wanted, the share within, and its Monte Carlo error.
+
+    The error is that of independent modes or what recordings differ by, whichever is larger: two recordings hardly
+    tell how much recordings differ.
+    """
     found = []
     for size, wanted in WITHIN.items():
         inside = [np.abs([mode[key] for mode in record["modes"]]) <= size for record in records if record["modes"]]
         share = float(np.mean(np.concatenate(inside)))
         off = np.array([one.sum() - share * one.size for one in inside])
-        sd = float(np.sqrt(np.sum(off**2))) / sum(one.size for one in inside)
-        found.append((wanted, share, max(sd, 0.01 if len(records) < 10 else 0.0)))
+        n_modes = sum(one.size for one in inside)
+        independent = float(np.sqrt(wanted * (1.0 - wanted) / n_modes))
+        found.append((wanted, share, max(float(np.sqrt(np.sum(off**2))) / n_modes, independent)))
     return found
 
 

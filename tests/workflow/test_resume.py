@@ -39,7 +39,7 @@ def stop_while_sampling(folder: Path, *stops: signal.Signals, n_chunks: int) -> 
     """Send a signal once so many chunks are saved; the exit code and what was said. The first of two only holds it."""
     with start(folder, BOARD, "--no-report") as process:
         last = folder / "checkpoint" / "linear" / f"chunk-{n_chunks - 1:04d}.npz"
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 600
         while not last.exists() and process.poll() is None:
             assert time.monotonic() < deadline
             time.sleep(0.01)
@@ -48,7 +48,7 @@ def stop_while_sampling(folder: Path, *stops: signal.Signals, n_chunks: int) -> 
             if stop == signal.SIGSTOP:
                 for beside in ("--force", "--resume"):
                     assert_taken(folder, beside, process.pid)
-        _, stderr = process.communicate(timeout=60)
+        _, stderr = process.communicate(timeout=600)
     return process.returncode, stderr
 
 
