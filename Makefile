@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs calibration spectra campaigns plans recordings sand measured coverage trial benchmarks
+.PHONY: fit test slow docs calibration spectra campaigns plans recordings sand measured bars coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -42,6 +42,9 @@ sand: $(VENV)/tested-with
 
 measured: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_measured.py --folder ../shared/data
+
+bars: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/run_bars.py --publish docs/validation --workers 2
 
 plans: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_plans.py --boards 200 --workers 2 --out results/plans.jsonl --publish docs/validation

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 import ritz
+from bars import meets
 
 from bayesplate.frequencies.laws import ExactLaw, LinearLaw
 from bayesplate.modes.mesh import mesh
@@ -72,7 +73,8 @@ def trial(name, n_draws=16):
 def test_frequencies_hold_within_half_a_cent_where_nothing_was_trained(name):
     draws, exact = trial(name)
 
-    assert np.abs(cents(prepared(name)[2].eigenvalues(draws), exact)).max() < 0.5
+    worst = np.abs(cents(prepared(name)[2].eigenvalues(draws), exact)).max()
+    meets("V11", f"full solves at 16 points, {name}", worst, at_most=0.5, unit="cents")
 
 
 @pytest.mark.parametrize("name", WANTED)
@@ -83,7 +85,7 @@ def test_reported_error_is_honest(name):
 
     worst = np.abs(cents(reduced.eigenvalues(draws), exact)).max()
 
-    assert worst < 3.0 * reduced.worst_cents
+    meets("V11", f"over the error that the law states, {name}", worst / reduced.worst_cents, at_most=3.0)
 
 
 def test_reported_error_is_the_true_one_where_the_basis_is_poor():
