@@ -2,14 +2,16 @@
 
 Plants boards with the independent generator, cell by cell of `cells`, judges each as `diagnose` would, and writes what
 came out to docs/validation/trial.json and trial.md; beside them the records of a whole trial, compressed, or their
-digest. An interrupted run goes on where it stopped if it is given the same
-file; if the code has changed since, one board of each cell is judged again, and must come out as it did. Exit code 0:
-every bar met; 1: some are missed, and stay there as missed; 2: usage.
+digest. An interrupted run goes on where it stopped if it is given the same file; if the code has changed since, one
+board of each cell is judged again, and must come out as it did. What was judged of a trial that is not whole is kept
+in begun.jsonl.gz, with which a new file begins. Exit code 0: every bar met; 1: some are missed, and stay there as
+missed; 2: usage.
 """
 
 from __future__ import annotations
 
 import argparse
+import gzip
 import json
 import os
 import sys
@@ -29,6 +31,8 @@ from trial.page import write
 BASE_SEED = 6
 """Boards of seeds 1 to 5 were looked at, or begun with, while rules and sizes could still change."""
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "validation"
+BEGUN = Path(__file__).with_name("begun.jsonl.gz")
+"""Records of a trial that is not whole yet, if there is one: a new file begins with them."""
 SAME = 1e-3
 """Probabilities that agree to this are the same: refactoring and other processors change the last digits."""
 
@@ -62,6 +66,14 @@ def run(
     order = {cell.name: place for place, cell in enumerate(cells)}
     keys = sorted(((cell.name, index) for cell, index in wanted), key=lambda key: (order[key[0]], key[1]))
     return [by_board[key] for key in keys if key in by_board]
+
+
+def begin(out: Path, begun: Path = BEGUN) -> None:
+    """Begin a file that does not exist with the records of the trial that is not whole yet."""
+    if out.exists() or not begun.exists():
+        return
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_bytes(gzip.decompress(begun.read_bytes()))
 
 
 def _begun(out: Path, cells: Sequence[Cell], base_seed: int, check: bool) -> list[Record]:
@@ -102,6 +114,8 @@ def main() -> int:
     parser.add_argument("--only-summary", action="store_true", help="judge no board, sum up those in the file")
     options = parser.parse_args()
     started = time.perf_counter()
+    if options.base_seed == BASE_SEED:
+        begin(options.out)
     records = run(
         CELLS,
         options.out,
