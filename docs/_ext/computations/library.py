@@ -33,6 +33,17 @@ from computations.runs import SOURCE
 RESULTS = SOURCE / "validation"
 CHECKS = (
     (
+        "bars",
+        "make bars",
+        "Every bar of computation, convergence, long runs and security, with the worst figure that a test of it measured.",
+    ),
+    (
+        "peers",
+        "make peers",
+        "The paper's six frequencies to a converged posterior, with this package and with the samplers that a user would "
+        "otherwise take: time from a cold process, effective draws a second, and how far the posteriors differ.",
+    ),
+    (
         "benchmarks",
         "make benchmarks",
         "What sampling and whole commands cost beside emcee as it comes, measured in one run, each with its limit.",
