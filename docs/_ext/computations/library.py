@@ -35,12 +35,12 @@ CHECKS = (
     (
         "bars",
         "make bars",
-        "Every bar of computation, convergence, long runs and security, with the worst figure that a test of it measured.",
+        "Every bar of computation, convergence, long runs and security, with the worst that a test measured.",
     ),
     (
         "peers",
         "make peers",
-        "The paper's six frequencies to a converged posterior, with this package and with the samplers that a user would "
+        "The six frequencies of the paper to a converged posterior, by this package and by the samplers that one would "
         "otherwise take: time from a cold process, effective draws a second, and how far the posteriors differ.",
     ),
     (
