@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bayesplate.columns import laid_out
-from bayesplate.errors import BayesplateError, Fault, UnwritableError
+from bayesplate.errors import BayesplateError, Fault, UnwritableError, plain
 
 if TYPE_CHECKING:
     from bayesplate.workflow.shown import Progress, Shown
@@ -131,7 +131,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
 
 
 def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:
-    click.echo(message, err=True)
+    click.echo("\n".join(plain(line) for line in message.split("\n")), err=True)
     if as_json:
         with suppress(UnwritableError):  # the message has been given
             say(json.dumps({"error": {"exit_code": code, "message": message, "faults": list(faults)}}, indent=2))

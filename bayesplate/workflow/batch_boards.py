@@ -14,7 +14,9 @@ from bayesplate.cards.rows import Cell, csv_rows
 from bayesplate.errors import Fault, InputError
 from bayesplate.results.board_table import parquet_library
 
-LARGEST_TABLE = 1_000_000_000
+LARGEST_TABLE = 100_000_000
+"""Bytes; hundreds of thousands of boards, and ten times as much in memory."""
+_LONGEST = 1e9
 _OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
@@ -148,7 +150,7 @@ def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
     plate, setups = content.get("plate"), content.get("setup")
     sides = [plate.get(f"length_{side}_mm") for side in "xy"] if isinstance(plate, dict) else []
     told = [side.get("mean") if isinstance(side, dict) else side for side in sides]
-    means = [float(side) for side in told if isinstance(side, int | float) and side > 0]
+    means = [float(side) for side in told if isinstance(side, int | float) and 0 < side <= _LONGEST]
     listed = setups if isinstance(setups, list) else [setups]
     edges = [repr(one.get("edges")) for one in listed if isinstance(one, dict)]
     if len(means) == 2:
@@ -159,6 +161,8 @@ def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
 def _read_csv(path: Path) -> tuple[list[str], list[list[Cell]]]:
     file = plain(path.name)
     try:
+        if not path.is_file():
+            raise InputError(Fault(file, "a regular file", "a device, or another that is none"))
         if path.stat().st_size > LARGEST_TABLE:
             raise InputError(Fault(file, f"a table of at most {LARGEST_TABLE:,} bytes", "a larger one"))
         rows = csv_rows(path.read_bytes(), file)
