@@ -78,7 +78,7 @@ def test_an_output_that_cannot_be_written_is_one_line(options):
 
 @pytest.fixture(scope="module")
 def places(tmp_path_factory) -> dict[str, str]:
-    """A folder with two cards that are refused, so that nothing is fitted; a card to be planned; a recording of a hit."""
+    """A folder with two cards that are refused, so that nothing is fitted; a card to be planned; a recorded hit."""
     folder = tmp_path_factory.mktemp("places")
     force, heard = hits(np.random.default_rng(2), [0.05], (0.02, 0.02))
     return {

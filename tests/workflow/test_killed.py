@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +62,7 @@ def moments(n: int, n_of: int, seed: int) -> list[int]:
     """So many moments of all, one in each of as many equal parts of the run."""
     ends = np.linspace(0, n_of, n + 1).astype(int)
     rng = np.random.default_rng(seed)
-    return [int(rng.integers(first, last)) + 1 for first, last in zip(ends, ends[1:], strict=False)]
+    return [int(rng.integers(first, last)) + 1 for first, last in pairwise(ends)]
 
 
 @pytest.mark.parametrize(
