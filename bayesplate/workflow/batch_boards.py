@@ -67,9 +67,10 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self._paths = sorted(path.glob("*.toml"), key=lambda one: one.name)
+        self._inside = os.path.realpath(path)
         entries, aside = [], []
         for at, file in enumerate(self._paths):
-            content = _content_of(file)
+            content = _content_of(file) if self._is_inside(file) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
             if is_other or content.keys() == {"setup"}:
                 aside.append(plain(file.name))
@@ -81,8 +82,15 @@ class Folder:
         self.aside: Sequence[str] = aside
 
     def card(self, entry: Entry) -> BoardCard:
-        """The card of a board; raises InputError with all its faults."""
-        return load_board(self._paths[entry.at])
+        """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
+        path = self._paths[entry.at]
+        if not self._is_inside(path):
+            wanted, remedy = "a card in the folder of the batch", "copy the card"
+            raise InputError(Fault(plain(path.name), wanted, "a link that leads out of it", remedy))
+        return load_board(path)
+
+    def _is_inside(self, path: Path) -> bool:
+        return Path(os.path.realpath(path)).is_relative_to(self._inside)  # which a link to itself does not confuse
 
 
 class Table:
