@@ -1,8 +1,8 @@
 """The journal of a run over many boards: a line for each board that is done, kept for the next run over them.
 
 A line is written at once and whole; what a killed run left of its last one is cut off, and one that was altered later
-is none. A row is found by a key that says all that decides it, so that a card that was changed is another board, and one
-that was moved is not.
+is none. A row is found by a key that says all that decides it, so that a card that was changed is another board, and
+one that was moved is not.
 """
 
 from __future__ import annotations

@@ -53,9 +53,10 @@ def picked(tmp_path_factory):
     arguments = [str(write_wav(folder / name, 4000.0, force, heard)) for name in names]
     for i in range(len(names)):
         arguments += ["--hammer", f"{20 + 10 * i},20"]
-    result = CliRunner().invoke(main, ["pick", *arguments, "--highest", "200", "--out", str(folder / "o\x1b[2Jut")])
+    out = folder / "o\x1b[2J\x07\u202eut"
+    result = CliRunner().invoke(main, ["pick", *arguments, "--highest", "200", "--out", str(out)])
     assert result.exit_code == 0, result.output
-    return names, folder / "o\x1b[2Jut", result.stdout + result.stderr
+    return names, out, result.stdout + result.stderr
 
 
 def test_names_of_recordings_stay_texts(picked):
