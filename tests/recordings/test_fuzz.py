@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from fuzzing import accepted_or_refused, fuzzed, memory_below, stopped_if_it_hangs
 from hypothesis import strategies as st
 
+import bayesplate
 from bayesplate.errors import InputError
 from bayesplate.recordings.reading import READERS, read_recordings
 from bayesplate.recordings.signals import FrequencyResponse, Recording
+from bayesplate.recordings.strength import _answer
 
 RATE = 4000
 TIMES = np.arange(1400) / RATE
@@ -107,11 +110,10 @@ PIECES = [*NUMBERS, *NAMES, ",", ";", "\t", "\n", "\r", "\r\n", "#", '"', "\0", 
           "\ufeff", "é", "\x1b[31m", "\u202e"]  # fmt: skip
 
 
-def table(names: list[str], columns: list[np.ndarray]) -> str:
+def table(names: list[str], columns: list[np.ndarray], form: str = "{:.6g}") -> str:
     """A CSV table."""
-    return (
-        ",".join(names) + "\n" + "".join(",".join(f"{x:.6g}" for x in row) + "\n" for row in zip(*columns, strict=True))
-    )
+    rows = (",".join(form.format(float(x)) for x in row) for row in zip(*columns, strict=True))
+    return "\n".join([",".join(names), *rows, ""])
 
 
 HERTZ = np.arange(120.0)
@@ -229,6 +231,54 @@ def test_what_was_found_is_refused_with_its_reason(tmp_path, name):
         read_recordings([tmp_path / name], rate=float(RATE))
 
     assert said in str(refused.value)
+
+
+def odd_signals() -> dict[str, np.ndarray]:
+    """Recordings that are read and hold no board."""
+    ones = np.ones(3000)
+    return {
+        "a click": np.eye(1, 3000, 5)[0],
+        "a ramp": np.arange(3000.0),
+        "noise of the last digit": ones + 1e-12 * np.random.default_rng(1).standard_normal(3000),
+        "noise": np.random.default_rng(2).standard_normal(3000),
+        "a click that is huge": 1e99 * np.eye(1, 3000, 1500)[0] + 1e-3 * np.sin(np.arange(3000.0)),
+        "a breath": 1e-90 * np.sin(np.arange(3000.0)),
+        "a ring of no length": np.exp(-np.arange(3000.0)),
+    }
+
+
+ODD = odd_signals()
+
+
+@pytest.mark.parametrize("heard", ODD)
+@pytest.mark.parametrize("struck", [None, "a click", "a breath", "noise of the last digit"])
+def test_what_is_no_board_is_picked_or_refused(tmp_path, heard, struck):
+    """With a force and without: modes, none, or a reason."""
+    columns = {"acceleration": ODD[heard], **({} if struck is None else {"force": ODD[struck]})}
+    (tmp_path / "a.csv").write_text(table([*columns], [*columns.values()], "{!r}"))
+
+    accepted_or_refused(lambda: bayesplate.pick([tmp_path / "a.csv"], rate=2000.0, highest=300.0), tmp_path)
+
+
+@pytest.mark.parametrize(("step", "said"), [(0.001, "got 0"), (100.0, "got 3"), (0.2, "")])
+def test_a_response_with_next_to_no_lines_in_the_band_is_refused(tmp_path, step, said):
+    hertz = np.arange(1600) * step
+    values = 1.0 / (60.0**2 - hertz**2 + 2j * hertz)
+    (tmp_path / "a.csv").write_text(table(["f_hz", "re", "im"], [hertz, values.real, values.imag]))
+
+    found = accepted_or_refused(lambda: bayesplate.pick([tmp_path / "a.csv"], lowest=20.0, highest=310.0), tmp_path)
+
+    assert (f"a.csv between 20 and 310 Hz: wanted 5 lines or more, {said}" in str(found)) == bool(said)
+
+
+def test_a_hit_without_force_at_a_mode_says_nothing_of_it():
+    """Neither a number that is none nor a warning: the mobility is not known there."""
+    spectra = SimpleNamespace(motion="velocity", between=((None, None),), places=np.zeros(2, dtype=int))
+    mode = SimpleNamespace(frequency=100.0, residues=np.zeros(2, complex), residue_sd=np.ones(2))
+    answer = _answer(spectra, mode, np.zeros(2, complex))
+
+    assert np.isfinite(answer.mobility).all()
+    assert answer.sd[0] > 1e100
 
 
 def test_a_header_that_claims_more_than_there_is_costs_no_memory(tmp_path):
