@@ -9,7 +9,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs calibration spectra campaigns plans recordings sand measured bars coverage trial benchmarks
+.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings sand measured bars coverage trial benchmarks
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -24,6 +24,14 @@ slow: $(VENV)/tested-with
 
 docs: $(VENV)/tested-with
 	$(BIN)/python -m sphinx -W --keep-going -n -b html docs docs/_build/html
+
+# The versions that the tests ran with, and what is known of their weaknesses.
+lock: $(VENV)/tested-with
+	$(BIN)/python .ci/lock.py > requirements.lock.partial
+	mv requirements.lock.partial requirements.lock
+
+audit:
+	$(PYTHON) .ci/audit.py
 
 calibration: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl --publish docs/validation

@@ -17,9 +17,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 
+def plain(text: str) -> str:
+    """A text whose unprintable characters are written as escapes, so that it cannot steer a terminal."""
+    return "".join(
+        character if character.isprintable() else character.encode("unicode_escape").decode() for character in text
+    )
+
+
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with an input.
+    """One thing wrong with an input; what is unprintable in it, wherever it comes from, is written as an escape.
 
     Attributes
     ----------
@@ -37,6 +44,11 @@ class Fault:
     wanted: str
     got: str
     remedy: str = ""
+
+    def __post_init__(self) -> None:
+        """Names of files and what libraries say of them may hold anything."""
+        for name in ("place", "wanted", "got", "remedy"):
+            object.__setattr__(self, name, plain(getattr(self, name)))
 
     def __str__(self) -> str:
         text = f"{self.place}: wanted {self.wanted}, got {self.got}"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bayesplate.columns import laid_out
-from bayesplate.errors import BayesplateError, Fault, UnwritableError
+from bayesplate.errors import BayesplateError, Fault, UnwritableError, plain
 
 if TYPE_CHECKING:
     from bayesplate.workflow.shown import Progress, Shown
@@ -40,26 +40,31 @@ def print_shown(shown: Shown) -> None:
     for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
         console.print(Text(sentence))
     console.print(Text(shown.closing))
-    say(printed.getvalue(), nl=False)
+    _write(printed.getvalue())
 
 
 def print_json(content: Any) -> None:
     """What a command found, for other programs."""
     from bayesplate.workflow.shown import json_text
 
-    say(json_text(content), nl=False)
+    _write(json_text(content))
 
 
 def say(text: str, *, nl: bool = True) -> None:
-    """Print on the standard output.
+    """Print a text on the standard output; the name of a folder in it may hold anything, and steers nothing.
 
     Raises
     ------
     UnwritableError
         If it cannot be written, as on a full disk.
     """
+    _write("\n".join(plain(line) for line in text.split("\n")) + "\n" * nl)
+
+
+def _write(text: str) -> None:
+    """Print what is ready for the standard output, with the codes of a terminal where it is one."""
     try:
-        click.echo(text, nl=nl)
+        click.echo(text, nl=False)
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -131,8 +136,10 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
 
 
 def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:
-    click.echo(message, err=True)
+    click.echo("\n".join(plain(line) for line in message.split("\n")), err=True)
     if as_json:
         with suppress(UnwritableError):  # the message has been given
-            say(json.dumps({"error": {"exit_code": code, "message": message, "faults": list(faults)}}, indent=2))
+            _write(
+                json.dumps({"error": {"exit_code": code, "message": message, "faults": list(faults)}}, indent=2) + "\n"
+            )
     sys.exit(code)

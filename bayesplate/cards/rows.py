@@ -13,7 +13,7 @@ from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, rea
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.shelf import find
 from bayesplate.cards.words import did_you_mean, plain, quoted
-from bayesplate.cards.writing import array, number, table, text
+from bayesplate.cards.writing import array, number, table, text, whole
 from bayesplate.errors import Fault, InputError
 
 Cell = str | float | int | None
@@ -216,7 +216,7 @@ def _toml(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int):
-        return str(value)
+        return whole(value)
     if isinstance(value, float):
         return number(value)
     if isinstance(value, Mapping):

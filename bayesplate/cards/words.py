@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 
+from bayesplate.errors import plain as plain
+
 EDGE_NAMES = ("x0", "x1", "y0", "y1")
 EDGE_WORDS = ("clamped", "supported", "free")
 ATTACHED_KINDS = ("accelerometer", "exciter", "shaker", "weight")
@@ -49,13 +51,6 @@ def quoted(text: str) -> str:
     """A text in double quotes, shortened, with control and direction characters made visible."""
     short = text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
     return '"' + plain(short).replace('"', '\\"') + '"'
-
-
-def plain(text: str) -> str:
-    """A text whose unprintable characters are written as escapes, so that it cannot steer a terminal."""
-    return "".join(
-        character if character.isprintable() else character.encode("unicode_escape").decode() for character in text
-    )
 
 
 def shown(value: object) -> str:

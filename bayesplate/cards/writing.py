@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -20,6 +21,7 @@ _DIGITS = 12
 """Where they say a number but for the rounding of a change of units, they are the ones that somebody wrote."""
 _ROUNDING = 2e-15
 _STEPS = (0, 1, -1, 2, -2)
+_MOST_BITS = 10_000
 
 
 def prior_text(prior: PriorCard) -> str:
@@ -122,8 +124,13 @@ def unstatable(place: str, one: Quantity, kind: Kind = "log-normal") -> list[Fau
 
 
 def text(value: str) -> str:
-    """A basic string of TOML; JSON escapes it the same way."""
-    return json.dumps(value, ensure_ascii=False)
+    """A basic string of TOML; JSON escapes it the same way, but for one character that TOML does not let through."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def whole(value: int) -> str:
+    """A whole number; one of thousands of digits, which Python does not write in tens, as TOML may have it too."""
+    return str(value) if value.bit_length() < _MOST_BITS else hex(value)
 
 
 def table(entries: Mapping[str, str]) -> str:
@@ -148,11 +155,15 @@ def write_card(path: Any, name: str, content: str, *, force: bool) -> None:
     shown = plain(str(path))
     if path.name != f"{name}.toml":
         raise InputError(Fault(shown, f"{name}.toml, the name of the card", plain(path.name)))
+    if path.exists() and not force:
+        raise InputError(Fault(shown, "a new file", "one that exists", "force=True replaces it"))
+    partial = path.with_name(path.name + ".partial")
     try:
-        with path.open("w" if force else "x", encoding="utf-8", newline="\n") as stream:
-            stream.write(content)
-    except FileExistsError:
-        raise InputError(Fault(shown, "a new file", "one that exists", "force=True replaces it")) from None
+        try:
+            partial.write_text(content, encoding="utf-8", newline="\n")
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
     except OSError as error:
         raise InputError(Fault(shown, "a place for the card", error.strerror or str(error))) from None
 
@@ -197,4 +208,6 @@ def _value(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return text(value)
+    if isinstance(value, int):
+        return whole(value)
     return value.isoformat() if hasattr(value, "isoformat") else repr(value)

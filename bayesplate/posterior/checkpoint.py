@@ -144,7 +144,7 @@ class Checkpoint:
             return
         try:
             found = json.loads(path.read_bytes())
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             raise self._error("wanted a readable manifest.json, got a damaged one") from None
         if not isinstance(found, dict):
             raise self._error("wanted a manifest.json with keys, got something else")

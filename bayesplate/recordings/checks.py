@@ -18,6 +18,8 @@ _FLAT = 4
 _SILENT = 1e-5
 """Of full scale: less than the last bit of 16."""
 _FASTEST, _SLOWEST = 1e6, 200.0
+_LARGEST, _SMALLEST = 1e100, 1e-100
+"""Of numbers without a unit: what lies between them can be squared and divided."""
 
 
 def signal_faults(one: Recording | FrequencyResponse) -> Iterator[Fault]:
@@ -25,7 +27,9 @@ def signal_faults(one: Recording | FrequencyResponse) -> Iterator[Fault]:
     if isinstance(one, FrequencyResponse):
         if not np.isfinite(one.values).all():
             yield Fault(one.name, "finite numbers", f"line {_first(one.values)} is none")
-        elif not np.abs(one.values).any():
+        elif _is_beyond(one.values):
+            yield Fault(one.name, f"numbers up to {_LARGEST:g}", "larger ones")
+        elif not (np.abs(one.values) > _SMALLEST).any():
             yield Fault(one.name, "a response", "nothing but zeros")
         return
     if not _SLOWEST <= one.rate <= _FASTEST:
@@ -44,10 +48,13 @@ def _channel_faults(one: Recording, signal: Floats, name: str) -> Iterator[Fault
     if not np.isfinite(signal).all():
         yield Fault(name, "finite numbers", f"sample {_first(signal)} is none")
         return
+    if _is_beyond(signal):
+        yield Fault(name, f"numbers up to {_LARGEST:g}", "larger ones")
+        return
     if signal.size < LEAST_DURATION * one.rate:
         yield Fault(name, f"{LEAST_DURATION:g} s or more", f"{signal.size / one.rate:.2g} s", "let the board ring out")
     spread = float(np.ptp(signal))
-    if spread <= (_SILENT * one.full_scale if np.isfinite(one.full_scale) else 0.0):
+    if spread <= (_SILENT * one.full_scale if np.isfinite(one.full_scale) else _SMALLEST):
         yield Fault(name, "a sound", "silence", "is the right channel connected?")
     elif (count := clipped_samples(signal, one.full_scale)) > 0:
         got = f"{count} samples cut off at the largest value"
@@ -73,6 +80,10 @@ def clipped_samples(signal: Floats, full_scale: float) -> int:
         least = 2 if top > 0.9 * full_scale else _FLAT
         total += int(runs[runs >= least].sum())
     return total
+
+
+def _is_beyond(values: NDArray[np.generic]) -> bool:
+    return bool((np.abs(np.real(values)) > _LARGEST).any() or (np.abs(np.imag(values)) > _LARGEST).any())
 
 
 def _first(values: NDArray[np.generic]) -> int:

@@ -11,8 +11,8 @@ from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
 from bayesplate.recordings.wav import from_channels
 
-_TIME, _RESPONSE = 1, 4
-"""Kinds of function of a UFF data set 58: a time response, a frequency response."""
+_TIME, _RESPONSE, _FORCE = 1, 4, -1
+"""Kinds of function of a UFF data set 58: a time response, a frequency response; a force has no number of its own."""
 _MOTIONS: dict[int, Motion] = {8: "displacement", 11: "velocity", 12: "acceleration", 15: "pressure"}
 """Kinds of data of its ordinate."""
 _EXCITATION = 13
@@ -52,19 +52,43 @@ def read_uff(
     found: list[Recording | FrequencyResponse] = []
     force: dict[str, Any] | None = None
     for number, one in enumerate(sets, start=1):
-        name, kind = f"{shown} set {number}", int(one.get("func_type", 0))
-        told = _MOTIONS.get(int(one.get("ordinate_spec_data_type", 0)), motion)
-        values, at = np.asarray(one["data"]), np.asarray(one["x"], dtype=float)
-        if kind == _RESPONSE:
-            found.append(FrequencyResponse(name, at, values.astype(complex), None, told))
-        elif kind == _TIME and int(one.get("ordinate_spec_data_type", 0)) == _EXCITATION:
-            force = one
-        elif kind == _TIME:
-            own = None if force is None else np.real(np.asarray(force["data"])).astype(float)
-            found.append(Recording(name, 1.0 / float(at[1] - at[0]), np.real(values).astype(float), own, told))
+        name = f"{shown} set {number}"
+        try:
+            kind = _kind_of(one)
+            if kind == _FORCE:
+                force = one
+            elif kind:
+                found.append(_of_set(one, kind, name, force, motion))
+        except (KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as error:
+            raise InputError(Fault(name, "a whole data set 58", f"a broken one ({type(error).__name__})")) from None
     if not found:
         raise InputError(Fault(shown, "data sets 58 or 58b with a time or a frequency response", f"{len(sets)} others"))
     return found
+
+
+def _kind_of(one: dict[str, Any]) -> int:
+    """What a data set 58 holds: one of the kinds above, 0 for any other."""
+    kind = int(one.get("func_type", 0))
+    if kind == _TIME and int(one.get("ordinate_spec_data_type", 0)) == _EXCITATION:
+        return _FORCE
+    return kind if kind in (_TIME, _RESPONSE) else 0
+
+
+def _of_set(
+    one: dict[str, Any], kind: int, name: str, force: dict[str, Any] | None, motion: Motion
+) -> Recording | FrequencyResponse:
+    """The recording or the frequency response of a data set; any error of its numbers where it is broken."""
+    told = _MOTIONS.get(int(one.get("ordinate_spec_data_type", 0)), motion)
+    values, at = np.asarray(one["data"]), np.asarray(one["x"], dtype=float)
+    own = None if force is None else np.real(np.asarray(force["data"])).astype(float)
+    if values.shape != at.shape or values.ndim != 1 or (own is not None and own.shape != at.shape):
+        raise ValueError("numbers and their places are not as many")
+    rises = at.size > 1 and np.isfinite(at).all() and bool((np.diff(at) > 0).all())
+    if not rises:
+        raise ValueError("times or frequencies that do not rise")
+    if kind == _RESPONSE:
+        return FrequencyResponse(name, at, values.astype(complex), None, told)
+    return Recording(name, 1.0 / float(at[1] - at[0]), np.real(values).astype(float), own, told)
 
 
 def _lacking(shown: str, kind: str, library: str) -> Fault:

@@ -127,7 +127,7 @@ def _onsets(response: Floats, rate: float) -> list[int]:
     change = np.diff(response[: n * block], n=2, prepend=response[[0, 0]])
     power = np.mean(change.reshape(n, block) ** 2, axis=1)
     floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
-    level = 10.0 * np.log10(np.maximum(power, 1e-300) / floor)
+    level = 10.0 * (np.log10(np.maximum(power, 1e-300)) - np.log10(floor))
     before = np.full(n, 0.0)
     before[1:] = np.maximum.accumulate(level)[:-1] if n < 2 else level[:-1]
     for back in range(2, _LOOK_BACK + 1):

@@ -176,6 +176,8 @@ def _windows(
         kept = (spectra.frequency >= max(low - margin, 0.3 * lowest, 3.0 * spacing)) & (
             spectra.frequency <= high + margin
         )
+        if not kept.any():
+            continue  # a frequency response that ends below
         yield Window(spectra.frequency[kept], values[kept], np.zeros((0, 2))), float(low), float(high)
 
 

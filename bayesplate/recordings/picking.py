@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.modes_found import Mode, Path, find_modes, fit_modes, joined
 from bayesplate.recordings.plausibility import Verdict, complexity, verdicts
 from bayesplate.recordings.spectra import Spectra
@@ -19,6 +20,7 @@ LOWEST, HIGHEST = 20.0, 1000.0
 """Hz between which modes are looked for unless others are given."""
 _BEYOND = 60.0
 """Hz above the highest in which modes are looked for too: they reach into the band."""
+_FEWEST_LINES = 5
 _PART = 0.5
 """Probability from which on a part of another peak is fitted together with it as one mode."""
 _PRIOR_GROUPS = 8.0
@@ -113,7 +115,16 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
     Returns
     -------
     Picked
+
+    Raises
+    ------
+    InputError
+        If the spectra have next to nothing between the two, as frequency responses that end below.
     """
+    n_lines = int(((spectra.frequency >= lowest) & (spectra.frequency <= highest)).sum())
+    if n_lines < _FEWEST_LINES:
+        place, wanted = f"{spectra.names[0]} between {lowest:g} and {highest:g} Hz", f"{_FEWEST_LINES} lines or more"
+        raise InputError(Fault(place, wanted, str(n_lines), "--lowest and --highest look elsewhere"))
     by_width, paths = find_modes(spectra, lowest, min(highest + _BEYOND, float(spectra.frequency[-1])))
     modes = fit_modes(spectra, joined(by_width, spectra), by_width, lowest, highest)
     answered = answers(spectra, modes)

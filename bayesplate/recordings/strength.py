@@ -78,7 +78,7 @@ def _answer(spectra: Spectra, mode: Mode, force: Complex) -> Answer:
     spare = 0
     for place in range(n_places):
         own = spectra.places == place
-        weight = float(np.sum(np.abs(force[own]) ** 2))
+        weight = max(float(np.sum(np.abs(force[own]) ** 2)), 1e-300)
         mobility[place] = np.sum(force[own].conj() * turned[own]) / weight
         sd[place] = mode.frequency**power * float(np.sqrt(np.mean(mode.residue_sd[own] ** 2) / weight))
         if own.sum() > 1:
@@ -90,6 +90,8 @@ def _answer(spectra: Spectra, mode: Mode, force: Complex) -> Answer:
 
 def _forces(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:
     """What each hit was at each mode's frequency: (n_records,) complex arrays."""
+    if not modes:
+        return []
     if spectra.force is not None:
         nearest = [int(np.argmin(np.abs(spectra.frequency - mode.frequency))) for mode in modes]
         return [spectra.force[line] for line in nearest]
@@ -98,7 +100,7 @@ def _forces(spectra: Spectra, modes: Sequence[Mode]) -> list[Complex]:
     residues = np.array([mode.residues for mode in modes]).reshape(len(modes), -1)
     for place in range(len(spectra.between)):
         own = np.flatnonzero(spectra.places == place)
-        if len(modes) and own.size > 1:
+        if own.size > 1:
             delays[own], gains[own] = _delays(hertz, residues[:, own])
     return [gains * np.exp(-2j * np.pi * one * delays) for one in hertz]
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import warnings
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +22,11 @@ KNOWN = (*_TIME, *_FORCE, *_RESPONSE, *_HERTZ, *_REAL, *_IMAGINARY, *_COHERENCE)
 WANTED = "named columns: force if it was measured, acceleration, velocity, displacement or sound, time; or f_hz, re, im"
 _JITTER = 1e-3
 """Share of a step by which the times of samples, or the lines of a spectrum, may be unevenly spaced."""
+_LATEST = 1e12
+"""s, Hz."""
 _LONGEST_HEADER = 10_000
+_END_OF_LINE = re.compile(r"\r\n|\r|\n")
+"""As the reader of the numbers counts lines; Python knows more ends of lines."""
 
 
 def read_csv(
@@ -58,7 +65,7 @@ def _header(path: Path, shown: str) -> tuple[list[str], int, int]:
         raise InputError(
             Fault(shown, "a text file in UTF-8", "another encoding or binary data", "save it as CSV in UTF-8")
         )
-    lines = head.decode("utf-8-sig", "replace").splitlines()
+    lines = _END_OF_LINE.split(head.decode("utf-8-sig", "replace"))
     for number, line in enumerate(lines, start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
@@ -72,14 +79,19 @@ def _header(path: Path, shown: str) -> tuple[list[str], int, int]:
         if unknown:
             wanted = f"columns among {', '.join(dict.fromkeys(KNOWN))}"
             raise InputError([Fault(f"{shown} line {number}", wanted, f'"{name[:40]}"') for name in unknown])
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError([Fault(f"{shown} line {number}", "each column once", f'"{name}" again') for name in twice])
         return names, number, number
     raise InputError(Fault(shown, WANTED, "no header"))
 
 
 def _columns(path: Path, shown: str, names: list[str], skipped: int) -> dict[str, Floats]:
     try:
-        values = np.loadtxt(path, delimiter=",", skiprows=skipped, ndmin=2, comments="#", encoding="utf-8-sig")
-    except (ValueError, UnicodeDecodeError) as error:
+        with path.open(encoding="utf-8-sig") as lines, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # that there are no numbers is told below
+            values = np.loadtxt(islice(lines, skipped, None), delimiter=",", ndmin=2, comments="#")
+    except ValueError as error:  # no numbers, or no UTF-8
         raise InputError(
             Fault(shown, f"{len(names)} numbers on each line", str(error)[:120], "mend or cut that line")
         ) from None
@@ -95,8 +107,7 @@ def _of(columns: dict[str, Floats], names: tuple[str, ...]) -> Floats | None:
 
 
 def _rate_of(times: Floats, shown: str, rate: float | None) -> tuple[float, Fault | None]:
-    steps = np.diff(times)
-    if times.size < 2 or not np.isfinite(times).all() or not (steps > 0).all():
+    if times.size < 2 or not (np.abs(times) < _LATEST).all() or not (np.diff(times) > 0).all():
         return 1.0, Fault(f"{shown} time", "times in s that rise", "times that do not")
     step = float((times[-1] - times[0]) / (times.size - 1))
     if (
@@ -114,9 +125,10 @@ def _response(columns: dict[str, Floats], shown: str, motion: Motion) -> Frequen
     hertz, real, imaginary = (_of(columns, names) for names in (_HERTZ, _REAL, _IMAGINARY))
     if hertz is None or real is None or imaginary is None:
         raise InputError(Fault(shown, "the columns f_hz, re and im", ", ".join(columns)))
-    steps = np.diff(hertz)
-    if hertz.size < 100 or not (steps > 0).all() or np.ptp(steps) > 2e-2 * float(np.mean(steps)):
+    steps = np.diff(np.where(np.abs(hertz) < _LATEST, hertz, -1.0))
+    if hertz.size < 100 or hertz[0] < 0 or not (steps > 0).all() or np.ptp(steps) > 2e-2 * float(np.mean(steps)):
         raise InputError(
             Fault(f"{shown} f_hz", "a hundred evenly spaced lines or more, rising", f"{hertz.size} others")
         )
-    return FrequencyResponse(shown, hertz, real + 1j * imaginary, _of(columns, _COHERENCE), motion)
+    values = np.stack([real, imaginary], axis=1).view(complex)[:, 0]  # without arithmetic: they may be no numbers
+    return FrequencyResponse(shown, hertz, values, _of(columns, _COHERENCE), motion)

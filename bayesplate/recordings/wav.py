@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,8 @@ def read_wav(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", wavfile.WavFileWarning)  # chunks with titles and the like
-            own_rate, samples = wavfile.read(path)
+            # from memory: of a file the library asks for as much room as the header claims, up to all there is
+            own_rate, samples = wavfile.read(io.BytesIO(path.read_bytes()))
     except (ValueError, OSError, EOFError, MemoryError) as error:
         remedy = "save it as WAV, PCM or floating point"
         raise InputError(Fault(shown, "a WAV file", str(error) or type(error).__name__, remedy)) from None
@@ -38,7 +40,7 @@ def from_channels(
 ) -> list[Recording | FrequencyResponse]:
     """Recordings from the samples of a sound file, (n,) or (n, n_channels) array."""
     faults = []
-    if rate is not None and abs(rate / own_rate - 1.0) > _RATE_OFF:
+    if rate is not None and abs(rate - own_rate) > _RATE_OFF * rate:
         faults.append(
             Fault(
                 f"{shown} rate", f"{rate:g} Hz, as --rate says", f"{own_rate:g} Hz", "leave --rate out: the file knows"

@@ -67,7 +67,8 @@ def spectra_picture(report: PickReport, averaged: Sequence[Averaged]) -> Picture
         panel.plot(one.frequency[inside], np.maximum(level, _LEAST_DB) - _STEP * i, color=BLUE, lw=0.6)
         if len(shown) > 1:
             at = level[0] - _STEP * i - 1.0
-            panel.text(report.lowest_hz, at, short(drawable(one.name), 24), fontsize=SMALL - 1.5, va="top", color=DARK)
+            name = short(drawable(one.name), 24)
+            panel.text(report.lowest_hz, at, name, fontsize=SMALL - 1.5, va="top", color=DARK, parse_math=False)
     low, high = panel.get_ylim()
     for peak in report.peaks:
         panel.axvline(

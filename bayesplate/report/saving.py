@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bayesplate.report.style import Picture
+from bayesplate.results.folder import writing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,10 +76,17 @@ def _bytes_of(figure: Figure, ending: str, told: Mapping[str, str]) -> bytes:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all."""
+    """Write a file completely or not at all.
+
+    Raises
+    ------
+    UnwritableError
+        If the disk is full or the place is not ours.
+    """
     partial = path.with_name(path.name + ".partial")
-    try:
-        partial.write_bytes(data)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with writing(path):
+        try:
+            partial.write_bytes(data)
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)

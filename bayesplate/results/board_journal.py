@@ -1,11 +1,13 @@
 """The journal of a run over many boards: a line for each board that is done, kept for the next run over them.
 
-A line is written at once and whole; what a killed run left of its last one is cut off. A row is found by a key that
-says all that decides it, so that a card that was changed is another board, and one that was moved is not.
+A line is written at once and whole; what a killed run left of its last one is cut off, and one that was altered later
+is none. A row is found by a key that says all that decides it, so that a card that was changed is another board, and
+one that was moved is not.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator
@@ -88,13 +90,21 @@ class Journal:
 
 
 def _line(key: str, row: BoardRow) -> bytes:
-    return json.dumps({"key": key, "row": row.to_json()}, allow_nan=False).encode() + b"\n"
+    """A row with its key and the hash of both, so that a line which was altered later is known."""
+    content = row.to_json()
+    whole = {"key": key, "sha256": _hash_of(key, content), "row": content}
+    return json.dumps(whole, allow_nan=False).encode() + b"\n"
+
+
+def _hash_of(key: str, content: Any) -> str:
+    return hashlib.sha256(json.dumps([key, content], allow_nan=False).encode()).hexdigest()
 
 
 def _key_of(line: bytes) -> str | None:
+    """The key of a line; None if it is not as it was written."""
     try:
         found: Any = json.loads(line)
-        BoardRow.from_json(found["row"])
-        return str(found["key"])
-    except (ValueError, KeyError, TypeError):
+        key = str(found["key"])
+        return key if found["sha256"] == _hash_of(key, found["row"]) else None
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None

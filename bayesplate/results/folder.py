@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from bayesplate.errors import CheckpointError, Fault, InputError, RunInterrupted, UnwritableError
-from bayesplate.posterior.checkpoint import take
+from bayesplate.posterior.checkpoint import Checkpoint, take
 from bayesplate.results.contract import as_json
 
 SUMMARY = "summary.json"
@@ -129,7 +129,12 @@ class OutputFolder:
         return any(self.checkpoint.rglob("chunk-*.npz*"))
 
     def close(self) -> None:
-        """Remove the checkpoint of a run that is done; chunks found damaged stay for whoever wants to look."""
+        """Remove the checkpoint of a run that is done; chunks found damaged stay for whoever wants to look.
+
+        Chunks first, the last of them before the first: a run that is killed at it can be resumed.
+        """
+        for manifest in sorted(self.checkpoint.rglob("manifest.json"), reverse=True):
+            Checkpoint(manifest.parent, "").discard()
         if not any(self.checkpoint.rglob("*.damaged")):
             shutil.rmtree(self.checkpoint, ignore_errors=True)
 

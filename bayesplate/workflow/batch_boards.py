@@ -14,7 +14,9 @@ from bayesplate.cards.rows import Cell, csv_rows
 from bayesplate.errors import Fault, InputError
 from bayesplate.results.board_table import parquet_library
 
-LARGEST_TABLE = 1_000_000_000
+LARGEST_TABLE = 100_000_000
+"""Bytes; hundreds of thousands of boards, and ten times as much in memory."""
+_LONGEST = 1e9
 _OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
@@ -65,9 +67,10 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self._paths = sorted(path.glob("*.toml"), key=lambda one: one.name)
+        self._inside = os.path.realpath(path)
         entries, aside = [], []
         for at, file in enumerate(self._paths):
-            content = _content_of(file)
+            content = _content_of(file) if self._is_inside(file) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
             if is_other or content.keys() == {"setup"}:
                 aside.append(plain(file.name))
@@ -79,8 +82,15 @@ class Folder:
         self.aside: Sequence[str] = aside
 
     def card(self, entry: Entry) -> BoardCard:
-        """The card of a board; raises InputError with all its faults."""
-        return load_board(self._paths[entry.at])
+        """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
+        path = self._paths[entry.at]
+        if not self._is_inside(path):
+            wanted, remedy = "a card in the folder of the batch", "copy the card"
+            raise InputError(Fault(plain(path.name), wanted, "a link that leads out of it", remedy))
+        return load_board(path)
+
+    def _is_inside(self, path: Path) -> bool:
+        return Path(os.path.realpath(path)).is_relative_to(self._inside)  # which a link to itself does not confuse
 
 
 class Table:
@@ -148,7 +158,7 @@ def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
     plate, setups = content.get("plate"), content.get("setup")
     sides = [plate.get(f"length_{side}_mm") for side in "xy"] if isinstance(plate, dict) else []
     told = [side.get("mean") if isinstance(side, dict) else side for side in sides]
-    means = [float(side) for side in told if isinstance(side, int | float) and side > 0]
+    means = [float(side) for side in told if isinstance(side, int | float) and 0 < side <= _LONGEST]
     listed = setups if isinstance(setups, list) else [setups]
     edges = [repr(one.get("edges")) for one in listed if isinstance(one, dict)]
     if len(means) == 2:
@@ -159,6 +169,8 @@ def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
 def _read_csv(path: Path) -> tuple[list[str], list[list[Cell]]]:
     file = plain(path.name)
     try:
+        if not path.is_file():
+            raise InputError(Fault(file, "a regular file", "a device, or another that is none"))
         if path.stat().st_size > LARGEST_TABLE:
             raise InputError(Fault(file, f"a table of at most {LARGEST_TABLE:,} bytes", "a larger one"))
         rows = csv_rows(path.read_bytes(), file)

@@ -15,7 +15,7 @@ from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
 from bayesplate.plate.from_card import board_from_card
-from bayesplate.results.folder import writing
+from bayesplate.results.folder import write_text, writing
 
 _EDGES_WANTED = (
     '"free", "cantilever", "clamped", "supported", or four letters of C, S and F for x0, y0, x1, y1, like "CFFF"'
@@ -85,8 +85,7 @@ def new(
         raise InputError(faults)
     with writing(card):
         card.parent.mkdir(parents=True, exist_ok=True)
-        with card.open("x", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
+    write_text(card, text)
     return card
 
 

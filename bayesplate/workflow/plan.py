@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from bayesplate.cards import is_campaign
+from bayesplate.cards.words import EFFECT_NAMES
 from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
@@ -41,6 +43,7 @@ from bayesplate.workflow.stages import Stages
 PLAN = "plan.json"
 _GAINS, _BENCH = "plan", "plan-bench"
 _POSE, _SEARCH, _PLAN = 1.0, 12.0, 4.0
+_ROUNDING = 1e-9
 """How long the parts take beside each other."""
 
 
@@ -205,10 +208,14 @@ def _finished(folder: Path, prepared: Prepared) -> _Finished | None:
             return None
         support = {tuple(one["effects"]): float(one["probability"]) for one in told["answers"]}
         none = float(told["probability_of_none"])
-    except (OSError, ValueError, KeyError, TypeError):
+        listed = told["effects"] if told["verdict"] == "indistinguishable group" else ()
+        named = {name for one in (*support, listed) for name in one}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    is_altered = not all(0.0 <= one <= 1.0 + _ROUNDING for one in (*support.values(), none))
+    if is_altered or not named <= {*EFFECT_NAMES, RELABELLING}:
         return None
     highest = max(support.values(), default=0.0)
-    listed = told["effects"] if told["verdict"] == "indistinguishable group" else ()
     rivals = frozenset(members for members in support if members and set(members) <= set(listed))
     near = {one: p for one, p in support.items() if one and p > 0.0 and (WITHIN * p >= highest or one in rivals)}
     return _Finished(near, none, rivals) if near else None

@@ -6,13 +6,18 @@ import re
 from dataclasses import replace
 
 import pytest
+from payloads import DIRECTION_MARKS, PAYLOADS, shown
+from read_pages import Read, faults
 
 import bayesplate
 from bayesplate.campaigns.claim import SharedClaim, TaughtBoard
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, PooledErrors, claim_sentence
 from bayesplate.errors import InputError
+from bayesplate.report import campaign_page as home
 from bayesplate.report.campaign_page import write_campaign_report
 from bayesplate.workflow.shown import show_diagnosis, show_fit
+
+PLACES = ("diagnosis", "shared", "boards", "common")
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +74,20 @@ def test_the_page_of_a_diagnosis(fitted_campaign, diagnosis, tmp_path):
     assert (tmp_path / "figures" / "left-out.png").exists()
     assert "<script" not in page
     assert "&lt;script&gt;" in page
+
+
+@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
+def test_a_text_stays_a_text(fitted_campaign, diagnosis, tmp_path, monkeypatch, payload):
+    """The title of the card, warnings, reasons and what is recommended; figures have none of them."""
+    monkeypatch.setattr(f"{home.__name__}.every_picture", lambda *_: dict.fromkeys(PLACES, ()))
+    told = replace(diagnosis, declared=False, reason=payload, recommendation=payload)
+    summary = replace(fitted_campaign.summary, warnings=(payload,))
+    text = write_campaign_report(tmp_path, payload, summary, told).read_text(encoding="utf-8")
+    page = Read(text)
+
+    assert faults(page) == []
+    assert " ".join(page.text.split()).count(" ".join(shown(payload).split())) >= 5
+    assert not set(DIRECTION_MARKS) & set(text)
 
 
 def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):

@@ -166,6 +166,13 @@ def test_a_manifest_cut_at_any_byte_is_refused(folder):
             n_usable_chunks(folder)
 
 
+@pytest.mark.parametrize("content", ["[" * 100_000, "3", '{"format": [[]]}', "\0"], ids=range(4))
+def test_a_manifest_with_anything_in_it_is_refused(folder, content):
+    (folder / "manifest.json").write_text(content)
+    with pytest.raises(CheckpointError, match=r"checkpoint: .*--force"):
+        n_usable_chunks(folder)
+
+
 def test_chunks_without_a_manifest_or_a_first_one_are_refused(folder):
     (folder / "chunk-0000.npz").unlink()
     with pytest.raises(CheckpointError, match=r"chunk-0000\.npz is missing"):

@@ -6,7 +6,6 @@ import re
 from base64 import b64decode, b64encode
 from dataclasses import replace
 from hashlib import sha256
-from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,63 +13,21 @@ import pytest
 import runs
 from diagnoses import DIAGNOSES, NEXT, candidate, spread
 from payloads import DIRECTION_MARKS, PAYLOADS, shown
+from read_pages import Read, faults
 
 from bayesplate.report.page import _of_diagnosis
 from bayesplate.report.style import visible
 from bayesplate.report.symbols import in_figure, in_page
 
-ALLOWED = {
-    "html", "head", "meta", "title", "style", "body", "header", "main", "section", "footer", "h1", "h2", "h3", "p",
-    "bdi", "strong", "div", "table", "caption", "thead", "tbody", "tr", "th", "td", "figure", "figcaption", "img",
-    "details", "summary", "ul", "li", "i", "sub", "sup",
-}  # fmt: skip
-"""Every element that the template holds; whatever a text could bring in besides is a fault."""
-NEVER = {"style", "href", "srcdoc"}
-OWN = "data:image/svg+xml;base64,"
 FIGURES = (
     "board", "constants", "corner", "modes", "percentiles", "predictive", "priors", "residuals", "sampler", "shares",
 )  # fmt: skip
 LARGEST = 3_000_000
 
 
-class Read(HTMLParser):
-    """Elements with their attributes, and the text of the page."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.elements: list[tuple[str, dict[str, str]]] = []
-        self.text = ""
-        self.source = page
-        self.feed(page)
-        self.close()
-
-    def handle_starttag(self, tag, attrs):
-        self.elements.append((tag, {name: value or "" for name, value in attrs}))
-
-    def handle_data(self, data):
-        self.text += data.replace("\N{NO-BREAK SPACE}", " ")
-
-    def handle_comment(self, data):
-        raise AssertionError(f"a comment: {data}")
-
-    def all(self, tag):
-        return [attributes for name, attributes in self.elements if name == tag]
-
-
 @pytest.fixture(scope="module")
 def page(clamped_folder):
     return Read((clamped_folder / "report.html").read_text(encoding="utf-8"))
-
-
-def faults(page: Read) -> list[str]:
-    """Everything that a page of ours never has."""
-    found = [f"element {tag}" for tag, _ in page.elements if tag not in ALLOWED]
-    for tag, attributes in page.elements:
-        found += [f"{tag} {name}" for name in attributes if name.startswith("on") or name in NEVER]
-        source = attributes.get("src", OWN)
-        found += [] if source.startswith(OWN) else [f"{tag} asks for {source[:40]}"]
-    found += ["two titles"] if len(page.all("title")) != 1 else []
-    return found
 
 
 def test_it_holds_every_figure_with_words_for_who_cannot_see_it(page, clamped_folder):

@@ -43,9 +43,25 @@ def test_a_line_that_is_half_written_is_cut_off_and_written_anew(tmp_path, cut):
     assert path.read_bytes() == whole
 
 
+def test_a_line_that_was_altered_is_no_row_wherever_it_was(tmp_path):
+    """Every byte in turn, as a disk or a hand may change it: never another row in its place, and the next one stays."""
+    path = tmp_path / "boards.jsonl"
+    journal = Journal(path)
+    journal.append("one", REFUSED)
+    journal.append("two", REFUSED)
+    journal.close()
+    whole = path.read_bytes()
+    for at in range(whole.index(b"\n")):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        journal = Journal(path)
+        assert "one" not in journal or journal.row("one") == REFUSED
+        assert journal.row("two") == REFUSED
+        journal.close()
+
+
 def test_a_damaged_line_is_no_row_and_the_others_are(tmp_path):
     path = tmp_path / "boards.jsonl"
-    path.write_bytes(b'{"key": "x"}\nnonsense\n{"key": "y", "row": {"name": 3}}\n')
+    path.write_bytes(b'{"key": "x"}\nnonsense\n{"key": "y", "row": {"name": 3}}\n' + b"[" * 100_000 + b"\n")
     journal = Journal(path)
     journal.append("one", ROW)
     journal.keep(["one"])

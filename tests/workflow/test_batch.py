@@ -70,6 +70,32 @@ def test_what_is_no_board_card_is_left_aside(cards, tmp_path):
     assert "unfinished" in {entry.name for entry in found.entries}
 
 
+@pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
+def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
+    """Whoever packed the folder could have any file read; a link within it is a card like any other."""
+    folder = write_cards(tmp_path / "tops", "a", bad=False)
+    (tmp_path / "b.toml").write_text(card_text("b"))
+    (folder / "inner").mkdir()
+    (folder / "inner" / "c.toml").write_text(card_text("c"))
+    (folder / "b.toml").symlink_to(tmp_path / "b.toml")
+    (folder / "c.toml").symlink_to(folder / "inner" / "c.toml")
+    (folder / "d.toml").symlink_to(folder / "d.toml")  # to itself
+    found = boards_of(folder, None)
+
+    read = {}
+    for entry in found.entries:
+        try:
+            read[entry.name] = found.card(entry).name
+        except InputError as error:
+            read[entry.name] = str(error)
+
+    assert (read["a"], read["c"]) == ("a", "c")
+    assert read["b"] == (
+        "b.toml: wanted a card in the folder of the batch, got a link that leads out of it (copy the card)"
+    )
+    assert "d.toml" in read["d"]
+
+
 def test_one_board_is_a_pure_function_that_travels(two, one):
     """What the table says of a board, and its files, are what `fit_board` gives with its seed; nothing is changed by
     the way to another process."""
@@ -162,7 +188,7 @@ def test_killed_at_a_random_moment_and_resumed_the_table_is_the_same(cards, two,
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     run = subprocess.Popen([*command, "--no-report"], env=environment, start_new_session=True,
                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
-    journal, n_lines = out / "boards.jsonl", int(np.random.default_rng().integers(1, 4))
+    journal, n_lines = out / "boards.jsonl", int(np.random.default_rng(1).integers(1, 4))
     until = time.monotonic() + 120
     while time.monotonic() < until and run.poll() is None:
         if journal.exists() and journal.read_bytes().count(b"\n") >= n_lines:

@@ -8,9 +8,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import runs
 from click.testing import CliRunner
+from killed_runs import CHANGES, WRITES
+from made_batches import write_cards
+from made_recordings import hits, write_wav
 
 from bayesplate.cli import main
 
@@ -70,3 +74,80 @@ def test_an_output_that_cannot_be_written_is_one_line(options):
 
     assert done.returncode == 3
     assert done.stderr == f"standard output: wanted a place that can be written, got {REASON}\n"
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory) -> dict[str, str]:
+    """A folder with two cards that are refused, so that nothing is fitted; a card to be planned; a recorded hit."""
+    folder = tmp_path_factory.mktemp("places")
+    force, heard = hits(np.random.default_rng(2), [0.05], (0.02, 0.02))
+    return {
+        "CARDS": str(write_cards(folder / "cards", names="")),
+        "UNMEASURED": str(Path(__file__).parents[2] / "docs" / "cards" / "half-top-unmeasured.toml"),
+        "HIT": str(write_wav(folder / "hit.wav", 4000.0, force, heard)),
+    }
+
+
+@pytest.mark.parametrize(
+    ("command", "place", "name"),
+    [
+        ("batch", "CARDS", "boards.jsonl"),
+        ("batch", "CARDS", "boards.csv"),
+        ("batch", "CARDS", "batch.json"),
+        ("batch", "CARDS", "grading.csv"),
+        ("batch", "CARDS", "grading.html"),
+        pytest.param("plan", "UNMEASURED", "plan.json", marks=pytest.mark.slow),
+        ("plan", "UNMEASURED", "plan.svg"),
+        ("pick", "HIT", "setup.toml"),
+        ("pick", "HIT", "pick.json"),
+        ("pick", "HIT", "figures/spectra.svg"),
+        ("pick", "HIT", "recordings.html"),
+        ("pick", "HIT", "figures/errors.png"),
+    ],
+)
+def test_the_file_is_named_and_what_stood_in_its_place_stays(command, place, name, places, full_at, tmp_path):
+    """But for what a batch makes anew from its beginning: there the earlier results are gone before it fits a board."""
+    out = tmp_path / "out"
+    (out / name).parent.mkdir(parents=True)
+    (out / name).write_bytes(b"earlier")
+    full_at(Path(name).name)
+    result = CliRunner().invoke(main, [command, places[place], "--out", str(out), "--force"])
+
+    assert result.exit_code == 3, result.output
+    assert f"{Path(name).name}: wanted a file that can be written, got {REASON}" in result.stderr
+    left = runs.files_in(out)
+    assert [path for path in left if path.endswith(".partial")] == []
+    if name == "boards.jsonl":
+        assert left[name].count(b"\n") == 2  # what --resume goes on from
+    else:
+        assert left.get(name) == (None if command == "batch" else b"earlier")
+
+
+READ_ONLY = "Read-only file system"
+
+
+@pytest.mark.parametrize(
+    ("command", "place", "code"),
+    [("fit", BOARD, 6), ("diagnose", BOARD, 6), ("batch", "CARDS", 6), ("pick", "HIT", 3), ("modes", BOARD, 3)],
+)
+def test_a_folder_that_cannot_be_written_is_left_as_it_is(command, place, code, places, tmp_path):
+    """Results of an earlier run stay, though --force would replace them."""
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in ("summary.json", "diagnosis.json", "boards.csv", "setup.toml", "modes.svg"):
+        (out / name).write_bytes(b"earlier")
+    before = runs.files_in(out)
+
+    def refuse(event: str, arguments: tuple[object, ...]) -> None:
+        is_change = event in CHANGES or (event == "open" and isinstance(arguments[2], int) and arguments[2] & WRITES)
+        if refused and is_change and str(arguments[0]).startswith(str(out)) and not Path(str(arguments[0])).is_dir():
+            raise OSError(errno.EROFS, READ_ONLY)
+
+    refused = [True]
+    sys.addaudithook(refuse)
+    result = CliRunner().invoke(main, [command, places.get(place, place), "--out", str(out), "--force"])
+    refused.clear()
+
+    assert result.exit_code == code, result.output
+    assert READ_ONLY in result.stderr
+    assert runs.files_in(out) == before

@@ -1,8 +1,7 @@
-"""Options of `fit`, and cards of the user's own: laws, noise, places, and no network."""
+"""Options of `fit`, and cards of the user's own: laws, noise, and places."""
 
 from __future__ import annotations
 
-import socket
 from pathlib import Path
 
 import pytest
@@ -83,18 +82,6 @@ def test_a_card_is_fitted_by_path_and_no_place_of_the_machine_is_told(quick_fit,
     assert str(run.folder) in run.stdout
     for content in (*run.files.values(), run.stdout.replace(str(run.folder), "").encode()):
         assert [place for place in places if place in content] == []
-
-
-def test_no_network_is_used(quick_fit, monkeypatch):
-    def blocked(*_: object, **__: object) -> None:
-        raise AssertionError("a network connection was asked for")
-
-    for name in ("socket", "create_connection", "getaddrinfo"):
-        monkeypatch.setattr(socket, name, blocked)
-    with pytest.raises(AssertionError, match="a network connection was asked for"):
-        socket.create_connection(("localhost", 1))
-
-    assert quick_fit("fiemme-spruce-clamped", "--quiet").exit_code == 0
 
 
 @pytest.mark.parametrize(

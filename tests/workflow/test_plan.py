@@ -169,8 +169,26 @@ class TestFinishedDiagnosis:
     def test_another_card_model_or_verdict_is_not_taken_up(self, tmp_path, told, other):
         assert self.finished(tmp_path, told | other) is None
 
-    def test_nor_is_what_cannot_be_read(self, tmp_path):
-        (tmp_path / "diagnosis.json").write_text("[]")
+    @pytest.mark.parametrize(
+        "altered",
+        [
+            {"probability_of_none": float("nan")},
+            {"probability_of_none": -0.5},
+            {"answers": [{"effects": ["air_loading"], "probability": 1.5}]},
+            {"answers": [{"effects": ["air_loading"], "probability": "much"}]},
+            {"answers": [{"effects": ["witchcraft"], "probability": 0.5}]},
+            {"answers": [{"effects": [["air_loading"]], "probability": 0.5}]},
+            {"answers": 3},
+            {"verdict": "indistinguishable group", "effects": 7},
+        ],
+        ids=range(8),
+    )
+    def test_nor_is_one_that_was_altered(self, tmp_path, told, altered):
+        assert self.finished(tmp_path, told | altered) is None
+
+    @pytest.mark.parametrize("content", ["[]", "", "[" * 100_000, "\0"], ids=range(4))
+    def test_nor_is_what_cannot_be_read(self, tmp_path, content):
+        (tmp_path / "diagnosis.json").write_text(content)
         assert home._finished(tmp_path, prepare(BOARD)) is None
         assert home._finished(tmp_path / "nowhere", prepare(BOARD)) is None
 

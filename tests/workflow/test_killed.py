@@ -1,0 +1,143 @@
+"""Killed at any moment and started again: the same bytes as if nothing had happened; nobody shares a folder."""
+
+from __future__ import annotations
+
+import os
+import signal
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from killed_runs import killed, quickly
+from made_batches import write_cards
+from runs import files_in
+
+from bayesplate.cli import main
+from bayesplate.posterior.checkpoint import take
+from bayesplate.results.folder import OutputFolder
+
+pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a signal that cannot be caught")
+
+FIT = ("fit", "fiemme-spruce-clamped", "--quiet", "--no-report")
+DIAGNOSE = ("diagnose", "paper-cantilever-fe", "--quiet", "--no-report")
+
+
+@pytest.fixture
+def arguments(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
+    """A command line without its folder; what runs in this process is as quick as what is killed in another."""
+    for place in ("fitting.SamplerSettings", "diagnose.full_search"):
+        home, name = place.split(".")
+        module = __import__(f"bayesplate.workflow.{home}", fromlist=[name])
+        monkeypatch.setattr(module, name, getattr(module, name))  # to be put back at the end
+    quickly()
+    if request.param == "batch":
+        return ("batch", str(write_cards(tmp_path / "cards")), "--workers", "1", "--quiet", "--no-report")
+    return {"fit": FIT, "fit and report": FIT[:-1], "diagnose": DIAGNOSE}[request.param]
+
+
+def run(folder: Path, *arguments: str):
+    return CliRunner().invoke(main, [*arguments, "--out", str(folder)])
+
+
+def is_saved(folder: Path) -> bool:
+    """Whether a run left something to go on from."""
+    journals = [path.read_bytes() for path in folder.glob("boards.jsonl")]
+    return any(folder.rglob("chunk-*.npz")) or b"\n" in b"".join(journals)
+
+
+def go_on(folder: Path, *arguments: str) -> None:
+    """Resume as a user would: where nothing had been saved the message says that --force runs it anew."""
+    was_saved = is_saved(folder)
+    again = run(folder, *arguments, "--resume")
+    if again.exit_code == 6:
+        assert not was_saved, again.stderr
+        assert "--force runs it anew" in again.stderr
+        again = run(folder, *arguments, "--force")
+    assert again.exit_code == (7 if arguments[0] == "batch" else 0), again.stderr
+
+
+def moments(n: int, n_of: int, seed: int) -> list[int]:
+    """So many moments of all, one in each of as many equal parts of the run."""
+    ends = np.linspace(0, n_of, n + 1).astype(int)
+    rng = np.random.default_rng(seed)
+    return [int(rng.integers(first, last)) + 1 for first, last in pairwise(ends)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "n"),
+    [
+        ("fit", 2),
+        pytest.param("fit and report", 20, marks=pytest.mark.slow),
+        pytest.param("diagnose", 20, marks=pytest.mark.slow),
+        pytest.param("batch", 20, marks=pytest.mark.slow),
+    ],
+    indirect=["arguments"],
+)
+def test_killed_at_any_moment_and_resumed_the_files_are_the_same(tmp_path, arguments, n):
+    """That the kills hit a run in progress is the negative control: what they leave is never the whole."""
+    n_of = killed(tmp_path / "whole", 0, *arguments)
+    whole = files_in(tmp_path / "whole")
+    assert n_of > 20
+
+    for moment in moments(n, n_of, seed=n):
+        folder = tmp_path / f"killed-{moment}"
+        assert killed(folder, moment, *arguments) == -signal.SIGKILL
+        left = files_in(folder)
+        go_on(folder, *arguments)
+        assert left != whole or moment == n_of, moment
+        assert files_in(folder) == whole, moment
+
+
+def test_a_checkpoint_that_is_removed_is_that_of_a_shorter_run_until_it_is_none(tmp_path, monkeypatch):
+    """Results are there by then; killed meanwhile a run can be resumed, for its first chunks are the last to go."""
+    folder, remove, n_left = OutputFolder(tmp_path / "out"), os.unlink, 0
+
+    def stops(*where, **how):
+        nonlocal n_left
+        n_left -= 1
+        if n_left < 0:
+            raise KeyboardInterrupt
+        remove(*where, **how)
+
+    monkeypatch.setattr(os, "unlink", stops)
+    for n_removed in range(100):
+        for stage in ("before", "after"):
+            inner = folder.checkpoint / stage / "linear"
+            inner.mkdir(parents=True, exist_ok=True)
+            for chunk in (f"chunk-000{i}.npz" for i in range(4)):
+                (inner / chunk).touch()
+                (inner / f"{chunk}.sha256").touch()
+            (inner / "manifest.json").touch()
+        n_left = n_removed
+        try:
+            folder.close()
+        except KeyboardInterrupt:
+            for stage in ("before", "after"):
+                left = {path.name for path in (folder.checkpoint / stage / "linear").glob("*")}
+                chunks = sorted(name for name in left if name.endswith(".npz"))
+                assert chunks == [f"chunk-000{i}.npz" for i in range(len(chunks))]
+                assert not chunks or {"manifest.json", *(f"{name}.sha256" for name in chunks)} <= left
+        else:
+            break
+
+    assert n_removed >= 18
+    assert not folder.checkpoint.exists()
+
+
+@pytest.mark.parametrize("arguments", ["fit", "diagnose", "batch"], indirect=True)
+def test_a_folder_that_another_run_holds_is_left_as_it_is(tmp_path, arguments):
+    """Results of an earlier run and of the one in progress; without the other run the same command goes ahead."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name in ("summary.json", "diagnosis.json", "boards.csv", "grading.html"):
+        (folder / name).write_text("earlier")
+    before = files_in(folder)
+    with take(folder / "checkpoint"):
+        refused = run(folder, *arguments, "--force")
+        after = {name: data for name, data in files_in(folder).items() if name != "checkpoint/lock"}
+
+    assert refused.exit_code == 6
+    assert "wanted sole use, got another run" in refused.stderr
+    assert after == before
