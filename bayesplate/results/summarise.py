@@ -12,12 +12,14 @@ from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.assessment import Assessment
+from bayesplate.posterior.certificate import Certificate, does_not_apply
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks
+from bayesplate.results.certified import contradiction
 from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import mode_rows
@@ -37,6 +39,8 @@ from bayesplate.results.summary import (
 
 Floats = NDArray[np.float64]
 
+TAUGHT = "its draws are weighted by what other boards teach"
+"""Why a board of a campaign has no certificate of its own: that of the board alone has."""
 HIGH_EXACT_ERROR = 0.5
 """Cents by which the exact law may miss full solves before a summary warns."""
 
@@ -65,6 +69,7 @@ def summarise(
     seed: int,
     versions: Mapping[str, str],
     card_sha256: str,
+    certificate: Certificate | None = None,
 ) -> Summary:
     """The summary of a converged fit.
 
@@ -77,11 +82,14 @@ def summarise(
     seed : int
     versions : dict of str
     card_sha256 : str
+    certificate : Certificate, optional
+        Of the draws of the fit; those that other boards teach have none.
 
     Returns
     -------
     Summary
     """
+    certificate = does_not_apply(TAUGHT) if certificate is None else certificate
     problem = inference.problem
     board = problem.board
     system = paper_system(board, problem.estimate, compared=False)
@@ -121,12 +129,13 @@ def summarise(
             surrogate_worst_cents=finite(_worst(assessment.surrogate_errors)),
         ),
         sampler=sampler_health(inference.chains, inference.convergence),
+        certificate=certificate,
         identifiability=(
             *remarks(board, problem.identifiability),
             *prior_remarks(draws, problem.prior),
             *input_remarks(draws, board),
         ),
-        warnings=tuple(warnings_of(problem, assessment)),
+        warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 
+from bayesplate.posterior.certificate import Certificate
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import ModeRow
@@ -157,6 +158,8 @@ class Summary(Run):
         Of the setups that have such peaks: all modes that they may be.
     error : ErrorFigures
     sampler : SamplerHealth
+    certificate : Certificate
+        Whether the draws agree with an answer in closed form on the same readings.
     identifiability, warnings : tuple of str
     """
 
@@ -178,6 +181,7 @@ class Summary(Run):
     spectra: tuple[Spectrum, ...]
     error: ErrorFigures
     sampler: SamplerHealth
+    certificate: Certificate
     identifiability: tuple[str, ...]
     warnings: tuple[str, ...]
 

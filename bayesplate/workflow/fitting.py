@@ -12,6 +12,7 @@ from pathlib import Path
 from bayesplate.errors import CheckpointError
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
+from bayesplate.posterior.certificate import certify
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer
@@ -163,7 +164,9 @@ def fitted(
         inference, draws = sampled(problem.posed.under("exact"))
         errors = linearisation(inference, draws)
     assessment = assess(inference, draws, errors)
-    summary = summarise(inference, draws, assessment, seed, versions(), problem.prepared.card.sha256)
+    certificate = certify(inference, seed)
+    sha256 = problem.prepared.card.sha256
+    summary = summarise(inference, draws, assessment, seed, versions(), sha256, certificate)
     return Fitted(problem, inference, draws, summary)
 
 
