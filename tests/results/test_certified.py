@@ -1,4 +1,4 @@
-"""The words of the check against a closed form: passed, failed, or why it does not apply; one of them is always said."""
+"""The words of the check against a closed form: passed, failed, or why it does not apply; one is always said."""
 
 from __future__ import annotations
 
@@ -32,9 +32,7 @@ def test_draws_that_contradict_the_closed_form_are_warned_of_and_not_praised():
     (warning,) = contradiction(FAILED)
     shown = show_fit(replace(SUMMARY, certificate=FAILED, warnings=(warning,)))
 
-    assert warning.startswith(
-        "draws against a closed form: DO NOT AGREE, the median of ln D_y is off by 7.2 Monte Carlo "
-    )
+    assert warning.startswith("draws against a closed form: DO NOT AGREE, the median of ln D_y is off by 7.2 Monte ")
     assert "do not use these constants" in warning
     assert shown.warnings == (warning,)
     assert certificate_sentence(FAILED) not in shown.remarks
