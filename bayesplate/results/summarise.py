@@ -32,6 +32,7 @@ from bayesplate.results.summary import (
     Percentile,
     PercentileValue,
     PointEstimate,
+    Request,
     SamplerHealth,
     Summary,
     Unconverged,
@@ -46,7 +47,13 @@ HIGH_EXACT_ERROR = 0.5
 
 
 def unconverged_summary(
-    problem: PosedProblem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
+    problem: PosedProblem,
+    chains: Chains,
+    convergence: Convergence,
+    seed: int,
+    versions: Mapping[str, str],
+    sha256: str,
+    request: Request,
 ) -> Unconverged:
     """The summary of a run that failed the gate."""
     return Unconverged(
@@ -59,6 +66,7 @@ def unconverged_summary(
         converged=False,
         sampler=sampler_health(chains, convergence),
         warnings=(*convergence.reasons, f"suggested steps: {convergence.suggested_steps}"),
+        request=request,
     )
 
 
@@ -70,6 +78,7 @@ def summarise(
     versions: Mapping[str, str],
     card_sha256: str,
     certificate: Certificate | None = None,
+    request: Request | None = None,
 ) -> Summary:
     """The summary of a converged fit.
 
@@ -84,6 +93,8 @@ def summarise(
     card_sha256 : str
     certificate : Certificate, optional
         Of the draws of the fit; those that other boards teach have none.
+    request : Request, optional
+        Of the fit; a board of a campaign has none.
 
     Returns
     -------
@@ -136,6 +147,7 @@ def summarise(
             *input_remarks(draws, board),
         ),
         warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
+        request=request,
     )
 
 

@@ -20,7 +20,7 @@ from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import OutputFolder
 from bayesplate.results.summarise import summarise
-from bayesplate.results.summary import Summary
+from bayesplate.results.summary import Request, Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.problem import Problem
 
@@ -166,8 +166,14 @@ def fitted(
     assessment = assess(inference, draws, errors)
     certificate = certify(inference, seed)
     sha256 = problem.prepared.card.sha256
-    summary = summarise(inference, draws, assessment, seed, versions(), sha256, certificate)
+    summary = summarise(inference, draws, assessment, seed, versions(), sha256, certificate, request_of(problem))
     return Fitted(problem, inference, draws, summary)
+
+
+def request_of(problem: Problem) -> Request:
+    """What a problem was asked for, as its summary keeps it."""
+    prepared = problem.prepared
+    return Request(prepared.card_text, problem.asked_law, prepared.named.digests)
 
 
 def checkpoint_in(folder: Path, problem: Problem, posed: PosedProblem) -> Checkpoint:
