@@ -26,7 +26,7 @@ docs: $(VENV)/tested-with
 	$(BIN)/python -m sphinx -W --keep-going -n -b html docs docs/_build/html
 
 calibration: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl --publish docs/validation
+	$(BIN)/python tests/calibration/run.py --workers 2 --out results/calibration.jsonl --publish docs/validation
 
 spectra: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_spectra.py --boards 200 --workers 2 --out results/spectra.jsonl --publish docs/validation
