@@ -99,8 +99,10 @@ def certify(inference: Inference, seed: int) -> Certificate:
     if not case.is_known:
         return does_not_apply("the prior ends next to the estimate, and has no normal case there")
     theta, log_posterior = _thinned(inference)
-    n_draws = log_posterior.size
-    effective, unreached = _overlap(inference, case, n_draws, seed)
+    try:
+        effective, unreached = _overlap(inference, case, log_posterior.size, seed)
+    except np.linalg.LinAlgError:
+        return does_not_apply("its normal equations have no solution at some noises")
     if unreached > _MOST_UNREACHED:
         return does_not_apply(
             f"{100 * unreached:.1f} % of the normal case lies where the posterior has next to nothing", effective
@@ -178,6 +180,8 @@ def _overlap(inference: Inference, case: NormalCase, n_draws: int, seed: int) ->
     """
     points = case.draws(_N_POINTS, np.random.default_rng([seed, _LINE_OF_SEEDS]))
     log_posterior = inference.problem.posterior(points)
+    if not np.isfinite(log_posterior).any():
+        return 0.0, 1.0
     log_ratio = case.log_density(points) - log_posterior
     inverse = -log_ratio
     log_constant = inverse.max() + np.log(np.mean(np.exp(inverse - inverse.max())))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from bayesplate.posterior.certificate import ALLOWED_ERRORS, FEWEST_EFFECTIVE, c
 from bayesplate.posterior.inference import infer, pose
 from bayesplate.posterior.normal_case import NormalCase
 from bayesplate.posterior.sampling import Chains, SamplerSettings
+from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 
 
@@ -143,6 +144,56 @@ def test_control_draws_of_a_posterior_without_one_mode_fail(fitted, mode):
     chains = Chains(draws, fitted.chains.log_prob - told, fitted.chains.burn_in)
     found = certify(replace(fitted, chains=chains), 1)
     assert found.passed is False, found
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Nowhere(Posterior):
+    """A posterior that has nothing where its normal case is."""
+
+    def log_likelihood(self, theta):
+        return np.full((len(theta), 1), -np.inf)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AtTheEdge(Posterior):
+    """A prior that ends at the estimate."""
+
+    def log_prior_constants(self, theta):
+        return np.where(theta[:, 0] > 0.0, super().log_prior_constants(theta), -np.inf)
+
+
+def test_where_there_is_no_normal_case_the_reason_is_told(fitted, monkeypatch):
+    one = fitted.problem.posterior
+    nowhere = Nowhere(one.board, one.prior, one.models, one.law)
+    at_edge = AtTheEdge(one.board, one.prior, one.models, one.law)
+    at = fitted.problem.centre.copy()
+    at[0] = 0.0
+
+    found = certify(replace(fitted, problem=replace(fitted.problem, posterior=nowhere)), 1)
+    assert "100.0 % of the normal case lies where the posterior has next to nothing" in found.reason
+    found = certify(replace(fitted, problem=replace(fitted.problem, posterior=at_edge, centre=at)), 1)
+    assert "the prior ends next to the estimate" in found.reason
+
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(NormalCase, "given_noise", singular)
+    assert "no solution" in certify(fitted, 1).reason
+
+
+def test_peaks_without_a_sure_label_have_no_normal_case(fitted):
+    class WithPeaks:
+        problem = replace(fitted.problem)
+
+    object.__setattr__(WithPeaks.problem, "posterior", replace_peaks(fitted.problem.posterior))
+    assert "which mode a peak is of is not sure" in certify(WithPeaks, 1).reason
+
+
+def replace_peaks(posterior):
+    """The same posterior that says it has peaks of which the label is not sure."""
+    other = Posterior(posterior.board, posterior.prior, posterior.models, posterior.law)
+    object.__setattr__(other, "peaks", (object(),))
+    return other
 
 
 def test_a_posterior_that_is_far_from_normal_is_said_to_be():
