@@ -202,6 +202,12 @@ def judge(records: Sequence[Record]) -> tuple[list[str], bool]:
             lines.append(f"{title}: not run")
             well = False
             continue
+        if found["chains"] < N_CHAINS or found["steps"] < N_STEPS:
+            lines.append(
+                f"{title}: {found['chains']} chains of {found['steps']}, {N_CHAINS} of {N_STEPS} are needed to judge"
+            )
+            well = False
+            continue
         z = found["z"]
         is_right = agrees(list(z.values()))
         worst = max(z, key=lambda name: abs(z[name]))

@@ -78,11 +78,12 @@ def is_caught(mutant: str, table: Sequence[Row]) -> bool:
 
 def text(title: str, table: Sequence[Row], n: int) -> str:
     """The table as it is printed."""
-    lines = [f"{title}, {n} simulations", f"  {'quantity':16} band p  chi2 p  mean rank  in 50 %  in 90 %"]
+    width = max(16, *(len(row.name) for row in table))
+    lines = [f"{title}, {n} simulations", f"  {'quantity':{width}} band p  chi2 p  mean rank  in 50 %  in 90 %"]
     for row in table:
         mark = "" if row.band > 0.05 else "  outside its own 95 % band"
         lines.append(
-            f"  {row.name:16} {row.band:6.4f}  {row.chi2:6.4f}  {row.mean_rank:9.3f}  {100 * row.within_50:7.1f}"
+            f"  {row.name:{width}} {row.band:6.4f}  {row.chi2:6.4f}  {row.mean_rank:9.3f}  {100 * row.within_50:7.1f}"
             f"  {100 * row.within_90:7.1f}{mark}"
         )
     return "\n".join(lines)

@@ -25,6 +25,18 @@ def test_constants_and_readings_drawn_in_turn_keep_their_distribution():
     assert joint.agrees(list(chains()["z"].values())), chains()["z"]
 
 
+def test_chains_are_judged_by_their_moments_and_their_length():
+    calm, far = {"ln D_x": 1.0, "ln D_y": -2.0}, {"ln D_x": 5.0, "ln D_y": -2.0}
+    whole = {"chains": joint.N_CHAINS, "steps": joint.N_STEPS}
+    right = [{**whole, "mutant": "", "z": calm}, *({**whole, "mutant": one, "z": far} for one in joint.MUTANTS)]
+
+    assert joint.judge(right)[1]
+    assert not joint.judge([{**right[0], "z": far}, *right[1:]])[1]
+    assert not joint.judge([*right[:2], {**right[2], "z": calm}])[1]
+    assert not joint.judge(right[:2])[1]
+    assert not joint.judge([{**right[0], "steps": joint.N_STEPS - 1}, *right[1:]])[1]
+
+
 def test_control_errors_drawn_half_as_large_are_found():
     assert not joint.agrees(list(chains("errors drawn half as large")["z"].values()))
 
@@ -142,6 +154,9 @@ def test_a_part_goes_on_where_it_stopped(tmp_path):
     records = part.run(out, 1, quiet=True)
     assert [record["value"] for record in records] == [0, 2, 4]
     assert records[1]["kept"]
+    assert part.done(out) == records
+    assert part.done(tmp_path / "other.jsonl") == []
+    assert not (tmp_path / "other.jsonl").exists()
     assert len(out.read_text().splitlines()) == 4
 
 
