@@ -186,7 +186,8 @@ def _problem(before: Mapping[str, Any], path: Path, card: str | os.PathLike[str]
         *_different(f"{file} request named", request["named"], named.digests, "bring back the card that was used"),
         *named.faults,
     ]
-    if card is not None:
+    if card is not None:  # the text's own name was held to the summary's when it was read: folders are called after it
+        faults += _different(f"{file} name", {"card": before["name"]}, {"card": read.name}, "")
         faults += _different(f"{file} card_sha256", {"card": before["card_sha256"]}, {"card": read.sha256}, "")
     if faults:
         raise InputError(faults)

@@ -84,6 +84,18 @@ def test_a_card_that_is_named_too_must_be_the_same(fitted, tmp_path):
     assert f"card_sha256 card: wanted {fitted.summary['card_sha256']}, got " in run.stderr
 
 
+@pytest.mark.parametrize("with_card", [False, True])
+def test_a_summary_cannot_name_a_folder_outside(fitted, tmp_path, monkeypatch, with_card):
+    monkeypatch.chdir(tmp_path)
+    path = edited(fitted, tmp_path, lambda summary: summary.update(name="../../outside"))
+    given = [BOARD] if with_card else []
+    result = CliRunner().invoke(main, ["fit", *given, "--repeat", str(path)])
+
+    assert result.exit_code == 3
+    assert set(runs.files_in(tmp_path)) == {"summary.json"}
+    assert not (tmp_path.parent / "outside-repeated").exists()
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
