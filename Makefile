@@ -34,7 +34,7 @@ audit:
 	$(PYTHON) .ci/audit.py
 
 calibration: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run.py --simulations 200 --workers 2 --out results/calibration.jsonl --publish docs/validation
+	$(BIN)/python tests/calibration/run.py --workers 2 --out results/calibration.jsonl --publish docs/validation
 
 spectra: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_spectra.py --boards 200 --workers 2 --out results/spectra.jsonl --publish docs/validation

@@ -8,7 +8,16 @@ from typing import Any
 import click
 
 from bayesplate.asking import asked_answers, given_answers
-from bayesplate.options import costs, mass_kg, names, places, refuse_both, sand_pictures, shared_options
+from bayesplate.options import (
+    costs,
+    mass_kg,
+    names,
+    places,
+    refuse_beside_repeat,
+    refuse_both,
+    sand_pictures,
+    shared_options,
+)
 from bayesplate.terminal import print_json, print_shown, progress_line, reporting, say
 
 
@@ -59,66 +68,42 @@ def check(card: str, effects: list[str] | None, setup: str | None, as_json: bool
 
 
 @main.command()
-@click.argument("card")
+@click.argument("card", required=False)
 @shared_options(
-    "out",
-    "seed",
-    "effects",
-    "setup",
-    "linear",
-    "exact",
-    "robust",
-    "report",
-    "force",
-    "resume",
-    "json",
-    "quiet",
-    "debug",
-)
+    "out", "seed", "effects", "setup", "linear", "exact", "robust", "report", "force", "resume", "repeat", "json",
+    "quiet", "debug",
+)  # fmt: skip
+@click.pass_context
 def fit(
-    card: str,
+    context: click.Context,
+    /,
+    card: str | None,
     out: str | None,
-    seed: int,
-    effects: list[str] | None,
-    setup: str | None,
     linear: bool,
     exact: bool,
-    robust: bool,
-    report: bool,
-    force: bool,
-    resume: bool,
+    repeat: str | None,
     as_json: bool,
     quiet: bool,
     debug: bool,
+    **asked: Any,
 ) -> None:
     """Posterior of the elastic constants of CARD: report.html, summary.json, posterior.nc."""
-    refuse_both(force, resume, "--force starts anew and --resume continues")
+    refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
     refuse_both(linear, exact, "--linear and --exact force different laws")
+    refuse_beside_repeat(context, card, repeat)
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
-            from bayesplate.workflow.fit import fit as run
-            from bayesplate.workflow.prepare import default_folder
+            from bayesplate.workflow.repeat import fit_or_repeat as run
 
-            result = run(
-                card,
-                out=default_folder(card) if out is None else out,
-                seed=seed,
-                effects=effects,
-                setup=setup,
-                law="linear" if linear else "exact" if exact else None,
-                robust=robust,
-                report=report,
-                force=force,
-                resume=resume,
-                progress=tell,
-            )
+            law = "linear" if linear else "exact" if exact else None
+            result, told = run(card, repeat, out=out, law=law, progress=tell, **asked)
         if as_json:
             print_json(result.summary)
         elif not quiet:
             from bayesplate.workflow.shown import show_fit
 
             print_shown(show_fit(result.summary))
-            say(f"written to {result.folder}")
+            say(f"{told}written to {result.folder}")
 
 
 @main.command()

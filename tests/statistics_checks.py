@@ -32,10 +32,15 @@ def differences_from_normal(draws, ess, mean, sd, n_errors=4.0):
     list of str
         One sentence a difference; empty if the draws agree.
     """
+    return differences(draws, ess, normal_truth(mean, sd), n_errors)
+
+
+def normal_truth(mean, sd):
+    """What is known of normal distributions of those means and standard deviations: (n_dim,) arrays to a `Truth`."""
     mean, sd = np.asarray(mean, dtype=float), np.asarray(sd, dtype=float)
     deviates = ndtri(np.array(QUANTILES))[:, None]
     densities = np.exp(-0.5 * deviates**2) / np.sqrt(2 * np.pi) / sd
-    return differences(draws, ess, Truth(mean, sd, np.full(mean.size, 3.0), mean + deviates * sd, densities), n_errors)
+    return Truth(mean, sd, np.full(mean.size, 3.0), mean + deviates * sd, densities)
 
 
 @dataclass(frozen=True)

@@ -206,7 +206,7 @@ def test_an_output_folder_that_cannot_be_one():
     [
         (["chek", "fiemme-spruce-clamped"], "No such command 'chek'. Did you mean 'check'?"),
         (["zzzz"], "No such command 'zzzz'."),
-        (["fit", "fiemme-spruce-clamped", "--rezume"], "No such option '--rezume'. Did you mean '--resume'?"),
+        (["fit", "fiemme-spruce-clamped", "--linar"], "No such option '--linar'. Did you mean '--linear'?"),
         (["fit", "fiemme-spruce-clamped", "--seed", "-1"], "-1 is not in the range x>=0"),
         (["fit", "fiemme-spruce-clamped", "--seed", "one"], "'one' is not a valid integer"),
         (["fit", "fiemme-spruce-clamped", "--force", "--resume"], "--force starts anew and --resume continues"),
@@ -221,7 +221,7 @@ def test_a_mistyped_command_line_is_a_usage_error(arguments, said):
     result = invoke(*arguments)
 
     assert result.exit_code == 2
-    assert said in result.stderr.replace("No such option: --rezume ", "No such option '--rezume'. ")
+    assert said in result.stderr.replace("No such option: --linar ", "No such option '--linar'. ")
     assert "Traceback" not in result.stderr
     assert files_in(Path()) == {}
 

@@ -12,12 +12,14 @@ from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.assessment import Assessment
+from bayesplate.posterior.certificate import Certificate, does_not_apply
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks
+from bayesplate.results.certified import contradiction
 from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import mode_rows
@@ -30,6 +32,7 @@ from bayesplate.results.summary import (
     Percentile,
     PercentileValue,
     PointEstimate,
+    Request,
     SamplerHealth,
     Summary,
     Unconverged,
@@ -37,12 +40,20 @@ from bayesplate.results.summary import (
 
 Floats = NDArray[np.float64]
 
+TAUGHT = "its draws are weighted by what other boards teach"
+"""Why a board of a campaign has no certificate of its own: that of the board alone has."""
 HIGH_EXACT_ERROR = 0.5
 """Cents by which the exact law may miss full solves before a summary warns."""
 
 
 def unconverged_summary(
-    problem: PosedProblem, chains: Chains, convergence: Convergence, seed: int, versions: Mapping[str, str], sha256: str
+    problem: PosedProblem,
+    chains: Chains,
+    convergence: Convergence,
+    seed: int,
+    versions: Mapping[str, str],
+    sha256: str,
+    request: Request,
 ) -> Unconverged:
     """The summary of a run that failed the gate."""
     return Unconverged(
@@ -55,6 +66,7 @@ def unconverged_summary(
         converged=False,
         sampler=sampler_health(chains, convergence),
         warnings=(*convergence.reasons, f"suggested steps: {convergence.suggested_steps}"),
+        request=request,
     )
 
 
@@ -65,6 +77,8 @@ def summarise(
     seed: int,
     versions: Mapping[str, str],
     card_sha256: str,
+    certificate: Certificate | None = None,
+    request: Request | None = None,
 ) -> Summary:
     """The summary of a converged fit.
 
@@ -77,11 +91,16 @@ def summarise(
     seed : int
     versions : dict of str
     card_sha256 : str
+    certificate : Certificate, optional
+        Of the draws of the fit; those that other boards teach have none.
+    request : Request, optional
+        Of the fit; a board of a campaign has none.
 
     Returns
     -------
     Summary
     """
+    certificate = does_not_apply(TAUGHT) if certificate is None else certificate
     problem = inference.problem
     board = problem.board
     system = paper_system(board, problem.estimate, compared=False)
@@ -121,12 +140,14 @@ def summarise(
             surrogate_worst_cents=finite(_worst(assessment.surrogate_errors)),
         ),
         sampler=sampler_health(inference.chains, inference.convergence),
+        certificate=certificate,
         identifiability=(
             *remarks(board, problem.identifiability),
             *prior_remarks(draws, problem.prior),
             *input_remarks(draws, board),
         ),
-        warnings=tuple(warnings_of(problem, assessment)),
+        warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
+        request=request,
     )
 
 

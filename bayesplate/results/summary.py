@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 
+from bayesplate.posterior.certificate import Certificate
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import ModeRow
@@ -118,12 +119,32 @@ class Run:
 
 
 @dataclass(frozen=True)
+class Request:
+    """What a fit was asked for, so that its summary alone can repeat it.
+
+    Attributes
+    ----------
+    card : str
+        Text of the board card, with what a --setup put in its place.
+    law : "linear", "exact" or None
+        As asked; None leaves the choice to the fit.
+    named : dict of str
+        SHA-256 of the numbers of the prior and the tables that the card names, by kind and name.
+    """
+
+    card: str
+    law: str | None
+    named: Mapping[str, str]
+
+
+@dataclass(frozen=True)
 class Unconverged(Run):
     """The summary of a run that failed the convergence gate: its diagnostics, and no constants."""
 
     converged: bool
     sampler: SamplerHealth
     warnings: tuple[str, ...]
+    request: Request | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,7 +178,11 @@ class Summary(Run):
         Of the setups that have such peaks: all modes that they may be.
     error : ErrorFigures
     sampler : SamplerHealth
+    certificate : Certificate
+        Whether the draws agree with an answer in closed form on the same readings.
     identifiability, warnings : tuple of str
+    request : Request or None
+        None for a board of a campaign, whose draws follow from all boards.
     """
 
     converged: bool
@@ -178,8 +203,10 @@ class Summary(Run):
     spectra: tuple[Spectrum, ...]
     error: ErrorFigures
     sampler: SamplerHealth
+    certificate: Certificate
     identifiability: tuple[str, ...]
     warnings: tuple[str, ...]
+    request: Request | None = None
 
     def __repr__(self) -> str:
         constants = ", ".join(f"{name} = {plus_minus(entry, GPA)} GPa" for name, entry in self.elastic.items())

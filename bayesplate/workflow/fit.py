@@ -24,7 +24,7 @@ from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
-from bayesplate.workflow.fitting import Fitted, fitted, opened
+from bayesplate.workflow.fitting import Fitted, fitted, opened, request_of
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.shown import show_fit
@@ -186,7 +186,10 @@ def refuse_unconverged(inference: Inference, seed: int, problem: Problem, folder
     convergence = inference.convergence
     if folder is not None:
         sha256 = problem.prepared.card.sha256
-        summary = unconverged_summary(inference.problem, inference.chains, convergence, seed, versions(), sha256)
+        request = request_of(problem)
+        summary = unconverged_summary(
+            inference.problem, inference.chains, convergence, seed, versions(), sha256, request
+        )
         write_text(folder / SUMMARY, json_text(summary))
     raise NotConvergedError(
         "the sampler did not converge, so no constants are given:\n" + "\n".join(convergence.reasons)

@@ -17,6 +17,7 @@ from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.batch_summary import BatchSummary
+from bayesplate.results.certified import certificate_sentence, contradiction
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.command_tables import (
     METHODS_REMARK,
@@ -103,7 +104,9 @@ def show_fit(summary: Summary | CampaignSummary) -> Shown:
         + (f"{left_out:.1f} left out" if left_out is not None else "too few modes to leave one out")
         + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )
-    return Shown(tables, summary.identifiability, summary.warnings, closing)
+    checked = summary.certificate
+    remarks = () if contradiction(checked) else (certificate_sentence(checked),)
+    return Shown(tables, (*summary.identifiability, *remarks), summary.warnings, closing)
 
 
 def _show_campaign_fit(summary: CampaignSummary) -> Shown:

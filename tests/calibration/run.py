@@ -1,7 +1,9 @@
-"""Calibrate the inference: `python tests/calibration/run.py --simulations 200 --workers 2 --out ranks.jsonl`.
+"""Calibrate the inference: `python tests/calibration/run.py --workers 2 --out results/calibration.jsonl`.
 
-Prints a table of every quantity and mutant. Exit code 0: calibrated and every mutant caught; 1: not; 2: usage. A run
-that was interrupted goes on where it stopped if it is given the same file.
+Four parts, each with its own file of records beside the one that is named: ranks of the truth among draws over a prior,
+with the mutants that they must find out; draws against closed forms; ranks at the paper's two boards; the joint
+distribution of constants and readings. Prints what each found. Exit code 0: calibrated and every mutant caught; 1: not,
+or not all of it was run; 2: usage. A run that was interrupted goes on where it stopped if it is given the same file.
 """
 
 from __future__ import annotations
@@ -10,37 +12,120 @@ import argparse
 import os
 import sys
 import time
-from dataclasses import fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration.records import add_to, publish, read_done
+from calibration import again, joint, oracle
+from calibration.layouts import EFFECTS
+from calibration.mutants import FITTED
+from calibration.records import Record, add_to, read_done
 from calibration.sbc import Design, identity, simulate_one
-from calibration.table import MUTANTS, family_p_value, is_calibrated, is_caught, rows, text
+from calibration.table import MUTANTS, NOT_COUNTED, family_p_value, is_calibrated, is_caught, rows, text
+
+TITLE = "Calibration of the posterior"
+SECTIONS = {
+    "ranks": (
+        "Ranks of the truth among draws",
+        "Constants, noise and the size of an effect drawn from their priors, readings from them, and the rank of each "
+        "among the draws of the fit; a frequency that was not read and the log likelihood are ranked too. Each mutant "
+        "is a wrong posterior that the same bands must find out.",
+    ),
+    "oracle": (
+        "Closed forms",
+        "Data sets whose posterior is known: normal where the noise is known, Student's where it is not.",
+    ),
+    "boards": (
+        "At the paper's boards",
+        "Constants drawn from the posterior of a board and new readings from them: their rank among the draws that see "
+        "both sets of readings.",
+    ),
+    "joint": (
+        "Joint distribution",
+        "Constants and readings drawn in turn, the constants by the sampler's own steps: moments against those of "
+        "independent draws.",
+    ),
+}
+"""Parts of the page: their titles and what they are."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part: what is computed, what a file of it must agree in, and what the records say.
+
+    Attributes
+    ----------
+    simulate : callable
+        Of the items of a job.
+    identity : dict
+    jobs : list of (key, job)
+        A record holds the items of its key.
+    judge : callable
+        Records to lines and whether all is well.
+    """
+
+    simulate: Callable[..., Record]
+    identity: Record
+    jobs: Sequence[tuple[Record, tuple[Any, ...]]]
+    judge: Callable[[Sequence[Record]], tuple[list[str], bool]]
+
+    def run(self, out: Path, workers: int, *, quiet: bool = False) -> list[Record]:
+        """Do what is not done yet, and return the records of all jobs."""
+        done = read_done(out, self.identity)
+        open_ones = [job for key, job in self.jobs if not any(key.items() <= record.items() for record in done)]
+        return self._asked_for(done + add_to(out, self.simulate, open_ones, workers, quiet=quiet))
+
+    def done(self, out: Path) -> list[Record]:
+        """The records of those jobs that were done before."""
+        return self._asked_for(read_done(out, self.identity)) if out.exists() else []
+
+    def _asked_for(self, done: Sequence[Record]) -> list[Record]:
+        found = (next((one for one in done if key.items() <= one.items()), None) for key, _ in self.jobs)
+        return [one for one in found if one is not None]
+
+
+def parts(sets: int, simulations: int, steps: int) -> dict[str, Part]:
+    """The parts beside the ranks, of so many data sets of each kind, simulations at each board, and steps."""
+    sets_of = [(kind, i) for i in range(sets) for kind in oracle.KINDS]
+    at_boards = [(name, i) for i in range(simulations) for name in again.BOARDS]
+    of_sets = [({"kind": kind, "set": i}, (kind, i)) for kind, i in sets_of]
+    of_boards = [({"board": name, "simulation": i}, (name, i)) for name, i in at_boards]
+    chains = [
+        ({"mutant": mutant, "steps": steps}, (joint.N_CHAINS, steps, 1, mutant)) for mutant in ("", *joint.MUTANTS)
+    ]
+    return {
+        "oracle": Part(oracle.check_one, oracle.identity(), of_sets, oracle.judge),
+        "boards": Part(again.simulate_again, again.identity(), of_boards, again.judge),
+        "joint": Part(joint.check_one, joint.identity(), chains, joint.judge),
+    }
 
 
 def run(
     design: Design, n_simulations: int, n_mutants: int, workers: int, out: Path, *, quiet: bool = False
 ) -> list[dict[str, Any]]:
-    """Do what is not done yet, and return the records of all simulations asked for, in their order."""
+    """Do the ranks that are not done yet, and return the records of all simulations asked for, in their order.
+
+    Without workers nothing is done, and those that were done before are returned.
+    """
     records = read_done(out, identity(design))
-    done = {(r["simulation"], "noise fixed too low" in r.get("ranks", {})) for r in records}
+    done = {(r["simulation"], "refused" in r) for r in records}
     open_ones = [
         (i, i < n_mutants)
         for i in range(n_simulations)
         if (i, True) not in done and ((i, False) not in done or i < n_mutants)
     ]
-    jobs = [(design, i, mutant) for i, mutant in open_ones]
-    records += add_to(out, simulate_one, jobs, workers, quiet=quiet)
+    jobs = [(design, i, FITTED if mutants else ()) for i, mutants in open_ones if workers]
+    records += add_to(out, simulate_one, jobs, workers, quiet=quiet) if jobs else []
     latest = {record["simulation"]: record for record in records if record["simulation"] < n_simulations}
     return [latest[i] for i in sorted(latest)]
 
 
-def judge(records: list[dict[str, Any]]) -> tuple[list[str], bool]:
-    """Paragraphs to print, and whether all is well."""
+def judge(records: list[dict[str, Any]], wanted: Mapping[str, int] = MUTANTS) -> tuple[list[str], bool]:
+    """Paragraphs to print, and whether all is well, the mutants that are wanted caught by so many simulations."""
     failed = [r for r in records if "error" in r]
     good = [r for r in records if "ranks" in r]
     paragraphs = []
@@ -56,7 +141,7 @@ def judge(records: list[dict[str, Any]]) -> tuple[list[str], bool]:
         f"started anew: {sum(r['attempts'] > 1 for r in good)}; linear law: {sum(r['law'] == 'linear' for r in good)}; "
         f"median {sorted(r['seconds'] for r in good)[len(good) // 2]:.1f} s"
     )
-    for mutant, fewest in MUTANTS.items():
+    for mutant, fewest in wanted.items():
         ranks = [r["ranks"][mutant] for r in good if mutant in r["ranks"]]
         if len(ranks) < fewest:
             paragraphs.append(f"mutant: {mutant}: {len(ranks)} simulations, {fewest} are needed to judge")
@@ -66,17 +151,32 @@ def judge(records: list[dict[str, Any]]) -> tuple[list[str], bool]:
         caught = is_caught(mutant, found)
         well &= caught
         paragraphs.append(text(f"mutant: {mutant}", found, len(ranks)))
-        paragraphs.append("  caught" if caught else "  NOT CAUGHT")
+        p = family_p_value(found, NOT_COUNTED.get(mutant, ()))
+        refused = sum(mutant in r.get("refused", ()) for r in good)
+        told = f"; {refused} more refused by the package" if mutant in FITTED and refused else ""
+        paragraphs.append(f"  {'caught' if caught else 'NOT CAUGHT'}, family-wise p {p:.1e}{told}")
     return paragraphs, well
+
+
+def page(found: dict[str, list[str]]) -> str:
+    """What was found as a page of the documentation; a part that was not run says so and nothing else."""
+    lines = [f"# {TITLE}", "", "Written by `make calibration`; do not edit.", ""]
+    for name, (title, what) in SECTIONS.items():
+        told = ["```", *"\n".join(found[name]).splitlines(), "```"] if name in found else ["Not run with this version."]
+        lines += [f"## {title}", "", what, "", *told, ""]
+    return "\n".join(lines)
 
 
 def main() -> int:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--simulations", type=int, default=200)
-    parser.add_argument(
-        "--mutants", type=int, default=50, help="simulations that are also fitted with too little noise"
-    )
+    parser.add_argument("--parts", nargs="+", choices=tuple(SECTIONS), default=list(SECTIONS),
+                        help="what is computed; of the others what was done before is told")  # fmt: skip
+    parser.add_argument("--simulations", type=int, default=1000, help="of the ranks")
+    parser.add_argument("--mutants", type=int, default=1000, help="simulations for which mutants are fitted too")
+    parser.add_argument("--sets", type=int, default=oracle.N_SETS, help="of each kind of closed form")
+    parser.add_argument("--at-boards", type=int, default=again.N_SIMULATIONS, help="simulations at each of two boards")
+    parser.add_argument("--steps", type=int, default=joint.N_STEPS, help="of the joint distribution")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
     parser.add_argument("--edges", choices=("free", "cantilever"), default="free")
@@ -85,17 +185,34 @@ def main() -> int:
     )
     parser.add_argument("--law", choices=("exact", "auto", "fixed-linear"), default="exact")
     parser.add_argument("--resolution", type=float, default=1.0, help="Hz; 0 for readings that are not rounded")
+    parser.add_argument("--without-effect", action="store_true", help="no size of an effect among the ranks")
     parser.add_argument("--base-seed", type=int, default=1)
     parser.add_argument("--publish", type=Path, help="folder for a page of what was found")
     arguments = vars(parser.parse_args())
-    design = Design(**{f.name: arguments[f.name] for f in fields(Design) if f.name in arguments})
+    if arguments["generator"] == "ritz" and not arguments["without_effect"]:
+        parser.error("the independent solver knows no effects: --without-effect")
+    effect = "" if arguments["without_effect"] else EFFECTS[arguments["edges"]]
+    design = Design(effect=effect, **{f.name: arguments[f.name] for f in fields(Design) if f.name in arguments})
     started = time.perf_counter()
-    records = run(design, arguments["simulations"], arguments["mutants"], arguments["workers"], arguments["out"])
-    paragraphs, well = judge(records)
-    print("\n".join(paragraphs))
+    out, workers = arguments["out"], arguments["workers"]
+    found: dict[str, list[str]] = {}
+    well = True
+    if "ranks" in arguments["parts"] or out.exists():
+        at_work = workers if "ranks" in arguments["parts"] else 0
+        found["ranks"], is_right = judge(run(design, arguments["simulations"], arguments["mutants"], at_work, out))
+        well &= is_right
+    for name, part in parts(arguments["sets"], arguments["at_boards"], arguments["steps"]).items():
+        beside = out.with_name(f"{out.stem}-{name}{out.suffix}")
+        records = part.run(beside, workers) if name in arguments["parts"] else part.done(beside)
+        if records:
+            found[name], is_right = part.judge(records)
+            well &= is_right
+    well &= set(found) == set(SECTIONS)
+    for name, lines in found.items():
+        print(f"{SECTIONS[name][0]}\n" + "\n".join(lines))
     if arguments["publish"]:
-        title = "Calibration of the posterior: ranks of the truth among its draws"
-        publish(arguments["publish"], "calibration", title, "make calibration", "\n".join(paragraphs).splitlines())
+        arguments["publish"].mkdir(parents=True, exist_ok=True)
+        (arguments["publish"] / "calibration.md").write_text(page(found), encoding="utf-8")
     print(f"{'calibrated' if well else 'NOT CALIBRATED'}, {(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

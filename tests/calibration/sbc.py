@@ -13,19 +13,20 @@ Bayesian Analysis (2023), doi:10.1214/23-BA1404.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
 import ritz
-from calibration.layouts import EDGES, LABELS, LENGTHS
-from calibration.mutants import LESS_NOISE, NARROWER, narrowed
+from calibration.layouts import EDGES, HELD_OUT, LABELS, LENGTHS
+from calibration.mutants import BELIEFS, NARROWER, counted_twice, narrowed
 from made_boards import models_at, setup_of, with_noise
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard, load_prior
+from bayesplate.effects import declare
 from bayesplate.errors import BayesplateError
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.refit import design as sensitivities
@@ -66,6 +67,8 @@ class Design:
         Relative; 0 takes the thickness as exact.
     prior : str
         Prior card; its Poisson ratio is marginalised.
+    effect : str
+        A declared effect, its parameters drawn from their priors and ranked too; "" for none.
     base_seed : int
     n_walkers, n_ensembles : int
     gate_taus : float
@@ -79,6 +82,7 @@ class Design:
     resolution: float = 1.0
     thickness_sd: float = 0.003
     prior: str = "spruce"
+    effect: str = ""
     base_seed: int = 1
     n_walkers: int = 24
     n_ensembles: int = 2
@@ -101,7 +105,18 @@ class Design:
     def board(self, hertz: Mapping[tuple[int, int], float], noise: Quantity = DEFAULT_NOISE) -> Board:
         """The board with readings by label."""
         setup = setup_of(EDGES[self.edges], hertz, name=self.edges, resolution=self.resolution, noise=noise)
-        return made_board("simulated", self.inputs, [setup], prior=self.prior)
+        return declare(made_board("simulated", self.inputs, [setup], prior=self.prior, effects=self._effects))
+
+    @property
+    def _effects(self) -> tuple[str, ...]:
+        return (self.effect,) if self.effect else ()
+
+
+@lru_cache(maxsize=8)
+def amplitudes(design: Design) -> dict[str, Quantity]:
+    """Priors of the parameters of the declared effect."""
+    board = design.board(dict.fromkeys(LABELS[design.edges], 1.0))
+    return {one.name: one.prior for one in board.parameters if one.is_of_effect}
 
 
 @dataclass(frozen=True)
@@ -123,6 +138,7 @@ def prior_values(design: Design, prior: PriorCard, rng: np.random.Generator) -> 
     """Constants and inputs drawn from their joint prior, which is cut off where no material exists."""
     while True:
         values = {name: float(quantity.value(rng.standard_normal())) for name, quantity in design.inputs.items()}
+        values |= {name: float(quantity.sample(rng, 1)[0]) for name, quantity in amplitudes(design).items()}
         constants = [float(prior.constants[name].sample(rng, 1)[0]) for name in MODULI]
         found = rigidities(*constants, values["thickness"], values["poisson_xy"])
         if np.isfinite(found.D_x):
@@ -152,7 +168,7 @@ def _frequencies(design: Design, values: Mapping[str, float]) -> tuple[dict[tupl
         )
         return ritz.simulate(plate, labels), ()
     if design.law == "fixed-linear":
-        model = _reference(design).posterior.models[0]
+        model = reference(design).posterior.models[0]
     else:
         (model,) = models_at(design.board(dict.fromkeys(labels, 1.0)), [values[n] for n in RIGIDITIES], **values)
     hertz = np.exp(model.log_frequencies(arrays, "linear")[0])
@@ -160,23 +176,24 @@ def _frequencies(design: Design, values: Mapping[str, float]) -> tuple[dict[tupl
 
 
 @lru_cache(maxsize=2)
-def _reference(design: Design) -> PosedProblem:
+def reference(design: Design) -> PosedProblem:
     """The board at the medians of the prior: where the fixed linear law is made."""
     prior = load_prior(design.prior)
-    inputs = {name: float(quantity.median) for name, quantity in design.inputs.items()}
+    inputs = {name: float(quantity.median) for name, quantity in {**design.inputs, **amplitudes(design)}.items()}
     found = rigidities(*(prior.constants[n].median for n in MODULI), inputs["thickness"], inputs["poisson_xy"])
     values = inputs | {name: float(value) for name, value in zip(RIGIDITIES, found, strict=True)}
     hertz, _ = _frequencies(replace(design, law="exact", generator="package"), values)
     return pose(replace(design, resolution=0.0).board(hertz), prior, law="linear")
 
 
-def make_problem(design: Design, truth: Truth, noise: Quantity = DEFAULT_NOISE) -> PosedProblem:
-    """The inference of simulated readings, under the noise prior that the analysis believes in."""
-    board = design.board(truth.hertz, noise)
+def make_problem(design: Design, truth: Truth, belief: Callable[[Board], Board] | None = None) -> PosedProblem:
+    """The inference of simulated readings, of the board that the analysis believes in."""
+    board = design.board(truth.hertz)
+    board = board if belief is None else belief(board)
     prior = load_prior(design.prior)
     if design.law != "fixed-linear":
         return pose(board, prior, law=None if design.law == "auto" else "exact")
-    return _under_the_fixed_law(_reference(design), board, prior)
+    return _under_the_fixed_law(reference(design), board, prior)
 
 
 def _under_the_fixed_law(reference: PosedProblem, board: Board, prior: PriorCard) -> PosedProblem:
@@ -187,15 +204,36 @@ def _under_the_fixed_law(reference: PosedProblem, board: Board, prior: PriorCard
     centre[parameters.n_dim - len(parameters.inputs) - 1] = np.log(board.setups[0].noise.median)
     predict = predictor(board, posterior.models, "linear", centre)
     scales = reading_scales(board)
-    centre[columns] = refit(predict, log_measured(board), scales, centre[columns])
+    centre[columns] = refit(predict, log_measured(board), scales, centre[columns], parameters.fitted_bounds)
     weighted = sensitivities(predict, scales, centre[columns])
     covariance = reference.covariance.copy()
     covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
     return replace(reference, board=board, posterior=posterior, centre=centre, covariance=covariance)
 
 
-def quantities(problem: PosedProblem, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """What is ranked, for many draws: (n_draws,) arrays."""
+HeldOut = Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
+
+
+def held_out(design: Design, problem: PosedProblem) -> HeldOut:
+    """ln f of the mode that is not read, from values by name: by the linear law at the estimate, which data fix."""
+    if design.law == "fixed-linear":
+        return _reference_held_out(design)
+    return _held_out_at(design, problem)
+
+
+def _held_out_at(design: Design, problem: PosedProblem) -> HeldOut:
+    values = {name: float(np.ravel(one)[0]) for name, one in problem.parameters.values(problem.centre[None]).items()}
+    (model,) = models_at(design.board({HELD_OUT[design.edges]: 1.0}), [values[n] for n in RIGIDITIES], **values)
+    return lambda drawn: np.asarray(model.log_frequencies(drawn, "linear")[:, 0])
+
+
+@lru_cache(maxsize=2)
+def _reference_held_out(design: Design) -> HeldOut:
+    return _held_out_at(design, reference(design))
+
+
+def quantities(problem: PosedProblem, theta: NDArray[np.float64], unread: HeldOut) -> dict[str, NDArray[np.float64]]:
+    """What is ranked, for many draws: (n_draws,) arrays; the inputs hold the sizes of effects too."""
     values = problem.parameters.values(theta)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     with np.errstate(invalid="ignore"):
@@ -205,14 +243,15 @@ def quantities(problem: PosedProblem, theta: NDArray[np.float64]) -> dict[str, N
         **constants._asdict(),
         **{name: values[name] for name in problem.parameters.inputs},
         "noise": problem.parameters.log_noise(theta)[:, 0],
+        "held_out": unread(values),
         "log_likelihood": log_likelihood,
     }
     return {name: np.broadcast_to(value, len(theta)) for name, value in found.items()}
 
 
-def ranks_among(problem: PosedProblem, truth: Truth, draws: NDArray[np.float64]) -> Ranks:
+def ranks_among(problem: PosedProblem, truth: Truth, draws: NDArray[np.float64], unread: HeldOut) -> Ranks:
     """Rank of the truth among the draws, 0 to `N_DRAWS`, for every quantity."""
-    true, drawn = quantities(problem, truth.theta(problem)), quantities(problem, draws)
+    true, drawn = quantities(problem, truth.theta(problem), unread), quantities(problem, draws, unread)
     return {name: int(np.sum(drawn[name] < true[name][0])) for name in true}
 
 
@@ -248,7 +287,7 @@ def prior_draws(problem: PosedProblem, design: Design, rng: np.random.Generator)
     return np.stack(rows)
 
 
-def simulate_one(design: Design, index: int, with_less_noise: bool = False) -> dict[str, Any]:
+def simulate_one(design: Design, index: int, mutants: Sequence[str] = ()) -> dict[str, Any]:
     """One simulation: its ranks, and those of the mutants.
 
     Parameters
@@ -256,8 +295,8 @@ def simulate_one(design: Design, index: int, with_less_noise: bool = False) -> d
     design : Design
     index : int
         Seeds everything random, together with the design's seed.
-    with_less_noise : bool
-        Also fit with the noise fixed at 0.7 of its median.
+    mutants : sequence of str
+        Those of `FITTED` that are to be fitted too; the others take no fit.
 
     Returns
     -------
@@ -274,18 +313,17 @@ def simulate_one(design: Design, index: int, with_less_noise: bool = False) -> d
         problem = make_problem(design, truth)
         places = tuple(place.rank for place in problem.posterior.models[0].places)
         draws, attempts = posterior_draws(problem, design, for_draws)
-        ranks = {"production": ranks_among(problem, truth, draws)}
-        ranks["likelihood omitted"] = ranks_among(problem, truth, prior_draws(problem, design, for_mutants))
+        unread = held_out(design, problem)
+        ranks = {"production": ranks_among(problem, truth, draws, unread)}
+        ranks["likelihood omitted"] = ranks_among(problem, truth, prior_draws(problem, design, for_mutants), unread)
         for name, factor in NARROWER.items():
-            ranks[name] = ranks_among(problem, truth, narrowed(draws, factor))
-        if with_less_noise:
-            quieter = make_problem(design, truth, LESS_NOISE)
-            draws, _ = posterior_draws(quieter, design, for_mutants)
-            ranks["noise fixed too low"] = ranks_among(quieter, truth, draws)
+            ranks[name] = ranks_among(problem, truth, narrowed(draws, factor), unread)
     except BayesplateError as error:
         return record | {"error": f"{type(error).__name__}: {error}"}
+    refused = add_mutants(mutants, design, truth, problem, for_mutants, ranks)
     return record | {
         "ranks": ranks,
+        **({"refused": refused} if mutants else {}),
         "seconds": round(time.perf_counter() - started, 2),
         "law": problem.posterior.law,
         "attempts": attempts,
@@ -293,6 +331,27 @@ def simulate_one(design: Design, index: int, with_less_noise: bool = False) -> d
     }
 
 
+def add_mutants(
+    names: Sequence[str],
+    design: Design,
+    truth: Truth,
+    problem: PosedProblem,
+    rng: np.random.Generator,
+    ranks: dict[str, Ranks],
+) -> list[str]:
+    """Fit mutants and add their ranks; the names of those that the package would not fit."""
+    refused = []
+    for name in names:
+        try:
+            belief = BELIEFS.get(name)
+            one = counted_twice(problem, design.edges) if belief is None else make_problem(design, truth, belief)
+            draws, _ = posterior_draws(one, design, rng)
+            ranks[name] = ranks_among(one, truth, draws, held_out(design, one))
+        except BayesplateError:
+            refused.append(name)
+    return refused
+
+
 def identity(design: Design) -> dict[str, Any]:
     """What a file of ranks must agree in before more are added to it."""
-    return {"format": 2, "n_draws": N_DRAWS, "design": asdict(design)}
+    return {"format": 3, "n_draws": N_DRAWS, "design": asdict(design)}

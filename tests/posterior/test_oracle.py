@@ -12,97 +12,18 @@ from functools import cache
 import numpy as np
 import pytest
 import ritz
-from made_boards import CANTILEVER_LABELS, NARROW, board_of, setup_of, with_noise
+from conjugate import ESS, NOISE, closed_form, conjugate, fixed_noise, rigidity_prior, sampled, stated, unknown_noise
+from made_boards import CANTILEVER_LABELS, board_of, setup_of, with_noise
 from scipy import stats
 from scipy.special import ndtr
 from statistics_checks import Truth, differences, differences_from_normal
 
 from bayesplate.campaigns.evidence import bridge_sampling
-from bayesplate.cards import StatedPrior, load_prior
-from bayesplate.plate.board import Board
-from bayesplate.plate.setup import Setup
-from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.inference import PosedProblem, infer, pose
-from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
+from bayesplate.cards import load_prior
+from bayesplate.posterior.inference import pose
 
-NOISE = 0.01
-ESS = 2500.0
-"""Makes a Monte Carlo error of a mean 2 % of the standard deviation."""
-
-PRIOR_MEDIANS, PRIOR_FACTORS = np.array([25.0, 2.0, 5.0]), np.array([1.2, 1.5, 1.3])
 THINNING_LOSS = 0.9
 """Share of the effective size that thinning to half an autocorrelation time leaves."""
-
-
-@dataclass(frozen=True, eq=False)
-class PowerLaw:
-    """A model whose ln f is linear in ln D, so that normal noise and a log-normal prior give a normal posterior."""
-
-    slopes: np.ndarray
-    constant: np.ndarray
-    setup: Setup
-
-    @property
-    def every_place(self):
-        return tuple(range(len(self.constant)))
-
-    def every_log_frequency(self, values, law):
-        logs = np.log(np.stack([values[name] for name in ("D_x", "D_y", "D_s")], axis=-1))
-        return self.constant + logs @ self.slopes.T
-
-
-SLOPES = 0.5 * np.array(
-    [[0.97, 0.0, 0.03], [0.1, 0.05, 0.85], [0.9, 0.05, 0.05], [0.05, 0.8, 0.15], [0.4, 0.1, 0.5], [0.1, 0.5, 0.4]]
-)
-
-
-def rigidity_prior(medians=PRIOR_MEDIANS, factors=PRIOR_FACTORS):
-    densities = [StatedPrior(Quantity.from_median(m, f), "") for m, f in zip(medians, factors, strict=True)]
-    stated = dict(zip(("D_x", "D_y", "D_s"), densities, strict=True)) | dict.fromkeys(("E_x", "E_y", "G_xy"))
-    return load_prior("weakly-informative").model_copy(update=stated)
-
-
-def fixed_noise(value):
-    return Quantity.from_median(value, NARROW)
-
-
-def conjugate(seed):
-    """A board, its power law, and the mean and covariance of its posterior in ln D."""
-    rng = np.random.default_rng(seed)
-    prior_mean, prior_sd = np.log(PRIOR_MEDIANS), np.log(PRIOR_FACTORS)
-    truth = prior_mean + prior_sd * rng.normal(size=3)
-    constant = np.log([20.0, 40.0, 130.0, 300.0, 160.0, 330.0])
-    log_f = constant + SLOPES @ truth + NOISE * rng.normal(size=6)
-    hertz = dict(zip(CANTILEVER_LABELS, np.exp(log_f).tolist(), strict=True))
-    board = board_of(ritz.FINNISH, [setup_of(ritz.CANTILEVER, hertz, noise=fixed_noise(NOISE))])
-    mean, covariance = closed_form(log_f - constant, np.full(6, NOISE))
-    return board, PowerLaw(SLOPES, constant, board.setups[0]), log_f - constant, mean, covariance
-
-
-def closed_form(data, scales):
-    """Posterior of ln D: normal prior, normal noise, linear model; an infinite scale drops a mode."""
-    prior_precision = np.diag(np.log(PRIOR_FACTORS) ** -2.0)
-    precision = prior_precision + (SLOPES.T / scales**2) @ SLOPES
-    covariance = np.linalg.inv(precision)
-    mean = covariance @ (prior_precision @ np.log(PRIOR_MEDIANS) + (SLOPES.T / scales**2) @ data)
-    return mean, covariance
-
-
-def stated(board: Board, prior, model, mean, covariance):
-    """A problem posed by hand, started off the truth by a standard deviation; only sampling is under test here."""
-    posterior = Posterior(board, prior, (model,), "linear")
-    centre = np.r_[mean + np.sqrt(np.diagonal(covariance)), np.log(board.setups[0].noise.median)]
-    wide = np.zeros((4, 4))
-    wide[:3, :3], wide[3, 3] = covariance, board.setups[0].noise.log_sd ** 2
-    return PosedProblem(board, prior, None, None, posterior, centre, wide)
-
-
-def sampled(problem, seed):
-    inference = infer(problem, SamplerSettings(seed=seed, gate=Gate(ess_min=ESS)))
-    assert inference.convergence.passed, inference.convergence.reasons
-    return inference
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +87,41 @@ def test_control_a_posterior_without_one_mode_differs(known, mode):
     scales = np.full(6, NOISE)
     scales[mode] = np.inf
     assert found_differences(inference, *closed_form(data, scales))
+
+
+@pytest.fixture(scope="module", params=[1, 2, 3])
+def unknown(request):
+    """Draws of a problem of unknown noise, and its closed form: Student's marginals."""
+    problem, truth = unknown_noise(request.param)
+    return sampled(problem, seed=10 + request.param), truth
+
+
+def unknown_differences(inference, truth, draws=None):
+    draws = inference.chains.pooled if draws is None else draws
+    return differences(draws, inference.convergence.ess, truth)
+
+
+def test_constants_of_unknown_noise_are_student_s(unknown):
+    inference, truth = unknown
+    assert unknown_differences(inference, truth) == []
+
+    wider = truth.mean + 1.15 * (inference.chains.pooled - truth.mean)
+    assert sum("standard deviation" in one for one in unknown_differences(inference, truth, wider)) == 4
+    assert unknown_differences(inference, truth, inference.chains.pooled[:, [1, 0, 2, 3]])
+
+
+def test_control_a_normal_posterior_of_the_same_width_is_not_student_s(unknown):
+    """Five per cent of it lie where Student's has more: what forgetting that the noise is unknown would give."""
+    _, truth = unknown
+    draws = np.random.default_rng(1).normal(truth.mean, truth.sd / np.sqrt(1.2), (100_000, 4))  # 12 degrees of freedom
+    assert differences(draws, np.full(4, 1e5), truth)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_other_normal_posteriors_are_recovered(seed):
+    board, law, _, mean, covariance = conjugate(seed)
+    inference = sampled(stated(board, rigidity_prior(), law, mean, covariance), seed=seed + 1)
+    assert found_differences(inference, mean, covariance) == []
 
 
 @pytest.mark.slow

@@ -14,7 +14,8 @@ import runs
 from runs import files_in, read_json
 
 BOARD = "fiemme-spruce-clamped"
-UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings"}
+UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings",
+               "request"}  # fmt: skip
 RESULTS = {"summary.json", "posterior.nc"}
 """What a fit without a report leaves; that a report is the same too is shown where threads are counted."""
 

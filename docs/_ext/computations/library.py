@@ -86,7 +86,8 @@ CHECKS = (
         "calibration",
         "make calibration",
         "Boards are drawn from the prior, measured with noise and fitted; if the inference is right, the truth falls "
-        "everywhere in the posterior alike. Broken variants must be caught.",
+        "everywhere in the posterior alike. Draws against closed forms, ranks at the paper's boards, and the joint "
+        "distribution of constants and readings. Broken variants must be caught.",
     ),
     (
         "coverage",

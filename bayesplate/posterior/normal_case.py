@@ -1,0 +1,210 @@
+"""The linear normal case of a board: a tangent law, normal errors and a normal prior, whose posterior is known exactly.
+
+With the logarithms of the frequencies linear in the fitted columns, errors of a reading that are normal, and a prior of
+the same slope and curvature as the board's own at the same point, the columns given the noise are normal: mean and
+covariance follow from the normal equations. The noise given the columns has a density of one variable.
+
+References
+----------
+A. Gelman et al., Bayesian Data Analysis, 3rd ed., 2013, section 14.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from bayesplate.estimates.least_squares import log_measured
+from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+
+Floats = NDArray[np.float64]
+
+_STEP = 1e-4
+_PRIOR_STEP = 1e-3
+_GRID_SDS, _N_GRID = 8.0, 401
+_N_SWEEPS = 8
+_EDGE = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class NormalCase:
+    """The joint density of columns and noise of a board with a linear law, normal errors and a normal prior.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    at : (n_dim,) array
+        Where the law is the tangent and the prior is expanded; nothing of it comes from draws.
+    slopes : (n_modes, n_fitted) array
+        Derivatives of ln f by the fitted columns there.
+    misfit : (n_modes,) array
+        ln measured - ln predicted there.
+    own_variance : (n_modes,) array
+        Relative variance of a reading apart from the noise: its own, and that of its rounding.
+    setup : (n_modes,) array of int
+        Of which setup a reading is.
+    prior_slope, prior_precision : (n_fitted,) and (n_fitted, n_fitted) arrays
+        Derivatives of the log prior there, and less its second ones.
+    """
+
+    parameters: Parameters
+    at: Floats
+    slopes: Floats
+    misfit: Floats
+    own_variance: Floats
+    setup: NDArray[np.intp]
+    prior_slope: Floats
+    prior_precision: Floats
+
+    @classmethod
+    def of(cls, problem: PosedProblem) -> NormalCase:
+        """The case that touches a problem at its centre, the estimate before any sampling."""
+        posterior, parameters, at = problem.posterior, problem.parameters, problem.centre
+        columns = parameters.fitted_columns
+        steps = _STEP * np.eye(columns.size)
+
+        def moved(rows: Floats) -> Floats:
+            theta = np.tile(at, (len(rows), 1))
+            theta[:, columns] += rows
+            return theta
+
+        def predict(rows: Floats) -> Floats:
+            return np.concatenate(posterior.log_frequencies(moved(rows)), axis=1)
+
+        def log_prior(rows: Floats) -> Floats:
+            factors = posterior.log_prior_factors(moved(rows))
+            return np.asarray(factors["constants"] + factors.get("inputs", 0.0))
+
+        slope, curvature = _derivatives(log_prior, columns.size)
+        return cls(
+            parameters=parameters,
+            at=at,
+            slopes=(predict(steps) - predict(-steps)).T / (2.0 * _STEP),
+            misfit=log_measured(problem.board) - predict(np.zeros((1, columns.size)))[0],
+            own_variance=np.concatenate([errors.own_variance for errors in posterior.readings]),
+            setup=np.repeat(np.arange(parameters.n_setups), [one.frequency.size for one in posterior.readings]),
+            prior_slope=slope,
+            prior_precision=_without_negative(-curvature),
+        )
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is such a case: every derivative exists."""
+        parts = (self.slopes, self.misfit, self.prior_slope, self.prior_precision)
+        return all(bool(np.isfinite(part).all()) for part in parts)
+
+    def log_density(self, theta: Floats) -> Floats:
+        """Log density but for a constant: (n_draws,) array from (n_draws, n_dim)."""
+        away = self._away(theta)
+        variance = self._variances(self.parameters.log_noise(theta))
+        residuals = self.misfit - away @ self.slopes.T
+        readings = -0.5 * np.sum(residuals**2 / variance + np.log(variance), axis=1)
+        prior = away @ self.prior_slope - 0.5 * np.einsum("ni,ij,nj->n", away, self.prior_precision, away)
+        return np.asarray(readings + prior + self.parameters.log_prior_noise(theta))
+
+    def given_noise(self, log_noise: Floats) -> tuple[Floats, Floats]:
+        """Mean and covariance of the fitted columns given the noise, by the normal equations.
+
+        Parameters
+        ----------
+        log_noise : (n_draws, n_setups) array
+
+        Returns
+        -------
+        (n_draws, n_fitted) and (n_draws, n_fitted, n_fitted) arrays
+        """
+        weights = 1.0 / self._variances(log_noise)
+        squares = (self.slopes[:, :, None] * self.slopes[:, None, :]).reshape(len(self.misfit), -1)
+        n_fitted = self.slopes.shape[1]
+        precision = (weights @ squares).reshape(-1, n_fitted, n_fitted) + self.prior_precision
+        covariance = np.linalg.inv(precision)
+        pull = weights @ (self.slopes * self.misfit[:, None]) + self.prior_slope
+        mean = self.at[self.parameters.fitted_columns] + np.einsum("nij,nj->ni", covariance, pull)
+        return mean, np.asarray(covariance)
+
+    def column_deviates(self, theta: Floats) -> Floats:
+        """Each fitted column less its mean given the noise, over its standard deviation: (n_draws, n_fitted) array.
+
+        Standard normal, each of them, if the draws are of this case.
+        """
+        mean, covariance = self.given_noise(self.parameters.log_noise(theta))
+        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        return np.asarray((theta[:, self.parameters.fitted_columns] - mean) / sd)
+
+    def noise_deviates(self, theta: Floats) -> Floats:
+        """The normal deviates of each noise given the columns: (n_draws, n_setups) array, standard normal likewise."""
+        found = np.empty((len(theta), self.parameters.n_setups))
+        log_noise = self.parameters.log_noise(theta)
+        for i in range(self.parameters.n_setups):
+            grid, below = self._noise_given_columns(theta, i)
+            place = np.clip((log_noise[:, i] - grid[0]) / (grid[1] - grid[0]), 0.0, len(grid) - 1.0)
+            left = np.minimum(place.astype(np.intp), len(grid) - 2)
+            rows, share = np.arange(len(theta)), place - left
+            probability = (1.0 - share) * below[rows, left] + share * below[rows, left + 1]
+            found[:, i] = ndtri(np.clip(probability, _EDGE, 1.0 - _EDGE))
+        return found
+
+    def draws(self, n_draws: int, rng: np.random.Generator) -> Floats:
+        """Independent draws, each the end of a chain that takes columns and noise in turn: (n_draws, n_dim) array."""
+        theta = np.tile(self.at, (n_draws, 1))
+        columns = self.parameters.fitted_columns
+        rows = np.arange(n_draws)
+        for _ in range(_N_SWEEPS):
+            for i in range(self.parameters.n_setups):
+                grid, below = self._noise_given_columns(theta, i)
+                u = rng.random(n_draws)
+                right = np.clip(np.sum(below < u[:, None], axis=1), 1, len(grid) - 1)
+                low, high = below[rows, right - 1], below[rows, right]
+                share = np.divide(u - low, high - low, out=np.full(n_draws, 0.5), where=high > low)
+                theta[:, N_RIGIDITIES + i] = grid[right - 1] + share * (grid[1] - grid[0])
+            mean, covariance = self.given_noise(self.parameters.log_noise(theta))
+            normal = rng.standard_normal(mean.shape)
+            theta[:, columns] = mean + np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), normal)
+        return theta
+
+    def _away(self, theta: Floats) -> Floats:
+        columns = self.parameters.fitted_columns
+        return np.asarray(theta[:, columns] - self.at[columns])
+
+    def _variances(self, log_noise: Floats) -> Floats:
+        return np.asarray(np.exp(2.0 * log_noise)[:, self.setup] + self.own_variance)
+
+    def _noise_given_columns(self, theta: Floats, setup: int) -> tuple[Floats, Floats]:
+        """A grid of the log noise of a setup, and the probability below each point given the columns."""
+        noise = self.parameters.noises[setup].prior
+        reach = _GRID_SDS * noise.log_sd
+        grid = np.log(noise.median) + np.linspace(-reach, reach, _N_GRID)
+        own = self.setup == setup
+        squares = (self.misfit[own] - self._away(theta) @ self.slopes[own].T) ** 2
+        variance = np.exp(2.0 * grid)[:, None] + self.own_variance[own]
+        log_density = -0.5 * (squares @ (1.0 / variance).T + np.log(variance).sum(axis=1))
+        log_density += noise.log_density_of_log(grid)
+        density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+        below = np.zeros_like(density)
+        np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]), axis=1, out=below[:, 1:])
+        return grid, below / below[:, -1:]
+
+
+def _derivatives(function: Callable[[Floats], Floats], n: int) -> tuple[Floats, Floats]:
+    """First and second derivatives at zero of a function of rows, by differences: (n,) and (n, n) arrays."""
+    steps = _PRIOR_STEP * np.eye(n)
+    with np.errstate(invalid="ignore"):
+        slope = (function(steps) - function(-steps)) / (2.0 * _PRIOR_STEP)
+        pairs = np.array([steps[i] + steps[j] for i, j in product(range(n), repeat=2)])
+        other = np.array([steps[i] - steps[j] for i, j in product(range(n), repeat=2)])
+        second = function(pairs) - function(other) - function(-other) + function(-pairs)
+    return np.asarray(slope), np.asarray(second.reshape(n, n) / (4.0 * _PRIOR_STEP**2))
+
+
+def _without_negative(precision: Floats) -> Floats:
+    """A symmetric matrix without its negative eigenvalues, which no normal density has."""
+    if not np.isfinite(precision).all():
+        return precision
+    values, vectors = np.linalg.eigh(precision)
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
