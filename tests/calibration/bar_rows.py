@@ -16,66 +16,241 @@ class Row:
     words : str
         What is compared with what.
     bar : str
+    tests : tuple of str
+        Tests that hold or do not, by file and the beginning of the name; others note what they measure (`bars.meets`).
+    page : str
+        Page of long runs on which its figures are.
     """
 
     check: str
     words: str
     bar: str
+    tests: tuple[str, ...] = ()
+    page: str = ""
 
 
 COMPUTATION = (
-    Row("V1", "Posteriors known in closed form, noise known (normal) and unknown (Student's t)",
-        "mean, standard deviation and 5, 50, 95 % quantiles within 4 Monte Carlo errors"),
-    Row("V2", "The likelihood as it is used, rounding included, against quadrature",
-        "as above; ln evidence within 0.02"),
-    Row("V3", "Wrong posteriors: standard deviation 1.15 times too large, a mode dropped, constants exchanged",
-        "each found out"),
-    Row("V4", "Without readings the sampler returns the prior",
-        "Kolmogorov and Smirnov's p, all parameters: above 0.01"),
-    Row("V5", "Simulation-based calibration from the prior, 1000 simulations",
-        "ranks inside the 95 % simultaneous band"),
-    Row("V6", "Mutants of it: no likelihood, noise halved, Poisson's ratio negated, a mode counted twice",
-        "each rejected at p < 0.001"),
-    Row("V7", "Simulation-based calibration at the posteriors of the paper's two boards, 500 simulations each",
-        "ranks inside the 95 % simultaneous band"),
-    Row("V8", "Coverage of intervals", "binomial 99 % of 50 and 90 %"),
-    Row("V9", "Geweke's joint test, 20 repeats of 2000 draws, 12 moments", "every z within 4, at most one beyond 3"),
-    Row("V10", "Finite elements against closed forms and an independent Ritz solver",
-        "0.5 cents; order of convergence"),
+    Row(
+        "V1",
+        "Posteriors known in closed form, noise known (normal) and unknown (Student's t)",
+        "mean, standard deviation and 5, 50, 95 % quantiles within 4 Monte Carlo errors",
+        tests=(
+            "posterior/test_oracle.py::test_a_normal_posterior_is_recovered",
+            "posterior/test_oracle.py::test_constants_of_unknown_noise",
+            "posterior/test_oracle.py::test_other_normal",
+            "posterior/test_oracle.py::test_fifty",
+        ),
+    ),
+    Row(
+        "V2",
+        "The likelihood as it is used, rounding included, against quadrature",
+        "as above; ln evidence within 0.02",
+        tests=(
+            "posterior/test_oracle.py::test_the_linear_law_with_rounded_readings",
+            "posterior/test_oracle.py::test_the_evidence_from_draws",
+        ),
+    ),
+    Row(
+        "V3",
+        "Wrong posteriors: standard deviation 1.15 times too large, a mode dropped, constants exchanged",
+        "each found out",
+        tests=("posterior/test_oracle.py::test_control",),
+    ),
+    Row(
+        "V4",
+        "Without readings the sampler returns the prior",
+        "p of Kolmogorov and Smirnov above 0.01 for all parameters",
+        tests=("posterior/test_prior_recovery.py::test_the_sampler_returns_the_prior",),
+    ),
+    Row(
+        "V5",
+        "Simulation-based calibration from the prior, 1000 simulations",
+        "ranks inside the 95 % simultaneous band",
+        page="calibration",
+    ),
+    Row(
+        "V6",
+        "Mutants of it: no likelihood, noise halved, Poisson's ratio negated, a mode counted twice",
+        "each rejected at p < 0.001",
+        page="calibration",
+    ),
+    Row(
+        "V7",
+        "Simulation-based calibration at the posteriors of the paper's two boards, 500 simulations each",
+        "ranks inside the 95 % simultaneous band",
+        page="calibration",
+    ),
+    Row("V8", "Coverage of intervals", "binomial 99 % of 50 and 90 %", page="calibration"),
+    Row(
+        "V9",
+        "Geweke's joint test, 20 repeats of 2000 draws, 12 moments",
+        "every z within 4, at most one beyond 3",
+        page="calibration",
+    ),
+    Row(
+        "V10", "Finite elements against closed forms and an independent Ritz solver", "0.5 cents; order of convergence"
+    ),
     Row("V11", "The reduced law against full solves that it has not seen", "0.5 cents, and the error it states itself"),
     Row("V12", "Errors of modes left out by refitting against r / (1 - h)", "1e-9 where the law is linear"),
     Row("V13", "What must not change: exchanged axes, scaled stiffness and mass, order of readings", "1e-10"),
-    Row("V14", "The same seed gives the same bytes, whatever the number of threads or workers", "no file differs"),
-)  # fmt: skip
+    Row(
+        "V14",
+        "The same seed gives the same bytes, whatever the number of threads or workers",
+        "no file differs",
+        tests=(
+            "posterior/test_sampling.py::test_the_same_seed",
+            "workflow/test_resume.py::test_the_same_seed",
+            "workflow/test_batch.py::test_the_same_bytes",
+            "workflow/test_diagnose.py::test_the_same_seed",
+        ),
+    ),
+)
 
 CONVERGENCE = (
-    Row("ensembles", "Independent ensembles", "4, each from its own seed"),
-    Row("length", "Draws over autocorrelation time, every ensemble and parameter", "50 or more"),
-    Row("r_hat", "Split R-hat over the ensembles", "1.01 or less"),
-    Row("refusal", "A run that has not converged", "no posterior, exit code 5"),
-    Row("certificate", "Draws against the closed form on the user's own data, where there is one",
-        "within 4 Monte Carlo errors"),
-)  # fmt: skip
+    Row(
+        "ensembles",
+        "Independent ensembles",
+        "4, each from its own seed",
+        tests=("posterior/test_sampling.py::test_two_ensembles_differ",),
+    ),
+    Row(
+        "length",
+        "Draws over autocorrelation time, every ensemble and parameter",
+        "50 or more",
+        tests=(
+            "posterior/test_convergence.py::test_a_short_run",
+            "posterior/test_convergence.py::test_the_burn_in_leaves",
+            "posterior/test_convergence.py::test_each_limit_of_the_default_gate",
+        ),
+    ),
+    Row(
+        "r_hat",
+        "Split R-hat over the ensembles",
+        "1.01 or less",
+        tests=(
+            "posterior/test_convergence.py::test_a_stuck_ensemble",
+            "posterior/test_convergence.py::test_ensembles_of_unlike_width",
+            "posterior/test_convergence.py::test_a_drift",
+            "posterior/test_convergence.py::test_rhat_is_not_taken",
+        ),
+    ),
+    Row(
+        "refusal",
+        "A run that has not converged",
+        "no posterior, exit code 5",
+        tests=(
+            "workflow/test_resume.py::test_a_run_that_does_not_converge",
+            "posterior/test_sampling.py::test_separate_peaks",
+            "posterior/test_sampling.py::test_too_few_steps",
+        ),
+    ),
+    Row(
+        "certificate",
+        "Draws against the closed form on the user's own data, where there is one",
+        "within 4 Monte Carlo errors",
+        tests=("posterior/test_certificate.py::test_right_draws", "posterior/test_certificate.py::test_control"),
+    ),
+)
 
 LONG_RUNS = (
-    Row("kill", "Runs killed at random moments and resumed", "final files identical to the byte"),
-    Row("interrupt", "Interrupted runs resumed", "exit code 130, then identical to the byte"),
     Row(
-        "damage", "Checkpoints cut off, altered, foreign or newer", "refused with the reason, or the one before is used"
+        "kill",
+        "Runs killed at random moments and resumed",
+        "final files identical to the byte",
+        tests=(
+            "workflow/test_killed.py::test_killed_at_any_moment",
+            "workflow/test_resume.py::test_a_killed_fit",
+            "posterior/test_checkpoint.py::test_kill_and_resume",
+        ),
     ),
-    Row("disk", "Full disks and folders that cannot be written", "what was there before stays"),
-    Row("two_runs", "Two runs into one folder", "the second is refused and touches nothing"),
+    Row(
+        "interrupt",
+        "Interrupted runs resumed",
+        "exit code 130, then identical to the byte",
+        tests=(
+            "workflow/test_resume.py::test_an_interrupted_fit",
+            "workflow/test_diagnose.py::test_an_interrupted_diagnosis",
+            "campaigns/test_fit.py::test_an_interrupted_campaign",
+        ),
+    ),
+    Row(
+        "damage",
+        "Checkpoints cut off, altered, foreign or newer",
+        "refused with the reason, or the one before is used",
+        tests=(
+            "posterior/test_checkpoint.py::test_a_chunk_cut",
+            "posterior/test_checkpoint.py::test_a_flipped_bit",
+            "posterior/test_checkpoint.py::test_a_manifest",
+            "posterior/test_checkpoint.py::test_another_run",
+            "posterior/test_checkpoint.py::test_a_newer_format",
+        ),
+    ),
+    Row(
+        "disk",
+        "Full disks and folders that cannot be written",
+        "what was there before stays",
+        tests=("workflow/test_full_disk.py::", "posterior/test_checkpoint.py::test_a_full_disk"),
+    ),
+    Row(
+        "two_runs",
+        "Two runs into one folder",
+        "the second is refused and touches nothing",
+        tests=(
+            "workflow/test_killed.py::test_a_folder_that_another_run_holds",
+            "posterior/test_checkpoint.py::test_two_writers",
+        ),
+    ),
 )
 
 SECURITY = (
-    Row("pickle", "Pickled objects in the package or the wheel", "none"),
-    Row("html", "Markup in names, labels and notes", "none reaches a page unescaped"),
-    Row("csv", "Spreadsheet formulas in tables", "none"),
-    Row("terminal", "Control characters in messages", "none"),
-    Row("paths", "Names that lead out of the output folder", "refused"),
-    Row("network", "Connections while any command runs", "none"),
-    Row("fuzz", "Cards, fragments and recordings, mutated", "accepted, or refused with a message"),
-    Row("lock", "Dependencies without a locked version", "none"),
+    Row(
+        "pickle",
+        "Pickled objects in the package or the wheel",
+        "none",
+        tests=(
+            "workflow/test_wheel.py::test_the_wheel_holds_nothing_else",
+            "posterior/test_checkpoint.py::test_a_pickled_payload",
+        ),
+    ),
+    Row(
+        "html",
+        "Markup in names, labels and notes",
+        "none reaches a page unescaped",
+        tests=(
+            "report/test_texts_stay_texts.py::",
+            "report/test_page.py::",
+            "report/test_grading_page.py::",
+            "campaigns/test_page.py::",
+        ),
+    ),
+    Row(
+        "csv", "Spreadsheet formulas in tables", "none", tests=("results/test_exports.py::", "workflow/test_batch.py::")
+    ),
+    Row(
+        "terminal",
+        "Control characters in messages",
+        "none",
+        tests=("report/test_texts_stay_texts.py::", "test_cli.py::"),
+    ),
+    Row(
+        "paths",
+        "Names that lead out of the output folder",
+        "refused",
+        tests=("cards/test_files.py::", "workflow/test_repeat.py::test_a_summary_cannot_name"),
+    ),
+    Row(
+        "network",
+        "Connections while any command runs",
+        "none",
+        tests=("workflow/test_no_network.py::test_a_command_runs",),
+    ),
+    Row(
+        "fuzz",
+        "Cards, fragments and recordings, mutated",
+        "accepted, or refused with a message",
+        tests=("cards/test_fuzz_files.py::", "cards/test_fuzz.py::", "recordings/test_fuzz.py::"),
+    ),
+    Row("lock", "Dependencies without a locked version", "none", tests=("structure/test_security.py::test_the_lock",)),
 )
 
 ROWS = {
