@@ -25,6 +25,6 @@ def contradiction(certificate: Certificate) -> tuple[str, ...]:
     if not certificate.applies or certificate.passed:
         return ()
     return (
-        f"{certificate_sentence(certificate)}. The sampler did not return the posterior that it was asked for: do not "
-        "use these constants, fit again with another --seed, and report it if it stays",
+        f"{certificate_sentence(certificate)}. The draws do not seem to be of the posterior that was asked for: do not "
+        "use these constants before a fit with another --seed agrees, and report it if none does",
     )
