@@ -1,8 +1,8 @@
 """Runs of the command line that are killed just before the n-th thing that they do to their folder.
 
 Between two such things nothing on the disk changes: whoever kills a run at each of them has seen every state in which a
-power cut can leave the folder, but for half of a file that is being written, which lies under another name until it is
-whole. The journal of a batch is written in place: there the kill comes in the middle of a line.
+kill can leave the folder, but for how much of a file is written: one that is opened anew is left empty, and the line of
+the journal of a batch, which is written in place, is left half.
 
     python tests/killed_runs.py FOLDER MOMENT COMMAND ARGUMENTS   MOMENT 0: nothing is killed, the number is printed
 """
@@ -51,7 +51,10 @@ class Moments:
     def heard(self, event: str, arguments: tuple[Any, ...]) -> None:
         """What the interpreter tells of each call to the system."""
         is_change = event in CHANGES or (event == "open" and isinstance(arguments[2], int) and arguments[2] & WRITES)
-        if is_change and self.is_inside(str(arguments[0])) and self.reached():
+        is_nothing = event == "os.remove" and os.path.isabs(arguments[0]) and not os.path.lexists(arguments[0])
+        if is_change and not is_nothing and self.is_inside(str(arguments[0])) and self.reached():
+            if event == "open" and arguments[2] & os.O_TRUNC:
+                os.close(os.open(arguments[0], arguments[2]))  # the file is there, and nothing in it yet
             end()
 
     def is_inside(self, path: str) -> bool:

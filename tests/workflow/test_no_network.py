@@ -1,4 +1,4 @@
-"""Every command runs where there is no network."""
+"""Every command runs where there is no network, and writes into its output folder alone."""
 
 from __future__ import annotations
 
@@ -39,13 +39,12 @@ main(sys.argv[1:])
 """
 
 
-def without_network(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a program in a Python that has no network."""
+def without_network(program: str, *arguments: str, desk: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a program in a Python that has no network, from a folder."""
     paths = (str(TESTS / "no_network"), str(TESTS), str(TESTS.parent))
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
-    return subprocess.run(
-        [sys.executable, "-c", program, *arguments], env=environment, capture_output=True, text=True, check=False
-    )
+    run = [sys.executable, "-c", program, *arguments]
+    return subprocess.run(run, env=environment, cwd=desk, capture_output=True, text=True, check=False)
 
 
 def test_every_command_is_tried():
@@ -54,7 +53,7 @@ def test_every_command_is_tried():
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_runs_without_a_network(command, tmp_path):
-    """With all that it writes: pages, figures, tables."""
+    """With all that it writes, pages, figures, tables; and nothing of it lies anywhere but in the output folder."""
     force, heard = hits(np.random.default_rng(2), [0.05], (0.02, 0.02))
     places = {
         "OUT": str(tmp_path / "out"),
@@ -64,10 +63,16 @@ def test_a_command_runs_without_a_network(command, tmp_path):
     }
     given = [places.get(word, word.replace("OUT/", f"{tmp_path}/")) for word in COMMANDS[command]]
 
-    done = without_network(PROGRAM, command, *given, "--debug")
+    (tmp_path / "desk").mkdir()
+    before = {path for path in tmp_path.rglob("*") if "out" not in path.relative_to(tmp_path).parts}
+
+    done = without_network(PROGRAM, command, *given, "--debug", desk=tmp_path / "desk")
 
     assert done.returncode == 0, done.stderr
     assert "network" not in done.stderr
+    written = set(tmp_path.rglob("*")) - before
+    outside = {path.relative_to(tmp_path).as_posix() for path in written if not path.is_relative_to(tmp_path / "out")}
+    assert outside == ({"my-board.toml"} if command == "new" else set())
 
 
 ASKING = {
