@@ -38,6 +38,12 @@ CHECKS = (
         "What sampling and whole commands cost beside emcee as it comes, measured in one run, each with its limit.",
     ),
     (
+        "peers",
+        "make peers",
+        "The six frequencies of a board by other samplers, each in an environment of its own: cold time to 4000 "
+        "effective draws, effective draws per second, and how far each is from quadrature.",
+    ),
+    (
         "closing-the-loop",
         "python examples/closing_the_loop.py --out docs/validation",
         "Shipped boards through `diagnose`: the verdict, whether an improvement is claimed, errors in cents before and "

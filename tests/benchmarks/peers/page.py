@@ -16,7 +16,7 @@ HEAD = """# Beside other samplers
 Written by `make peers`; do not edit. One posterior, that of `{board}` under the linear law: four parameters, six
 frequencies read to 1 Hz, each the probability of the interval that was rounded to it. Every sampler is given the same
 file of coefficients, priors and readings, and the estimate to start from, which the package has to find first. Each
-has an environment and a process of its own, on one thread, all in one session.
+has an environment and a process of its own, on one thread.
 
 - Cold time: a whole process, from its start to its exit, with draws in a file, that ends with at least
   {goal:,} effective draws of the parameter that has fewest. The length of the run is told to every peer; it was found
@@ -82,9 +82,9 @@ def ahead(results: Sequence[Result], peers: Sequence[Peer], base: Result) -> lis
     found = [result for result in results if not result.missing and result.name not in limits]
     colder = [result.name for result in found if result.cold_time < base.cold_time]
     lines = [f"Ahead of the package from a cold process: {_joined(colder)}."]
-    for what, kept in (("that compiles nothing", False), ("that is compiled, once it is", True)):
+    for what, kept in (("that compile nothing", False), ("that are compiled, once they are", True)):
         faster = [r.name for r in found if (r.name in compiled) is kept and r.rate > base.rate]
-        lines.append(f"Ahead of it in effective draws per second, of those {what}: {_joined(faster)}.")
+        lines.append(f"Ahead of it in effective draws per second, of the peers {what}: {_joined(faster)}.")
     return lines
 
 

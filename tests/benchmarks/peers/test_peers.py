@@ -134,8 +134,8 @@ def test_the_page_says_who_is_ahead_and_whose_posterior_is_another():
     text = written(every_result(with_blackjax=quick, with_smcpy=off))
 
     assert f"Ahead of the package from a cold process: {smcpy.name}." in text
-    assert f"that is compiled, once it is: {nuts.name}." in text
-    assert "that compiles nothing: none." in text
+    assert f"that are compiled, once they are: {nuts.name}." in text
+    assert "that compile nothing: none." in text
     assert (
         f"- {smcpy.name}: a mean differs by 0.01 posterior standard deviations, a standard deviation by 25 %." in text
     )
