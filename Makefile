@@ -9,7 +9,8 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings sand measured bars coverage trial benchmarks
+.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings sand measured bars coverage trial \
+	benchmarks peers
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -65,6 +66,9 @@ coverage: $(VENV)/tested-with
 
 benchmarks: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/run.py --publish docs/validation --repeats 3
+
+peers: $(VENV)/installed
+	$(BIN)/python tests/benchmarks/peers/run.py --publish docs/validation --environments build/peers
 
 # The stamps: an environment is made again when pyproject.toml changes. pip knows dependency groups from 25.1 on.
 $(VENV)/installed: pyproject.toml
