@@ -28,6 +28,8 @@ FIGURES = "figures"
 CONSTANTS = ("constants.csv", "constants.tex")
 BEFORE_AFTER = ("before-after.csv", "before-after.tex")
 KNOWN_EFFECTS = ("known-effects.csv", "known-effects.tex")
+EARLIER = "earlier"
+"""Subfolder of the checkpoint with the results that a run replaces, until it is done."""
 BATCH = ("batch.json", "boards.jsonl", "boards.csv", "boards.parquet", "grading.csv", "grading.html")
 RESULTS = (SUMMARY, ARCHIVE, DIAGNOSIS, PAGE, *CONSTANTS, *BEFORE_AFTER, *KNOWN_EFFECTS, *BATCH)
 """What a run leaves besides its figures, and the next one in the same folder replaces."""
@@ -53,6 +55,11 @@ class OutputFolder:
     def checkpoint(self) -> Path:
         """Folder of the unfinished run's chunks."""
         return self.path / CHECKPOINT
+
+    @property
+    def earlier(self) -> Path:
+        """Where the results of an earlier run lie until those of this one are whole."""
+        return self.checkpoint / EARLIER
 
     def require_usable(self, *, force: bool, resume: bool) -> None:
         """Check, before any work and without writing, that the run may use this folder.
@@ -84,9 +91,10 @@ class OutputFolder:
             )
 
     def open(self, *, resume: bool) -> None:
-        """Make the folder and take it; unless resuming, remove the results and the checkpoint of an earlier run.
+        """Make the folder and take it; unless resuming, remove the checkpoint of an earlier run.
 
-        A run that is resumed may yet turn out to be another one: what it left stays until there is something better.
+        The results of an earlier run are laid aside until this one is done (`earlier`). A run that is resumed may yet
+        turn out to be another one: what it left stays until there is something better.
 
         Raises
         ------
@@ -101,20 +109,37 @@ class OutputFolder:
             held.append(self)
         try:
             if not resume:
-                for path in self._earlier_results():
-                    path.unlink(missing_ok=True)
+                self._lay_aside()
                 before = self.path / BEFORE
                 if before.is_dir() and not any(before.iterdir()):
                     before.rmdir()
                 for path in self.checkpoint.iterdir():
-                    if path.is_dir():
+                    if path.is_dir() and path != self.earlier:
                         shutil.rmtree(path)
         except OSError as error:
             fault = Fault(f"--out {self.path}", "a folder that can be written", error.strerror or str(error))
             raise InputError(fault) from error
 
-    def _earlier_results(self) -> list[Path]:
-        """Results and figures of an earlier run, not what else somebody keeps in the folder."""
+    def _lay_aside(self) -> None:
+        """Move the results of an earlier run away; what a run left that has some there already was never whole."""
+        for path in self._results():
+            kept = self.earlier / path.relative_to(self.path)
+            if kept.exists():
+                path.unlink(missing_ok=True)
+            elif path.exists():
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                path.rename(kept)
+
+    def _put_back(self) -> None:
+        """Move them back from where a run left nothing in their place."""
+        if any(path.exists() for path in self._results()):
+            return
+        for kept in [path for path in self.earlier.rglob("*") if path.is_file()]:
+            kept.rename(self.path / kept.relative_to(self.earlier))
+        shutil.rmtree(self.earlier)
+
+    def _results(self) -> list[Path]:
+        """Where results and figures of a run are, not what else somebody keeps in the folder."""
         figures = self.path / FIGURES
         drawn = [path for path in figures.iterdir() if path.suffix in (".png", ".svg")] if figures.is_dir() else []
         before = (self.path / BEFORE / name for name in (SUMMARY, ARCHIVE))
@@ -129,10 +154,11 @@ class OutputFolder:
         return any(self.checkpoint.rglob("chunk-*.npz*"))
 
     def close(self) -> None:
-        """Remove the checkpoint of a run that is done; chunks found damaged stay for whoever wants to look.
+        """Remove the checkpoint of a run that is done, and what it replaces; chunks found damaged stay to be looked at.
 
         Chunks first, the last of them before the first: a run that is killed at it can be resumed.
         """
+        shutil.rmtree(self.earlier, ignore_errors=True)
         for manifest in sorted(self.checkpoint.rglob("manifest.json"), reverse=True):
             Checkpoint(manifest.parent, "").discard()
         if not any(self.checkpoint.rglob("*.damaged")):
@@ -141,6 +167,9 @@ class OutputFolder:
     def release(self) -> None:
         """Let others use the folder, and leave none behind that holds nothing."""
         if not self.has_checkpoint:
+            with suppress(OSError):
+                self._put_back()
+        if not self.has_checkpoint and not self.earlier.exists():
             shutil.rmtree(self.checkpoint, ignore_errors=True)
             with suppress(OSError):  # not empty
                 self.path.rmdir()
@@ -170,14 +199,22 @@ def run_of_its_own() -> Iterator[None]:
         if any(folder.has_checkpoint for folder in held):
             raise RunInterrupted("interrupted; --resume continues from the last checkpoint") from None
         raise
+    except CheckpointError as error:
+        raise CheckpointError(f"{error}{_where_the_earlier_are(held)}") from error
     except UnwritableError as error:
         if any(folder.has_checkpoint for folder in held):
-            raise CheckpointError(f"{error}\nwhat was sampled is saved: make room, and --resume continues") from error
+            saved = "what was sampled is saved: make room, and --resume continues"
+            raise CheckpointError(f"{error}\n{saved}{_where_the_earlier_are(held)}") from error
         raise
     finally:
         _HELD.reset(token)
         for folder in held:
             folder.release()
+
+
+def _where_the_earlier_are(held: list[OutputFolder]) -> str:
+    """A line for each folder whose earlier results lie aside."""
+    return "".join(f"\nwhat was there before is in {folder.earlier}" for folder in held if folder.earlier.is_dir())
 
 
 def _is_of_a_run(name: str) -> bool:

@@ -39,10 +39,17 @@ def full_at(monkeypatch):
 
 @pytest.mark.parametrize("name", ["chunk-0001.npz", "posterior.nc", "summary.json", "report.html", "sampler.png"])
 @pytest.mark.usefixtures("quickly")
-def test_a_fit_keeps_what_it_sampled(name, full_at, tmp_path):
+def test_a_fit_keeps_what_it_sampled_and_what_it_was_to_replace(name, full_at, tmp_path):
     full_at(name)
-    run = runs.fit(tmp_path / "out", BOARD)
+    (tmp_path / "out" / "figures").mkdir(parents=True)
+    for earlier in ("summary.json", "constants.csv", "figures/modes.png"):
+        (tmp_path / "out" / earlier).write_bytes(b"earlier")
+    run = runs.fit(tmp_path / "out", BOARD, "--force")
     left = run.files
+
+    for earlier in ("summary.json", "constants.csv", "figures/modes.png"):
+        assert left.pop(f"checkpoint/earlier/{earlier}") == b"earlier"
+    assert f"what was there before is in {tmp_path / 'out' / 'checkpoint' / 'earlier'}" in run.stderr.replace("\n", "")
 
     assert run.exit_code == 6
     assert REASON in run.stderr
@@ -106,7 +113,7 @@ def places(tmp_path_factory) -> dict[str, str]:
     ],
 )
 def test_the_file_is_named_and_what_stood_in_its_place_stays(command, place, name, places, full_at, tmp_path):
-    """But for what a batch makes anew from its beginning: there the earlier results are gone before it fits a board."""
+    """But for what a batch makes anew from its beginning: there the earlier results are laid aside."""
     out = tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
     (out / name).write_bytes(b"earlier")
@@ -119,8 +126,7 @@ def test_the_file_is_named_and_what_stood_in_its_place_stays(command, place, nam
     assert [path for path in left if path.endswith(".partial")] == []
     if name == "boards.jsonl":
         assert left[name].count(b"\n") == 2  # what --resume goes on from
-    else:
-        assert left.get(name) == (None if command == "batch" else b"earlier")
+    assert left[f"checkpoint/earlier/{name}" if command == "batch" else name] == b"earlier"
 
 
 READ_ONLY = "Read-only file system"

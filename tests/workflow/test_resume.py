@@ -202,6 +202,24 @@ def test_force_replaces_the_results_and_the_checkpoint_and_nothing_else(stopped,
     assert run.files["posterior.nc"] != b"old"
 
 
+@pytest.mark.usefixtures("quickly")
+def test_force_that_is_interrupted_before_sampling_leaves_the_old_results(tmp_path, monkeypatch):
+    """They were laid aside, and come back."""
+    (tmp_path / "figures").mkdir()
+    for name in ("summary.json", "posterior.nc", "figures/modes.png"):
+        (tmp_path / name).write_bytes(b"old")
+    before = files_in(tmp_path)
+
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bayesplate.workflow.fitting.infer", interrupted)
+    run = runs.fit(tmp_path, BOARD, "--force")
+
+    assert run.exit_code == 130
+    assert files_in(tmp_path) == before
+
+
 def test_force_of_a_refused_card_keeps_the_old_results(quick_fit, own_card):
     before = quick_fit(str(own_card), "--quiet").files
     own_card.write_text(own_card.read_text(encoding="utf-8").replace("= 600", "= -600"), encoding="utf-8")
