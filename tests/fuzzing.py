@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 
 from bayesplate.errors import Fault, InputError
 
-LONGER = 40
+LONGER = 20
 """Times as many examples in the long one."""
 HANGS, WAITS = 30.0, 20.0
 """s of processor time for one example, and times as long by the clock: far above what any takes on a busy machine."""
