@@ -135,7 +135,9 @@ class OutputFolder:
         if any(path.exists() for path in self._results()):
             return
         for kept in [path for path in self.earlier.rglob("*") if path.is_file()]:
-            kept.rename(self.path / kept.relative_to(self.earlier))
+            place = self.path / kept.relative_to(self.earlier)
+            place.parent.mkdir(exist_ok=True)
+            kept.rename(place)
         shutil.rmtree(self.earlier)
 
     def _results(self) -> list[Path]:

@@ -182,15 +182,24 @@ def test_a_folder_with_results_needs_force_and_force_leaves_no_stale_before(tmp_
     assert not (folder / "before").exists()
 
 
-def test_what_somebody_else_keeps_in_before_stays(tmp_path):
-    before = tmp_path / "before"
-    before.mkdir()
-    for name in (*FIT, "notes.txt"):
-        (before / name).write_bytes(b"mine")
+@pytest.mark.parametrize("has_notes", [True, False])
+def test_what_somebody_else_keeps_in_before_stays(tmp_path, has_notes):
+    """The fit of an earlier diagnosis goes when the new one is whole, and comes back where it leaves nothing."""
+    (tmp_path / "before").mkdir()
+    for name in (*FIT, *(["notes.txt"] if has_notes else [])):
+        (tmp_path / "before" / name).write_bytes(b"mine")
+    before = files_in(tmp_path)
     folder = OutputFolder(tmp_path)
     folder.open(resume=False)
+    assert not any((tmp_path / "before" / name).exists() for name in FIT)
     folder.release()
-    assert files_in(tmp_path) == {"before/notes.txt": b"mine"}
+    assert files_in(tmp_path) == before
+
+    folder.open(resume=False)
+    (tmp_path / "summary.json").write_bytes(b"new")
+    folder.close()
+    folder.release()
+    assert files_in(tmp_path) == {"summary.json": b"new"} | ({"before/notes.txt": b"mine"} if has_notes else {})
 
 
 @pytest.mark.parametrize(
