@@ -26,7 +26,8 @@ from bayesplate.cards.setup import (
     SetupSection,
 )
 from bayesplate.cards.shelf import card_names, find
-from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES, plain
+from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
+from bayesplate.errors import plain
 
 __all__ = [
     "DEFAULT_POISSON",

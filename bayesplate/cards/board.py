@@ -27,8 +27,8 @@ from bayesplate.cards.values import (
     read_text,
     read_words,
 )
-from bayesplate.cards.words import EFFECT_NAMES, plain, quoted, shown
-from bayesplate.errors import Fault
+from bayesplate.cards.words import EFFECT_NAMES, quoted, shown
+from bayesplate.errors import Fault, plain
 from bayesplate.quantities import Quantity
 
 DEFAULT_PRIOR = "weakly-informative"

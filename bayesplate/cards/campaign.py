@@ -25,8 +25,8 @@ from bayesplate.cards.values import (
     read_reference,
     read_text,
 )
-from bayesplate.cards.words import EFFECT_NAMES, plain, quoted
-from bayesplate.errors import Fault
+from bayesplate.cards.words import EFFECT_NAMES, quoted
+from bayesplate.errors import Fault, plain
 
 FEWEST_BOARDS, MOST_BOARDS = 2, 200
 MOST_SHARED = 10

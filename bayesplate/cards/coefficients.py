@@ -27,7 +27,8 @@ from bayesplate.cards.values import (
     read_text,
 )
 from bayesplate.cards.values import read_table as read_entries
-from bayesplate.cards.words import plain, shown
+from bayesplate.cards.words import shown
+from bayesplate.errors import plain
 from bayesplate.labels import Label
 
 Coefficients = tuple[float, float, float]

@@ -9,9 +9,9 @@ from typing import Any
 
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.setup import DEFAULT_SETUP_NAME, SetupSection
-from bayesplate.cards.words import did_you_mean, plain, quoted, shown
+from bayesplate.cards.words import did_you_mean, quoted, shown
 from bayesplate.cards.writing import table_text
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, plain
 
 _READINGS = ("frequencies_hz", "signs", "label_confidence", "unlabelled_hz", "peaks")
 """What was measured together: a fragment that has any of them replaces all that the card says of them."""

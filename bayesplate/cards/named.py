@@ -11,8 +11,8 @@ from typing import TypeVar
 from bayesplate.cards.board import BoardCard
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.prior import PriorCard, load_prior
-from bayesplate.cards.words import plain, setup_places
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import setup_places
+from bayesplate.errors import Fault, InputError, plain
 
 Card = TypeVar("Card", PriorCard, CoefficientCard)
 

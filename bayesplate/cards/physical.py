@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from bayesplate.cards.board import BoardCard
 from bayesplate.cards.setup import SetupSection
-from bayesplate.cards.words import plain, setup_places
-from bayesplate.errors import Fault
+from bayesplate.cards.words import setup_places
+from bayesplate.errors import Fault, plain
 from bayesplate.labels import Label
 from bayesplate.quantities import Quantity
 

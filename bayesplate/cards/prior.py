@@ -17,8 +17,8 @@ from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.schema import Section, validated
 from bayesplate.cards.shelf import find
 from bayesplate.cards.values import Choice, Complaint, Number, Refusal, read_format, read_name, read_text
-from bayesplate.cards.words import plain, shown
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import shown
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.quantities import Quantity
 
 ELASTIC = ("E_x", "E_y", "G_xy")

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from bayesplate.cards.syntax import syntax_remedy
-from bayesplate.cards.words import plain, quoted
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import quoted
+from bayesplate.errors import Fault, InputError, plain
 
 LARGEST_FILE = 1_000_000
 DEEPEST_NESTING = 20

@@ -12,9 +12,9 @@ from typing import Any
 from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, read_board_text
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.shelf import find
-from bayesplate.cards.words import did_you_mean, plain, quoted
+from bayesplate.cards.words import did_you_mean, quoted
 from bayesplate.cards.writing import array, number, table, text, whole
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, plain
 
 Cell = str | float | int | None
 

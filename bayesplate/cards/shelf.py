@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 from typing import Literal
 
-from bayesplate.cards.words import did_you_mean, plain, quoted
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import did_you_mean, quoted
+from bayesplate.errors import Fault, InputError, plain
 
 CardKind = Literal["boards", "priors", "coefficients", "campaigns"]
 _SINGULAR = {"boards": "board", "priors": "prior", "coefficients": "coefficient", "campaigns": "campaign"}

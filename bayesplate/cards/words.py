@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 
-from bayesplate.errors import plain as plain
+from bayesplate.errors import plain
 
 EDGE_NAMES = ("x0", "x1", "y0", "y1")
 EDGE_WORDS = ("clamped", "supported", "free")

@@ -10,8 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bayesplate.cards.words import plain
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.quantities import Kind, Quantity
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bayesplate.report.style import Picture
-from bayesplate.results.folder import writing
+from bayesplate.results.folder import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,20 +72,3 @@ def _bytes_of(figure: Figure, ending: str, told: Mapping[str, str]) -> bytes:
     stream = BytesIO()
     figure.savefig(stream, format=ending, dpi=DOTS_PER_INCH, metadata=metadata, **packing)
     return stream.getvalue()
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all.
-
-    Raises
-    ------
-    UnwritableError
-        If the disk is full or the place is not ours.
-    """
-    partial = path.with_name(path.name + ".partial")
-    with writing(path):
-        try:
-            partial.write_bytes(data)
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)

@@ -132,11 +132,11 @@ class OutputFolder:
 
     def _put_back(self) -> None:
         """Move them back from where a run left nothing in their place."""
-        if any(path.exists() for path in self._results()):
+        if not self.earlier.is_dir() or any(path.exists() for path in self._results()):
             return
         for kept in [path for path in self.earlier.rglob("*") if path.is_file()]:
             place = self.path / kept.relative_to(self.earlier)
-            place.parent.mkdir(exist_ok=True)
+            place.parent.mkdir(parents=True, exist_ok=True)
             kept.rename(place)
         shutil.rmtree(self.earlier)
 
@@ -202,7 +202,9 @@ def run_of_its_own() -> Iterator[None]:
             raise RunInterrupted("interrupted; --resume continues from the last checkpoint") from None
         raise
     except CheckpointError as error:
-        raise CheckpointError(f"{error}{_where_the_earlier_are(held)}") from error
+        if where := _where_the_earlier_are(held):
+            raise CheckpointError(f"{error}{where}") from error
+        raise
     except UnwritableError as error:
         if any(folder.has_checkpoint for folder in held):
             saved = "what was sampled is saved: make room, and --resume continues"
@@ -281,7 +283,12 @@ def json_text(content: Any) -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file completely or not at all.
+    """Write a text file completely or not at all; raises as `write_bytes`."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file completely or not at all.
 
     Raises
     ------
@@ -291,8 +298,8 @@ def write_text(path: Path, text: str) -> None:
     partial = path.with_name(path.name + ".partial")
     with writing(path):
         try:
-            with partial.open("w", encoding="utf-8", newline="\n") as stream:
-                stream.write(text)
+            with partial.open("wb") as stream:
+                stream.write(data)
                 stream.flush()
                 os.fsync(stream.fileno())
             os.replace(partial, path)

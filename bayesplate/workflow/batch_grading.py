@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from bayesplate.cards.words import did_you_mean, plain, quoted
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import did_you_mean, quoted
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.plate.material import MODULI
 from bayesplate.results.grading import GradingRequest
 from bayesplate.results.log_figures import FIGURES

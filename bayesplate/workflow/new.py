@@ -10,8 +10,8 @@ from bayesplate.cards import EDGE_NAMES, load_prior, physical_faults, read_board
 from bayesplate.cards.setup import EdgeWord, edge_words
 from bayesplate.cards.starter import Starter, starter_text
 from bayesplate.cards.values import Number, Refusal
-from bayesplate.cards.words import plain, shown
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import shown
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
 from bayesplate.plate.from_card import board_from_card

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bayesplate.cards.words import plain
-from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
 from bayesplate.recordings.contract import PickReport, rows
 from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
 from bayesplate.recordings.reading import read_recordings

@@ -43,8 +43,8 @@ from bayesplate.workflow.stages import Stages
 PLAN = "plan.json"
 _GAINS, _BENCH = "plan", "plan-bench"
 _POSE, _SEARCH, _PLAN = 1.0, 12.0, 4.0
-_ROUNDING = 1e-9
 """How long the parts take beside each other."""
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from bayesplate.cards import load_board, load_named, read_board_text
-from bayesplate.cards.words import plain, shown
-from bayesplate.errors import Fault, InputError
+from bayesplate.cards.words import shown
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.folder import SUMMARY, json_text
 from bayesplate.results.summary import FORMAT

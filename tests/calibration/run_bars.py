@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -112,12 +113,13 @@ def _of_notes(own: Sequence[Note]) -> Iterable[tuple[str, str]]:
 
 
 def _how_near(note: Note) -> float:
-    """How near a value lies to the bound that it could break; larger is worse."""
+    """How near a value lies to the bound that it could break; larger is worse, and no number the worst."""
     low, high = note["bar"]
-    gaps = [
-        bound - note["value"] if bound is high else note["value"] - bound for bound in (low, high) if bound is not None
-    ]
-    return -min(gaps)
+    if math.isnan(note["value"]):
+        return math.inf
+    below = math.inf if high is None else high - note["value"]
+    above = math.inf if low is None else note["value"] - low
+    return -min(below, above)
 
 
 def _shown(note: Mapping[str, Any]) -> str:

@@ -36,6 +36,9 @@ def test_a_value_outside_its_bar_fails_and_is_noted_as_missed(noted, value, bar)
 def test_what_is_no_number_misses_every_bar(noted):
     with pytest.raises(AssertionError):
         meets("V10", "twelve modes", float("nan"), at_most=0.5)
+    meets("V10", "twelve modes", 0.4, at_most=0.5)
+
+    assert any("twelve modes: nan (at most 0.5), worst of 2 | **missed** |" in line for line in page(read(noted), {}))
 
 
 def test_a_bar_has_a_bound(noted):

@@ -18,7 +18,7 @@ from trial.amplitudes import MEANINGS, quantiles
 from trial.cells import CELLS, KINDS, NOISES, SENSORS, Cell, identity, jobs
 from trial.counts import Share, mean, median
 from trial.judge import judge_one, plant_board
-from trial.run import BASE_SEED, begin, run
+from trial.run import BASE_SEED, BEGUN, begin, run
 from trial.shared import baseline_of_card, control_of
 from trial.summary import CONDITIONS
 
@@ -167,6 +167,14 @@ def test_a_new_file_begins_with_what_was_judged_before_and_one_that_is_there_sta
     assert out.read_text() == "mine"
     begin(tmp_path / "none.jsonl", tmp_path / "missing.gz")
     assert not (tmp_path / "none.jsonl").exists()
+
+
+@pytest.mark.skipif(not BEGUN.exists(), reason="no trial is begun")
+def test_the_trial_that_is_begun_is_of_these_cells_and_this_seed():
+    """Records of other boards would be refused; those of another search are judged again."""
+    first = json.loads(gzip.decompress(BEGUN.read_bytes()).splitlines()[0])
+    wanted = json.loads(json.dumps(identity(CELLS, BASE_SEED)))
+    assert {**first, "code": wanted["code"]} == wanted
 
 
 def test_a_killed_run_goes_on_to_the_same_records(few, tmp_path):
