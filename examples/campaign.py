@@ -57,10 +57,15 @@ def main() -> None:
     parser.add_argument("--results", type=Path, help="folder for the results of the run")
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run of --results")
     arguments = parser.parse_args()
-    results = None if arguments.out is None else arguments.out / "results"
-    is_new = not arguments.resume
+    results = arguments.results
+    if arguments.resume and results is None:
+        parser.error("--resume needs --results, the folder of the run to go on with")
     found = bayesplate.diagnose(
-        arguments.card, effects=[], out=results, resume=not is_new, force=is_new and results is not None
+        arguments.card,
+        effects=[],
+        out=results,
+        resume=arguments.resume,
+        force=results is not None and not arguments.resume,
     )
     text = page(found)
     print(text)

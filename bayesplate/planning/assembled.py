@@ -24,13 +24,17 @@ from bayesplate.planning.plan import (
     SequenceEntry,
 )
 from bayesplate.planning.proposals import Proposal, score
+from bayesplate.planning.stations import BareLaw, Station
 from bayesplate.plate.board import Board, Values
 
 Floats = NDArray[np.float64]
 
 _EVERY = 5
 """Of the grid of a sheet: so far apart places for sensor and hammer are tried."""
-_MOST_BENCHES = 2
+MOST_BENCHES = 2
+BAND = (WITHIN[0], 0.5, WITHIN[1])
+"""Probabilities of the ends of a band and of its middle."""
+KNOWN_NOW = "by what is known now"
 NOTHING: Mapping[str, float] = {}
 
 
@@ -93,30 +97,49 @@ class Bench:
 
 def benches(beliefs: Beliefs, steps: Sequence[Proposal], values: Values, rng: np.random.Generator) -> tuple[Bench, ...]:
     """For each way to hold the board that proposals ask for, the modes to look for."""
+    likely = "over all explanations that survive" if len(beliefs.explanations) > 1 else KNOWN_NOW
     made: list[Bench] = []
     for one in steps:
-        if one.law is not None and one.what != "again" and len(made) < _MOST_BENCHES:
-            made.append(_bench(beliefs, one, values, rng))
+        if one.law is not None and one.what != "again" and len(made) < MOST_BENCHES:
+            ends = bands(beliefs, one.readings, rng, BAND)
+            goes_on = one.what in ("modes", "mass")
+            made.append(bench_of(beliefs.board, one.law, one.rows, ends, values, likely, goes_on=goes_on))
     return tuple(made)
 
 
-def _bench(beliefs: Beliefs, one: Proposal, values: Values, rng: np.random.Generator) -> Bench:
-    assert one.law is not None
-    board, station = beliefs.board, one.law.station
+def bench_of(
+    board: Board, law: BareLaw, rows: Sequence[int], ends: Floats, values: Values, likely: str, *, goes_on: bool
+) -> Bench:
+    """The sheet for some modes of a board.
+
+    Parameters
+    ----------
+    board : Board
+    law : BareLaw
+    rows : sequence of int
+        Which of its modes.
+    ends : (n_rows, 3) array
+        ln of the frequencies (Hz) at the probabilities of `BAND`.
+    values : dict of float
+        Rigidities and inputs about which the shapes are computed.
+    likely : str
+        By what the bands are judged.
+    goes_on : bool
+        Whether it is the session that was begun, so that the sensor stands where it stood.
+    """
+    station = law.station
     system = station.system(board)
     drawn = sheet(board, system, station.values(system, values), "as all explanations together expect them")
-    ends = np.exp(bands(beliefs, one.readings, rng, (WITHIN[0], 0.5, WITHIN[1])))
     by_name = {mode.name: mode for mode in drawn.modes}
-    wanted = [str(station.setup.labels[i]) for i in one.rows]
-    there = [(by_name[name], end) for name, end in zip(wanted, ends, strict=True) if name in by_name]
+    wanted = [str(station.setup.labels[i]) for i in rows]
+    there = [(by_name[name], end) for name, end in zip(wanted, np.exp(ends), strict=True) if name in by_name]
     shown = tuple(
         replace(mode, hertz=float(end[1]), measured_hz=None, band_hz=(float(end[0]), float(end[2])))
         for mode, end in sorted(there, key=lambda pair: pair[1][1])
     )
     grid = points()[::_EVERY]
     shapes = np.stack([mode.shape[::_EVERY, ::_EVERY] for mode in shown])
-    placed = placing(shapes, grid, _sensor(board, one))
-    likely = "over all explanations that survive" if len(beliefs.explanations) > 1 else "by what is known now"
+    placed = placing(shapes, grid, _sensor(board, station) if goes_on else None)
     kept = replace(drawn, modes=shown, combined=(), likely=likely, basis="where they are expected")
     marks = places_on(board, station.setup, (placed.sensor, placed.hammer, *placed.taps))
     sensor, hammer, *taps = ((round(1e3 * x), round(1e3 * y)) for x, y in marks)
@@ -128,12 +151,10 @@ def _bench(beliefs: Beliefs, one: Proposal, values: Values, rng: np.random.Gener
     return Bench(entry, kept, placed)
 
 
-def _sensor(board: Board, one: Proposal) -> tuple[float, float] | None:
-    """Where the sensor stands in a session that goes on, as fractions of what vibrates; None where it may be moved."""
-    assert one.law is not None
-    station = one.law.station
+def _sensor(board: Board, station: Station) -> tuple[float, float] | None:
+    """Where the one sensor stands, as fractions of what vibrates; None where there is none, or there are several."""
     fixed = [item for item in station.base.attached if len(item.places) == 1]
-    if one.what not in ("modes", "mass") or len(fixed) != 1:
+    if len(fixed) != 1:
         return None
     ((x, y),) = fixed[0].places
     start = places_on(board, station.setup, ((0.0, 0.0),))[0]

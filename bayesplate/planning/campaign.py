@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
+from bayesplate.planning.assembled import BAND, KNOWN_NOW, MOST_BENCHES, Bench, bench_of
 from bayesplate.planning.inputs_read import measurements
 from bayesplate.planning.joint import BoardInJoint, Joint, board_in_joint
 from bayesplate.planning.plan import GainEntry, ProposalEntry, SequenceEntry
@@ -43,6 +44,8 @@ class Reading:
     labels : tuple of str
     rows : (n, n_u) array
     variance : (n,) array
+    further : tuple of int
+        Board, setup, and which modes of it: where modes are to be looked for; empty elsewhere.
     """
 
     what: str
@@ -53,6 +56,7 @@ class Reading:
     labels: tuple[str, ...]
     rows: Floats
     variance: Floats
+    further: tuple[int, ...] = ()
 
 
 def joint_of(
@@ -108,31 +112,20 @@ def _of_board(joint: Joint, place: int, costs: Costs, goal: str | None) -> Itera
     """Further modes of one board, its modes again, and readings of its sizes."""
     one = joint.boards[place]
     name = one.board.name
-    for i, law in enumerate(one.laws):
-        setup, read, variance = law.station.base.name, one.was_read(i), one.variance(i)
-        rows = joint.rows(place, one.own[i], one.shared[i])
-        labels = [str(label) for label in law.station.setup.labels]
-
-        def some(chosen: Sequence[int]) -> Reading:
-            told = ", ".join(labels[j] for j in chosen)  # noqa: B023
-            sentence = f"Measure modes {told} of board {name} as well"
-            kept = list(chosen)
-            cost = len(kept) * costs.reading
-            those = tuple(labels[j] for j in kept)  # noqa: B023
-            return Reading("modes", name, setup, sentence, cost, those, rows[kept], variance[kept])  # noqa: B023
-
-        new = [int(j) for j in np.flatnonzero(~read)]
+    for i in range(len(one.laws)):
+        read = one.was_read(i)
         best: list[int] = []
-        for _ in range(min(BEST, len(new))):
-            best.append(max(set(new) - set(best), key=lambda j: worth(joint, (some([*best, j]),), goal)))
+        for _ in range(min(BEST, int((~read).sum()))):
+            left = set(map(int, np.flatnonzero(~read))) - set(best)
+            gains = {j: worth(joint, (_further(joint, place, i, [*best, j], costs),), goal) for j in left}
+            best.append(max(gains, key=lambda j: gains[j]))
         if best:
-            yield some(sorted(best))
+            yield _further(joint, place, i, sorted(best), costs)
         old = [int(j) for j in np.flatnonzero(read)]
         if old:
             again = f"Measure all {len(old)} modes of board {name} again on another day"
             cost = costs.clamping + len(old) * costs.reading
-            those = tuple(labels[j] for j in old)
-            yield Reading("again", name, setup, again, cost, those, rows[old], variance[old])
+            yield _of_modes(joint, place, i, old, ("again", again, cost))
     columns = {column.removeprefix("z[").removesuffix("]"): i for i, column in enumerate(one.names)}
     for measured in measurements(one.board):
         if measured.parameter.name in columns:
@@ -142,6 +135,26 @@ def _of_board(joint: Joint, place: int, costs: Costs, goal: str | None) -> Itera
             words = f"{measured.sentence}, board {name}"
             cost = measured.n * costs.reading
             yield Reading("size", name, "", words, cost, (), row, np.array([1.0 / measured.precision]))
+
+
+def _further(joint: Joint, place: int, setup: int, chosen: Sequence[int], costs: Costs) -> Reading:
+    """Modes of a board that were not read."""
+    one = joint.boards[place]
+    labels = ", ".join(str(one.laws[setup].station.setup.labels[j]) for j in chosen)
+    sentence = f"Measure modes {labels} of board {one.board.name} as well"
+    found = _of_modes(joint, place, setup, chosen, ("modes", sentence, len(chosen) * costs.reading))
+    return replace(found, further=(place, setup, *chosen))
+
+
+def _of_modes(joint: Joint, place: int, setup: int, chosen: Sequence[int], told: tuple[str, str, float]) -> Reading:
+    """Some modes of a board: what it is, the order to do it, and its cost."""
+    one, rows = joint.boards[place], list(chosen)
+    what, sentence, cost = told
+    station = one.laws[setup].station
+    labels = tuple(str(station.setup.labels[j]) for j in rows)
+    seen = joint.rows(place, one.own[setup][rows], one.shared[setup][rows])
+    variance = one.variance(setup)[rows]
+    return Reading(what, one.board.name, station.base.name, sentence, cost, labels, seen, variance)
 
 
 def _of_shared(joint: Joint, shared: Sequence[Shared], costs: Costs) -> Iterator[Reading]:
@@ -240,14 +253,35 @@ def _gain(joint: Joint, some: Sequence[Reading], shared: Sequence[Shared], goal:
 
 
 def joined(
-    joint: Joint, listed: Sequence[Reading], shared: Sequence[Shared], goal: str | None, longest: int = 3
-) -> tuple[SequenceEntry, ...]:
+    joint: Joint, listed: Sequence[Reading], goal: str | None, longest: int = 3
+) -> tuple[tuple[Reading, ...], ...]:
     """The best two and the best three together, found one by one: each goes with those found before it."""
     chosen, result = list(listed[:1]), []
     while chosen and len(chosen) < min(longest, len(listed)):
         left = [one for one in listed if one not in chosen]
         chosen.append(max(left, key=lambda one: worth(joint, (*chosen, one), goal)))
-        cost = sum(one.cost for one in chosen)
-        steps = tuple(one.sentence for one in chosen)
-        result.append(SequenceEntry(steps, cost, _gain(joint, chosen, shared, goal, cost)))
+        result.append(tuple(chosen))
     return tuple(result)
+
+
+def joined_entry(joint: Joint, steps: Sequence[Reading], shared: Sequence[Shared], goal: str | None) -> SequenceEntry:
+    """Readings together as they are written."""
+    cost = sum(one.cost for one in steps)
+    return SequenceEntry(tuple(one.sentence for one in steps), cost, _gain(joint, steps, shared, goal, cost))
+
+
+def benches(joint: Joint, steps: Sequence[Reading]) -> tuple[Bench, ...]:
+    """For each board of which modes are to be read, where they are expected."""
+    wanted = [one for one in steps if one.further][:MOST_BENCHES]
+    return tuple(_bench(joint, one) for one in wanted)
+
+
+def _bench(joint: Joint, reading: Reading) -> Bench:
+    from scipy.special import ndtri
+
+    place, setup, *modes = reading.further
+    one = joint.boards[place]
+    law = one.laws[setup]
+    spread = np.einsum("nu,uv,nv->n", reading.rows, joint.covariance, reading.rows) + reading.variance
+    ends = law.solved[0, modes, None] + np.sqrt(spread)[:, None] * ndtri(np.array(BAND))
+    return bench_of(one.board, law, modes, ends, one.values, KNOWN_NOW, goes_on=True)

@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.planning.assembled import Bench
-from bayesplate.planning.campaign import entry, joined, joint_of, readings
+from bayesplate.planning.campaign import benches, entry, joined, joined_entry, joint_of, readings
 from bayesplate.planning.plan import FORMAT, Plan
 from bayesplate.planning.proposals import EXPLANATIONS, Costs
 from bayesplate.planning.words import campaign_line
@@ -47,6 +47,8 @@ def plan_campaign(
     joint = joint_of(boards, priors, campaign.shared, stages.reached)
     stages.begin("gains of further readings", _READINGS)
     listed = readings(joint, priors, campaign.shared, costs, goal)
+    together = joined(joint, listed, goal)
+    drawn = benches(joint, together[-1] if together else listed[:1])
     proposals = tuple(entry(joint, one, campaign.shared, goal) for one in listed)
     made = Plan(
         format=FORMAT,
@@ -61,8 +63,8 @@ def plan_campaign(
         entropy=0.0,
         first=campaign_line(proposals),
         proposals=proposals,
-        sequences=joined(joint, listed, campaign.shared, goal),
-        bench=(),
+        sequences=tuple(joined_entry(joint, one, campaign.shared, goal) for one in together),
+        bench=tuple(one.entry for one in drawn),
         notes=(LINEAR,),
     )
-    return made, ()
+    return made, drawn

@@ -1,0 +1,98 @@
+"""What to measure next in a campaign: proposals in their order, and sheets for the modes to look for."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bayesplate
+from bayesplate.planning.campaign import benches, joint_of, readings
+from bayesplate.planning.proposals import Costs
+
+SHARED = "attached_mass.mass"
+
+
+@pytest.fixture(scope="module")
+def planned(campaign, tmp_path_factory):
+    """A plan of three boards with one sensor, with its files."""
+    return bayesplate.plan(campaign, out=tmp_path_factory.mktemp("plan"))
+
+
+def test_what_narrows_the_shared_parameter_most_comes_first(planned):
+    listed = planned.summary.proposals
+    scores = [one.gain.score for one in listed]
+
+    assert planned.summary.basis == "campaign"
+    assert listed[0].sentence in planned.summary.first
+    assert scores == sorted(scores, reverse=True)
+    assert scores == pytest.approx([-np.log(one.gain.shared[SHARED]) for one in listed])
+    (weighing,) = [one for one in listed if "Weigh" in one.sentence]
+    assert weighing is listed[0]  # the sensor itself: a reading of what is shared, and nothing beside it
+    assert weighing.gain.E_x > 0.9
+
+
+def test_two_steps_give_more_than_one_and_three_more_than_two(planned):
+    best = planned.summary.proposals[0].gain.score
+    scores = [best, *(one.gain.score for one in planned.summary.sequences)]
+    costs = [one.cost_minutes for one in planned.summary.sequences]
+
+    assert len(scores) == 3
+    assert scores == sorted(scores)
+    assert costs == sorted(costs)
+
+
+@pytest.fixture(scope="module")
+def joint(campaign):
+    """All boards to first order."""
+    boards = [one.prepared.board for one in campaign.problems]
+    return joint_of(boards, [one.prior for one in campaign.problems], campaign.shared)
+
+
+@pytest.fixture(scope="module")
+def listed(campaign, joint):
+    """What could be read next, for the sake of E_y."""
+    return readings(joint, [one.prior for one in campaign.problems], campaign.shared, Costs(), "E_y")
+
+
+def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(campaign, joint, listed):
+    found = [one.entry for one in benches(joint, listed)]
+
+    assert len(found) == 2
+    for bench in found:
+        (wanted,) = [one.labels for one in listed if one.further and one.board == bench.board]
+        assert {mode.label for mode in bench.modes} == set(wanted)
+        assert all(mode.low_hz < mode.hz < mode.high_hz for mode in bench.modes)
+        board = next(one.prepared.board for one in campaign.problems if one.prepared.board.name == bench.board)
+        ((x, y),) = board.setups[0].attached[0].places
+        assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=25)  # the grid of places
+
+
+def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(planned):
+    asked = [one for one in planned.summary.sequences[-1].steps if "as well" in one][:2]
+
+    assert len(planned.benches) == len(planned.summary.bench) == len(asked)
+    assert all(
+        f"of board {bench.board} as well" in step for bench, step in zip(planned.summary.bench, asked, strict=True)
+    )
+
+
+def test_the_bands_of_a_sheet_are_four_times_as_wide_with_four_times_the_noise(joint, listed):
+    (reading, *_) = [one for one in listed if one.further]
+    worse = replace(joint, boards=tuple(replace(one, noise=4.0 * one.noise) for one in joint.boards))
+    louder = replace(reading, variance=16.0 * reading.variance)
+    usual, wider = (
+        [np.log(mode.high_hz / mode.low_hz) for mode in bench.entry.modes]
+        for bench in (*benches(joint, [reading]), *benches(worse, [louder]))
+    )
+
+    assert np.divide(wider, usual) == pytest.approx(np.full(len(usual), 4.0), rel=0.25)
+
+
+def test_files_are_those_of_a_plan(planned):
+    told = json.loads(next(path for path in planned.files if path.name == "plan.json").read_text())
+
+    assert told["basis"] == "campaign"
+    assert {path.suffix for path in planned.files} == {".json", ".png", ".svg"}
