@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import ritz
+from bars import meets
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
 from scipy.optimize import least_squares
 
@@ -36,7 +37,7 @@ def test_the_estimate_is_where_a_general_minimiser_ends(name):
     assert np.linalg.norm(found.jac @ (x - found.x)) < 1e-3
     assert np.linalg.norm(found.jac @ (x + np.array([1e-3, 0.0, 0.0]) - found.x)) > 1e-2  # control: 0.1 % would be seen
     # the sensitivities that come with the solve are the slopes of full solves
-    slopes = estimate.sensitivities / estimate.scales[:, None]
+    slopes = weighted_slopes(estimate)
     assert slopes == pytest.approx(found.jac, abs=1e-3 * np.abs(found.jac).max())
 
 
@@ -52,6 +53,22 @@ def test_the_constants_of_another_solver_s_board_are_found():
     found = moduli(*estimate.rigidities, ritz.FINNISH.h, ritz.FINNISH.nu_xy)
     assert np.stack(found) == pytest.approx([13.0e9, 0.702e9, 0.668e9], rel=5e-4)
     assert np.abs(estimate.residuals).max() * 1200 / np.log(2) < 0.5
+
+
+def test_readings_given_twice_leave_the_estimate_and_halve_its_variances():
+    board = prepare("fiemme-spruce-clamped").board
+    (setup,) = board.setups
+    once = weighted_least_squares(board, accepted=1e-12)
+    twice = weighted_least_squares(replace(board, setups=(setup, replace(setup, name="again"))), accepted=1e-12)
+
+    sd, less = (np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes))) for slopes in map(weighted_slopes, (once, twice)))
+    meets("V13", "readings given twice, standard errors", np.abs(less * np.sqrt(2.0) / sd - 1.0).max(), at_most=1e-10)
+    off = np.abs(twice.rigidities / once.rigidities - 1.0).max()
+    meets("V13", "readings given twice, constants", off, at_most=1e-10)
+
+
+def weighted_slopes(estimate):
+    return estimate.sensitivities / estimate.scales[:, None]
 
 
 def test_a_reading_s_own_uncertainty_weighs_it():

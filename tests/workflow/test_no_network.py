@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -31,11 +32,21 @@ COMMANDS = {
     "batch": ("CARDS", "--out", "OUT", "--workers", "1"),
 }  # fmt: skip
 PROGRAM = """
-import sys
+import json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from killed_runs import quickly
 from bayesplate.cli import main
 quickly()
-main(sys.argv[1:])
+ended = {}
+for command, *given in json.loads(sys.argv[1]):
+    told = StringIO()
+    try:
+        with redirect_stdout(StringIO()), redirect_stderr(told):
+            main([command, *given, "--debug"])
+    except SystemExit as end:
+        ended[command] = (end.code, told.getvalue())
+print(json.dumps(ended))
 """
 
 
@@ -47,31 +58,49 @@ def without_network(program: str, *arguments: str, desk: Path | None = None) -> 
     return subprocess.run(run, env=environment, cwd=desk, capture_output=True, text=True, check=False)
 
 
+def ended(commands, desk=None, program=PROGRAM):
+    """Exit code and messages of commands that are run one after another without a network."""
+    done = without_network(program, json.dumps(commands), desk=desk)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def every_command(tmp_path_factory):
+    """Exit code, messages and files outside the output folder of each command."""
+    inputs, outputs, desk = (tmp_path_factory.mktemp(name) for name in ("inputs", "outputs", "desk"))
+    force, heard = hits(np.random.default_rng(2), [0.05], (0.02, 0.02))
+    places = {
+        "HIT": str(write_wav(inputs / "hit.wav", 4000.0, force, heard)),
+        "CARD": str(TESTS.parent / "docs" / "cards" / "half-top-unmeasured.toml"),
+        "CARDS": str(write_cards(inputs / "cards", "a", bad=False)),
+    }
+    before = set(inputs.rglob("*"))
+    commands = []
+    for command, words in COMMANDS.items():
+        (outputs / command).mkdir()
+        own = {**places, "OUT": str(outputs / command / "out")}
+        commands.append([command, *(own.get(word, word.replace("OUT/", f"{outputs / command}/")) for word in words)])
+    done = ended(commands, desk)
+    lost = [*desk.rglob("*"), *(set(inputs.rglob("*")) - before)]
+    told = {}
+    for command, (code, messages) in done.items():
+        beside = [path for path in (outputs / command).iterdir() if path.name != "out"]
+        told[command] = code, messages, {path.name for path in [*lost, *beside]}
+    return told
+
+
 def test_every_command_is_tried():
     assert set(COMMANDS) == set(main.commands)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_command_runs_without_a_network(command, tmp_path):
+def test_a_command_runs_without_a_network(every_command, command):
     """With all that it writes, pages, figures, tables; and nothing of it lies anywhere but in the output folder."""
-    force, heard = hits(np.random.default_rng(2), [0.05], (0.02, 0.02))
-    places = {
-        "OUT": str(tmp_path / "out"),
-        "HIT": str(write_wav(tmp_path / "hit.wav", 4000.0, force, heard)),
-        "CARD": str(TESTS.parent / "docs" / "cards" / "half-top-unmeasured.toml"),
-        "CARDS": str(write_cards(tmp_path / "cards", "a", bad=False)),
-    }
-    given = [places.get(word, word.replace("OUT/", f"{tmp_path}/")) for word in COMMANDS[command]]
+    code, messages, outside = every_command[command]
 
-    (tmp_path / "desk").mkdir()
-    before = {path for path in tmp_path.rglob("*") if "out" not in path.relative_to(tmp_path).parts}
-
-    done = without_network(PROGRAM, command, *given, "--debug", desk=tmp_path / "desk")
-
-    assert done.returncode == 0, done.stderr
-    assert "network" not in done.stderr
-    written = set(tmp_path.rglob("*")) - before
-    outside = {path.relative_to(tmp_path).as_posix() for path in written if not path.is_relative_to(tmp_path / "out")}
+    assert code == 0, messages
+    assert "network" not in messages
     assert outside == ({"my-board.toml"} if command == "new" else set())
 
 
@@ -94,11 +123,11 @@ def test_who_asks_for_the_network_is_noticed(asked):
     assert "the network was asked for" in done.stderr
 
 
-def test_a_command_that_asked_for_it_would_fail(tmp_path):
+def test_a_command_that_asked_for_it_would_fail():
     """The negative control of the commands themselves: one line more in the package is enough."""
     line = "import bayesplate.workflow.check as home, socket\nwhole = home.check\n"
     line += "home.check = lambda *a, **k: (socket.getaddrinfo('localhost', 80), whole(*a, **k))[1]\n"
-    done = without_network(line + PROGRAM, "check", BOARD, "--debug")
+    code, messages = ended([["check", BOARD]], program=line + PROGRAM)["check"]
 
-    assert done.returncode == 70
-    assert "the network was asked for: socket.getaddrinfo" in done.stderr
+    assert code == 70
+    assert "the network was asked for: socket.getaddrinfo" in messages
