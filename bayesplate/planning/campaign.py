@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,14 @@ _CUT = 2
 """Boards of which a shorter one is looked at."""
 
 
+class ToFind(NamedTuple):
+    """Modes of a board, by the places of the board, of its setup, and of the modes in that setup's law."""
+
+    board: int
+    setup: int
+    modes: tuple[int, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Reading:
     """One thing that could be measured next in a campaign.
@@ -44,8 +53,8 @@ class Reading:
     labels : tuple of str
     rows : (n, n_u) array
     variance : (n,) array
-    further : tuple of int
-        Board, setup, and which modes of it: where modes are to be looked for; empty elsewhere.
+    further : ToFind or None
+        Modes that are to be looked for; None elsewhere.
     """
 
     what: str
@@ -56,7 +65,7 @@ class Reading:
     labels: tuple[str, ...]
     rows: Floats
     variance: Floats
-    further: tuple[int, ...] = ()
+    further: ToFind | None = None
 
 
 def joint_of(
@@ -116,9 +125,9 @@ def _of_board(joint: Joint, place: int, costs: Costs, goal: str | None) -> Itera
         read = one.was_read(i)
         best: list[int] = []
         for _ in range(min(BEST, int((~read).sum()))):
-            left = set(map(int, np.flatnonzero(~read))) - set(best)
-            gains = {j: worth(joint, (_further(joint, place, i, [*best, j], costs),), goal) for j in left}
-            best.append(max(gains, key=lambda j: gains[j]))
+            left = [int(j) for j in np.flatnonzero(~read) if j not in best]
+            gains = [worth(joint, (_further(joint, place, i, [*best, j], costs),), goal) for j in left]
+            best.append(left[int(np.argmax(gains))])
         if best:
             yield _further(joint, place, i, sorted(best), costs)
         old = [int(j) for j in np.flatnonzero(read)]
@@ -143,7 +152,7 @@ def _further(joint: Joint, place: int, setup: int, chosen: Sequence[int], costs:
     labels = ", ".join(str(one.laws[setup].station.setup.labels[j]) for j in chosen)
     sentence = f"Measure modes {labels} of board {one.board.name} as well"
     found = _of_modes(joint, place, setup, chosen, ("modes", sentence, len(chosen) * costs.reading))
-    return replace(found, further=(place, setup, *chosen))
+    return replace(found, further=ToFind(place, setup, tuple(chosen)))
 
 
 def _of_modes(joint: Joint, place: int, setup: int, chosen: Sequence[int], told: tuple[str, str, float]) -> Reading:
@@ -272,16 +281,15 @@ def joined_entry(joint: Joint, steps: Sequence[Reading], shared: Sequence[Shared
 
 def benches(joint: Joint, steps: Sequence[Reading]) -> tuple[Bench, ...]:
     """For each board of which modes are to be read, where they are expected."""
-    wanted = [one for one in steps if one.further][:MOST_BENCHES]
-    return tuple(_bench(joint, one) for one in wanted)
+    wanted = [(one, one.further) for one in steps if one.further is not None]
+    return tuple(_bench(joint, one, modes) for one, modes in wanted[:MOST_BENCHES])
 
 
-def _bench(joint: Joint, reading: Reading) -> Bench:
+def _bench(joint: Joint, reading: Reading, wanted: ToFind) -> Bench:
     from scipy.special import ndtri
 
-    place, setup, *modes = reading.further
-    one = joint.boards[place]
-    law = one.laws[setup]
+    one = joint.boards[wanted.board]
+    law = one.laws[wanted.setup]
     spread = np.einsum("nu,uv,nv->n", reading.rows, joint.covariance, reading.rows) + reading.variance
-    ends = law.solved[0, modes, None] + np.sqrt(spread)[:, None] * ndtri(np.array(BAND))
-    return bench_of(one.board, law, modes, ends, one.values, KNOWN_NOW, goes_on=True)
+    ends = law.solved[0, list(wanted.modes), None] + np.sqrt(spread)[:, None] * ndtri(np.array(BAND))
+    return bench_of(one.board, law, wanted.modes, ends, one.values, KNOWN_NOW, goes_on=True)
