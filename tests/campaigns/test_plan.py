@@ -79,16 +79,20 @@ def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(planned):
     )
 
 
-def test_the_bands_of_a_sheet_are_four_times_as_wide_with_four_times_the_noise(joint, listed):
+def test_the_band_of_a_mode_has_what_is_not_known_of_the_board_and_the_noise(joint, listed):
+    """Two times in three, so 0.967 standard deviations either way; of a board that were known, the noise alone."""
     (reading, *_) = [one for one in listed if one.further]
-    worse = replace(joint, boards=tuple(replace(one, noise=4.0 * one.noise) for one in joint.boards))
-    louder = replace(reading, variance=16.0 * reading.variance)
-    usual, wider = (
-        [np.log(mode.high_hz / mode.low_hz) for mode in bench.entry.modes]
-        for bench in (*benches(joint, [reading]), *benches(worse, [louder]))
-    )
+    known = replace(joint)
+    known.__dict__["covariance"] = np.zeros_like(joint.covariance)
+    widths = []
+    for one in (joint, known):
+        (bench,) = benches(one, [reading])
+        by_label = {mode.label: np.log(mode.high_hz / mode.low_hz) for mode in bench.entry.modes}
+        widths.append(np.array([by_label[label] for label in reading.labels]))
 
-    assert np.divide(wider, usual) == pytest.approx(np.full(len(usual), 4.0), rel=0.25)
+    assert widths[1] == pytest.approx(2.0 * 0.9674 * np.sqrt(reading.variance), rel=1e-3)
+    of_board = np.einsum("nu,uv,nv->n", reading.rows, joint.covariance, reading.rows)
+    assert widths[0] / widths[1] == pytest.approx(np.sqrt(1.0 + of_board / reading.variance))
 
 
 def test_files_are_those_of_a_plan(planned):
