@@ -32,8 +32,8 @@ _NEEDED = {
 _NEEDED_OF_REQUEST = {"card": str, "named": dict}
 
 
-@dataclass(frozen=True, eq=False)
-class Repeated:
+@dataclass(frozen=True, eq=False, repr=False)
+class RepeatResult:
     """A fit that was repeated.
 
     Attributes
@@ -56,6 +56,9 @@ class Repeated:
             "processor or another library for matrices is left, or a diagnosis that chose the form of an effect"
         )
 
+    def __repr__(self) -> str:
+        return f"<RepeatResult of {self.result.summary.name}: {self.sentence}>"
+
 
 def repeat(
     summary: str | os.PathLike[str],
@@ -66,7 +69,7 @@ def repeat(
     force: bool = False,
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
-) -> Repeated:
+) -> RepeatResult:
     """Fit again what a summary is of: its card, effects, law and seed.
 
     Parameters
@@ -82,7 +85,7 @@ def repeat(
 
     Returns
     -------
-    Repeated
+    RepeatResult
 
     Raises
     ------
@@ -101,7 +104,7 @@ def repeat(
     done = fit(problem, out=out, report=report, seed=before["seed"], force=force, resume=resume, progress=progress)
     after = json.loads(json_text(cast(FitResult, done).summary))
     differs = tuple(name for name in {**before, **after} if before.get(name) != after.get(name))
-    return Repeated(cast(FitResult, done), differs)
+    return RepeatResult(cast(FitResult, done), differs)
 
 
 def default_repeat_folder(summary: str | os.PathLike[str]) -> Path:
