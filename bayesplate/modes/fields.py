@@ -54,7 +54,7 @@ Measure = tuple[tuple[Products, Products], ...]
 
 Nodes = tuple[float, ...]
 
-_N_KEPT = 32
+_N_KEPT = 128
 """Measures that are kept: candidates of a search share those of the fields that the board has anyway."""
 _POINTS = 6
 """Gauss points per element: a product of two cubics with a field of degree five is exact."""

@@ -60,6 +60,10 @@ Beams = tuple[int, int]
 """Order of the beam functions along x and y whose product a mode resembles; (0, 0) is the lowest."""
 
 
+_AT_ONCE = 2048
+"""Stored places of a pattern that are worked on together: what they need stays in the fast memory."""
+
+
 class Weights(NamedTuple):
     """Weights of the stiffness terms, s^-2, and of the mass terms, as fractions of the board's mass.
 
@@ -141,6 +145,18 @@ class Block:
         small = np.stack(in_threads(lambda term: vectors.T @ (self.matrix(term) @ vectors), terms))
         return (small + np.swapaxes(small, -1, -2)) / 2.0
 
+    def energies(self, terms: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Each term's phi' K phi of (n_dof, n_vectors) vectors: (n_terms, n_vectors) array.
+
+        The diagonal of `project`; all terms at once, because they share the products of unknowns at the stored places.
+        """
+        columns = np.repeat(np.arange(self.n_dof), np.diff(self.indptr))
+        found = np.zeros((len(terms), vectors.shape[1]))
+        for start in range(0, columns.size, _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            found += terms[:, part] @ (vectors[self.indices[part]] * vectors[columns[part]])
+        return found
+
     def project_masses(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """All mass terms on the span of vectors, the projected ones last."""
         small = self.project(self.masses, vectors)
@@ -148,6 +164,14 @@ class Block:
             return small
         deflections = self.spread(vectors)
         return np.concatenate([small, [term(deflections) for term in self.projected]])
+
+    def mass_energies(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same of all mass terms, the projected ones last: (n_masses, n_vectors) array."""
+        own = self.energies(self.masses, vectors)
+        if not self.projected:
+            return own
+        deflections = self.spread(vectors)
+        return np.concatenate([own, [np.diagonal(term(deflections)) for term in self.projected]])
 
     def spread(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Deflection of (n_dof, n_vectors) of the class as (n_vectors, n_dof_x, n_dof_y) of the two lines."""

@@ -45,9 +45,7 @@ class ClassModes:
 
         Weighted with the weights of the solve they sum to the eigenvalue and to 1 (the sum rule).
         """
-        stiffness = self.block.project(self.block.terms, self.vectors)
-        masses = self.block.project_masses(self.vectors)
-        return np.diagonal(stiffness, axis1=1, axis2=2).T, np.diagonal(masses, axis1=1, axis2=2).T
+        return self.block.energies(self.block.terms, self.vectors).T, self.block.mass_energies(self.vectors).T
 
 
 def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
