@@ -1,11 +1,13 @@
 """A campaign: what six boards of one laboratory share, claimed by the boards that were left out.
 
 Six free half-tops were measured on one day with one accelerometer. Each of them alone cannot tell transverse shear from
-the sensor's mass. Together they teach both, and each board is asked whether it wants what the other five teach it.
+the sensor's mass. Together they teach both, and each board is asked whether it wants what the other five teach it. The
+card spruce-half-tops-shear names the same boards and shares transverse shear alone.
 
     python examples/campaign.py --out campaign --results campaign/results
 
-prints what was found and writes it as a page. The road of an hour or two goes board by board, and can be resumed.
+prints what was found and writes it as a page, NAME.md. It takes half an hour to two hours, board by board, and can be
+resumed.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ def main() -> None:
     """Diagnose the campaign, print the page, and write it where told."""
     parser = argparse.ArgumentParser(description="What six boards share.")
     parser.add_argument("card", nargs="?", default=CAMPAIGN, help="card of a campaign (default: the shipped one)")
-    parser.add_argument("--out", type=Path, help="folder for campaign.md")
+    parser.add_argument("--out", type=Path, help="folder for the page, NAME.md")
     parser.add_argument("--results", type=Path, help="folder for the results of the run")
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run of --results")
     arguments = parser.parse_args()
@@ -71,7 +73,7 @@ def main() -> None:
     print(text)
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        (arguments.out / "campaign.md").write_text(text, encoding="utf-8")
+        (arguments.out / f"{found.summary.name}.md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -61,9 +61,14 @@ CHECKS = (
         "up: how often that settles which is true, and whether expected gains are realised.",
     ),
     (
-        "campaign",
-        "python examples/campaign.py --out docs/validation --results results/campaign",
+        "spruce-half-tops",
+        "python examples/campaign.py --out docs/validation --results results/spruce-half-tops",
         "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it.",
+    ),
+    (
+        "spruce-half-tops-shear",
+        "python examples/campaign.py spruce-half-tops-shear --out docs/validation --results results/shear",
+        "The same six with transverse shear alone shared.",
     ),
     (
         "campaigns",
