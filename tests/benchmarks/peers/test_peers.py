@@ -118,6 +118,48 @@ def test_a_peer_that_cannot_be_installed_says_why(tmp_path, monkeypatch):
         environments.python_of(PEERS[0], tmp_path)
 
 
+def made_up(worth, asked):
+    """Runs in place of processes: so many effective draws at a size, a second each; what was asked for is noted."""
+
+    def run_peer(peer, python, problem, size, seed, *, again=False):
+        asked.append((size, seed))
+        draws = np.full((8, 2, 4), worth(size))
+        return trials.Run(draws, None, {"start_up": 0.1, "sampling": 1.0, "again": 0.5}, 2.0, 2.0)
+
+    return run_peer
+
+
+@pytest.mark.parametrize("worth", [lambda size: 0.5 * size, lambda size: 50.0 * size], ids=["too few", "too many"])
+def test_a_peer_is_measured_with_every_seed_at_a_size_that_trials_have_found(worth, monkeypatch):
+    asked = []
+    monkeypatch.setattr(trials, "run_peer", made_up(worth, asked))
+    monkeypatch.setattr(measures, "effective_draws", lambda draws, weights: draws[0, 0])
+    monkeypatch.setattr(trials, "pooled_difference", lambda runs, truth: SAME)
+    peer = replace(PEERS[0], size=2000, largest=50_000, is_compiled=False)
+
+    found = trials.measured(peer, None, None, None, 4000, [1, 2, 3], "mark")
+
+    assert not found.missing
+    assert 4000.0 <= min(found.ess) <= trials.TOO_MUCH * 4000.0
+    assert [one for one in asked if one[1] < 100] == [(found.size, seed) for seed in (1, 2, 3)]
+    assert found.cold_time == 2.0
+    assert found.warm == ()
+
+
+@pytest.mark.parametrize(("worth", "told"), [
+    (lambda size: 10.0, "10 effective draws at a size of 3000, the largest tried"),
+    (lambda size: np.nan, "walkers that never join the others at a size of 3000, the largest tried"),
+])  # fmt: skip
+def test_a_peer_that_does_not_get_there_says_how_far_it_came(worth, told, monkeypatch):
+    monkeypatch.setattr(trials, "run_peer", made_up(worth, []))
+    monkeypatch.setattr(measures, "effective_draws", lambda draws, weights: draws[0, 0])
+
+    found = trials.measured(replace(PEERS[0], size=1000, largest=3000), None, None, None, 4000, [1], "mark")
+
+    assert found.missing == told
+    assert found.cold == ()
+
+
 def test_the_page_tells_what_was_skipped_and_why():
     skipped = trials.Result(PEERS[3].name, "mark", missing="pip: no wheel for this machine")
     text = written(every_result(**{PEERS[3].module: skipped}))

@@ -138,7 +138,7 @@ def run_peer(peer: Peer, python: Path, problem: Path, size: int, seed: int, *, a
 
 def next_size(size: int, ess: float, goal: float) -> int:
     """The size at which a sampler should give the wanted draws: in proportion, at most four times as much."""
-    return int(size * min(max(MARGIN * goal / max(ess, 1.0), 0.05), 4.0))
+    return int(size * min(max(MARGIN * goal / float(np.nanmax([ess, 1.0])), 0.05), 4.0))
 
 
 def measured(peer: Peer, python: Path, problem: Path, truth: measures.Truth, goal: float, seeds: Sequence[int],
@@ -150,7 +150,8 @@ def measured(peer: Peer, python: Path, problem: Path, truth: measures.Truth, goa
         if ess >= goal and (trial or ess <= TOO_MUCH * goal):  # shortened once at most: some have a least length
             break
         if size >= peer.largest:
-            return Result(peer.name, fingerprint, f"{ess:.0f} effective draws at a size of {size}, the largest tried")
+            worth = "walkers that never join the others" if np.isnan(ess) else f"{ess:.0f} effective draws"
+            return Result(peer.name, fingerprint, f"{worth} at a size of {size}, the largest tried")
         size = min(next_size(size, ess, goal), peer.largest)
     runs = [run_peer(peer, python, problem, size, seed) for seed in seeds]
     short = min(run.ess for run in runs)
