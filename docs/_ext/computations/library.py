@@ -83,6 +83,12 @@ CHECKS = (
         "errors, bias, false and missed modes, and a control that reads the highest line.",
     ),
     (
+        "spectra",
+        "make spectra",
+        "Simulated free boards with two labels, missed modes and a spurious peak: probabilities of assignments, and "
+        "intervals of the constants.",
+    ),
+    (
         "sand",
         "make sand",
         "Pictures of sand, uneven, partial and askew: how often the right mode is the likeliest.",
