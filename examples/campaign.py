@@ -6,8 +6,8 @@ card spruce-half-tops-shear names the same boards and shares transverse shear al
 
     python examples/campaign.py --out campaign --results campaign/results
 
-prints what was found and writes it as a page, NAME.md. It takes half an hour to two hours, board by board, and can be
-resumed.
+prints what was found and writes it as a page, NAME.md. It goes board by board, for a quarter of an hour to an hour, and
+can be resumed.
 """
 
 from __future__ import annotations

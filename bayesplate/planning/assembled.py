@@ -129,7 +129,7 @@ def bench_of(
     """
     station = law.station
     system = station.system(board)
-    drawn = sheet(board, system, station.values(system, values), "as all explanations together expect them")
+    drawn = sheet(board, system, station.values(system, values), "where they are expected")
     by_name = {mode.name: mode for mode in drawn.modes}
     wanted = [str(station.setup.labels[i]) for i in rows]
     there = [(by_name[name], end) for name, end in zip(wanted, np.exp(ends), strict=True) if name in by_name]
@@ -140,7 +140,7 @@ def bench_of(
     grid = points()[::_EVERY]
     shapes = np.stack([mode.shape[::_EVERY, ::_EVERY] for mode in shown])
     placed = placing(shapes, grid, _sensor(board, station) if goes_on else None)
-    kept = replace(drawn, modes=shown, combined=(), likely=likely, basis="where they are expected")
+    kept = replace(drawn, modes=shown, combined=(), likely=likely)
     marks = places_on(board, station.setup, (placed.sensor, placed.hammer, *placed.taps))
     sensor, hammer, *taps = ((round(1e3 * x), round(1e3 * y)) for x, y in marks)
     modes = tuple(

@@ -70,13 +70,18 @@ def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(campaign
         assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=25)  # the grid of places
 
 
-def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(planned):
-    asked = [one for one in planned.summary.sequences[-1].steps if "as well" in one][:2]
+def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, listed, tmp_path, monkeypatch):
+    """Where modes are all that could be read, the best three are of three boards; two of them get a sheet."""
+    of_modes = tuple(one for one in listed if one.further)
+    monkeypatch.setattr("bayesplate.workflow.campaign_plan.readings", lambda *_: of_modes)
+    found = bayesplate.plan(campaign, goal="E_y", out=tmp_path / "out")
+    asked = found.summary.sequences[-1].steps
 
-    assert len(planned.benches) == len(planned.summary.bench) == len(asked)
-    assert all(
-        f"of board {bench.board} as well" in step for bench, step in zip(planned.summary.bench, asked, strict=True)
-    )
+    assert len(asked) == 3
+    assert len(found.benches) == len(found.summary.bench) == 2
+    for bench, step in zip(found.summary.bench, asked, strict=False):
+        assert f"of board {bench.board} as well" in step
+    assert {"plan-bench.png", "plan-bench-2.svg"} <= {path.name for path in found.files}
 
 
 def test_the_band_of_a_mode_has_what_is_not_known_of_the_board_and_the_noise(joint, listed):
@@ -95,8 +100,10 @@ def test_the_band_of_a_mode_has_what_is_not_known_of_the_board_and_the_noise(joi
     assert widths[0] / widths[1] == pytest.approx(np.sqrt(1.0 + of_board / reading.variance))
 
 
-def test_files_are_those_of_a_plan(planned):
+def test_a_plan_without_modes_to_look_for_has_no_sheet(planned):
     told = json.loads(next(path for path in planned.files if path.name == "plan.json").read_text())
 
     assert told["basis"] == "campaign"
-    assert {path.suffix for path in planned.files} == {".json", ".png", ".svg"}
+    assert not any("as well" in step for step in told["sequences"][-1]["steps"])
+    assert told["bench"] == []
+    assert {path.name for path in planned.files} == {"plan.json", "plan.png", "plan.svg"}
