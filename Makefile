@@ -50,7 +50,7 @@ sand: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_sand.py --pictures 20 --workers 2 --out results/sand.jsonl --publish docs/validation
 
 measured: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_measured.py --folder ../shared/data
+	$(BIN)/python tests/calibration/run_measured.py --folder ../shared/data --publish docs/validation
 
 bars: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_bars.py --publish docs/validation --workers 2

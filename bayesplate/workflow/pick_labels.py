@@ -31,7 +31,7 @@ MOST_PROPOSING = 12
 _LEAST_SHARE, _MOST_WAYS = 0.01, 3
 _POLARITY_SURE = float(np.log(20.0))
 _STATED, _BEYOND_DOUBT = 0.5, 0.99
-"""Probability from which on a label is stated: by sand and residues alone, and by all together."""
+"""Probability from which on a label is stated: where sand and residues speak for it too, and where they do not."""
 _GRID = np.linspace(0.0, 1.0, 61)
 _NEAR = 0.15
 """Relative distance within which sand and residues choose among the modes."""
@@ -62,14 +62,17 @@ class Labels:
     def stated(self, peak: int) -> tuple[str, float] | None:
         """The label that a card may state, and the confidence in it; None where it is left to the fit.
 
-        Sand and residues are not known to the fit. What the frequencies alone say it finds out by itself, and would
-        use twice, unless it is beyond doubt: then it is where the fit can begin.
+        It is the most probable by all that is known. Sand and residues are not known to the fit: where they say the same,
+        theirs is the confidence. What the frequencies alone say the fit finds out by itself, and would use twice, unless
+        it is beyond doubt: then it is where the fit can begin.
         """
-        for found, least in ((self.by_evidence[peak], _STATED), (self.probabilities[peak], _BEYOND_DOUBT)):
-            name, share = next(iter(found.items()), ("", 0.0))
-            if name.startswith("(") and share >= least:
-                return name, share
-        return None
+        name, share = next(iter(self.probabilities[peak].items()), ("", 0.0))
+        other, by_evidence = next(iter(self.by_evidence[peak].items()), ("", 0.0))
+        if share < _STATED or not name.startswith("("):
+            return None
+        if name == other and by_evidence >= _STATED:
+            return name, by_evidence
+        return (name, share) if share >= _BEYOND_DOUBT else None
 
 
 def label_peaks(

@@ -1,0 +1,25 @@
+"""Which label of a picked peak a card states, and how sure it is said to be."""
+
+import pytest
+
+from bayesplate.workflow.pick_labels import Labels
+
+CASES = {
+    "both say the same: the confidence is that of sand and residues": (
+        {"(3,1)": 0.999, "(2,2)": 0.001}, {"(3,1)": 0.6, "(2,2)": 0.4}, ("(3,1)", 0.6),
+    ),
+    "sand and residues tell nothing: beyond doubt by its frequency": ({"(3,1)": 0.995}, {}, ("(3,1)", 0.995)),
+    "they tell nothing, and its frequency leaves some doubt": ({"(3,1)": 0.98, "(2,2)": 0.02}, {}, None),
+    "they prefer another, yet all together leave no doubt": (
+        {"(2,2)": 0.999}, {"(3,1)": 0.68, "(2,2)": 0.32}, ("(2,2)", 0.999),
+    ),
+    "they prefer another, and doubt is left": ({"(5,0)": 0.69, "(3,3)": 0.31}, {"(3,3)": 0.9, "(5,0)": 0.1}, None),
+    "they are not sure": ({"(3,1)": 0.9, "(2,2)": 0.1}, {"(3,1)": 0.45, "(2,2)": 0.4}, None),
+    "rather no mode": ({"(1,2)": 0.35}, {"(1,2)": 0.73}, None),
+    "a mode of no clear name": ({"mode 7": 1.0}, {}, None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("by_all", "by_evidence", "expected"), CASES.values(), ids=CASES)
+def test_the_label_stated_is_never_another_than_the_most_probable(by_all, by_evidence, expected):
+    assert Labels((by_all,), (by_evidence,), None).stated(0) == expected
