@@ -27,6 +27,7 @@ from calibration.records import Record, add_to, read_done
 from calibration.sbc import Design, identity, simulate_one
 from calibration.table import MUTANTS, NOT_COUNTED, family_p_value, is_calibrated, is_caught, rows, text
 
+FEWEST_OF_MUTANT = 60
 TITLE = "Calibration of the posterior"
 SECTIONS = {
     "ranks": (
@@ -112,16 +113,17 @@ def run(
     Without workers nothing is done, and those that were done before are returned.
     """
     records = read_done(out, identity(design))
-    done = {(r["simulation"], "refused" in r) for r in records}
-    open_ones = [
-        (i, i < n_mutants)
-        for i in range(n_simulations)
-        if (i, True) not in done and ((i, False) not in done or i < n_mutants)
-    ]
-    jobs = [(design, i, FITTED if mutants else ()) for i, mutants in open_ones if workers]
-    records += add_to(out, simulate_one, jobs, workers, quiet=quiet) if jobs else []
+    done = {r["simulation"]: {*r.get("ranks", FITTED), *r.get("refused", ())} for r in records}
+    wanted = [(i, fitted_mutants(i, n_mutants)) for i in range(n_simulations)]
+    jobs = [(design, i, names) for i, names in wanted if i not in done or not done[i].issuperset(names)]
+    records += add_to(out, simulate_one, jobs, workers, quiet=quiet) if jobs and workers else []
     latest = {record["simulation"]: record for record in records if record["simulation"] < n_simulations}
     return [latest[i] for i in sorted(latest)]
+
+
+def fitted_mutants(index: int, n_mutants: int) -> tuple[str, ...]:
+    """The mutants that are fitted in a simulation: each in no more than it takes to find it out."""
+    return tuple(name for name in FITTED if index < min(n_mutants, max(MUTANTS[name], FEWEST_OF_MUTANT)))
 
 
 def judge(records: list[dict[str, Any]], wanted: Mapping[str, int] = MUTANTS) -> tuple[list[str], bool]:
