@@ -10,7 +10,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
 .PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings sand measured bars coverage trial \
-	benchmarks peers
+	benchmarks peers batch
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -66,6 +66,9 @@ coverage: $(VENV)/tested-with
 
 benchmarks: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/run.py --publish docs/validation --repeats 3
+
+batch: $(VENV)/tested-with
+	$(BIN)/python tests/benchmarks/batch.py --boards 10 200 --workers 1 2 --dask --many 10000 --out results/batch.jsonl --publish docs/validation
 
 peers: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/peers/run.py --publish docs/validation --environments build/peers

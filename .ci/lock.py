@@ -2,8 +2,7 @@
 
     python .ci/lock.py > requirements.lock
 
-What pyproject.toml asks for, its extras and groups included, and what those ask for in turn, as far as it is installed:
-the extras for a cluster and for Parquet are not needed by the tests.
+What pyproject.toml asks for, its extras and groups included, and what those ask for in turn.
 """
 
 from __future__ import annotations
@@ -18,8 +17,6 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
-LEFT_OUT = ("dask", "parquet")
-"""Extras that the tested environment need not have."""
 
 
 def wanted(project: Path = PROJECT) -> list[Requirement]:
@@ -29,7 +26,7 @@ def wanted(project: Path = PROJECT) -> list[Requirement]:
     groups = told["dependency-groups"].values()
     texts = [
         *told["project"]["dependencies"],
-        *(one for name, extra in extras.items() if name not in LEFT_OUT for one in extra),
+        *(one for extra in extras.values() for one in extra),
         *(one for group in groups for one in group if isinstance(one, str)),
     ]
     return [Requirement(text) for text in texts]

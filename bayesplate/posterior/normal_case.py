@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 _STEP = 1e-4
 _PRIOR_STEP = 1e-3
-_GRID_SDS, _N_GRID = 8.0, 401
+_GRID_SDS, _N_GRID = 8.0, 201
 _N_SWEEPS = 8
 _EDGE = 1e-12
 
@@ -183,12 +183,14 @@ class NormalCase:
         own = self.setup == setup
         squares = (self.misfit[own] - self._away(theta) @ self.slopes[own].T) ** 2
         variance = np.exp(2.0 * grid)[:, None] + self.own_variance[own]
-        log_density = -0.5 * (squares @ (1.0 / variance).T + np.log(variance).sum(axis=1))
-        log_density += noise.log_density_of_log(grid)
-        density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
-        below = np.zeros_like(density)
-        np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]), axis=1, out=below[:, 1:])
-        return grid, below / below[:, -1:]
+        density = squares @ (-0.5 / variance).T
+        density += noise.log_density_of_log(grid) - 0.5 * np.log(variance).sum(axis=1)
+        density -= density.max(axis=1, keepdims=True)
+        np.exp(density, out=density)
+        below = np.cumsum(density, axis=1)
+        below -= 0.5 * (density + density[:, :1])  # trapezoids
+        below /= below[:, -1:]
+        return grid, below
 
 
 def _derivatives(function: Callable[[Floats], Floats], n: int) -> tuple[Floats, Floats]:

@@ -62,9 +62,9 @@ class Labels:
     def stated(self, peak: int) -> tuple[str, float] | None:
         """The label that a card may state, and the confidence in it; None where it is left to the fit.
 
-        It is the most probable by all that is known. Sand and residues are not known to the fit: where they say the same,
-        theirs is the confidence. What the frequencies alone say the fit finds out by itself, and would use twice, unless
-        it is beyond doubt: then it is where the fit can begin.
+        It is the most probable by all that is known. Sand and residues are not known to the fit: where they say the
+        same, theirs is the confidence. What the frequencies alone say the fit finds out by itself, and would use twice,
+        unless it is beyond doubt: then it is where the fit can begin.
         """
         name, share = next(iter(self.probabilities[peak].items()), ("", 0.0))
         other, by_evidence = next(iter(self.by_evidence[peak].items()), ("", 0.0))

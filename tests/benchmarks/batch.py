@@ -1,13 +1,14 @@
-"""Time and memory of many boards: `python tests/benchmarks/batch.py --boards 10 200 --workers 1 2 [--dask]`.
+"""Time and memory of many boards: `python tests/benchmarks/batch.py --out results/batch.jsonl [--publish FOLDER]`.
 
 Each run is a process of its own over simulated cards; what it and its workers take of processor time and memory is read
 from the system while they run (Linux). Ratios of runs stand beside the limit; the load of the machine is stated, for a
-wall time says nothing without it.
+wall time says nothing without it. A run that is in the file already is not made again.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import subprocess
@@ -20,17 +21,32 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.ratios import Ratio
+from benchmarks.run import machine
 
 DESIGN = "cantilever-6"
+WAYS = {"1": "one worker", "2": "two workers", "dask-2": "a Dask cluster of two processes"}
+SPEED = {"2": 1.8, "dask-2": 1.5}
+"""How much faster than one worker each way has to be; twice would be ideal."""
+FEWEST_FOR_SPEED = 200
+"""Boards from which on the time counts: with fewer, starting a worker is a part of it."""
+MOST_OVER_LINEAR, MOST_MEMORY = 1.2, 1.1
+HEAD = """# Many boards
+
+Written by `make batch`; do not edit. Simulated cards of one design with constants of their own, six readings each,
+through `bayesplate batch`, with the libraries' threads switched off. Two workers can be twice as fast at best.
+"""
 _TICKS = os.sysconf("SC_CLK_TCK")
 _MEGABYTE = 1e6
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One run: boards, workers, seconds by the clock, processor seconds of all, peak megabytes, load before it."""
+    """One run: boards, workers, seconds by the clock, processor seconds of all, peak megabytes, load before it, and the
+    digest of its table.
+    """
 
     boards: int
     workers: str
@@ -40,6 +56,7 @@ class Measured:
     peak_parent: float
     peak_worker: float
     load: float
+    table: str
 
 
 def write_cards(folder: Path, n: int, seed: int = 3) -> Path:
@@ -81,6 +98,7 @@ def measured(cards: Path, out: Path, workers: Sequence[str], told: str) -> Measu
         peak_parent=ended[2].ru_maxrss * 1024 / _MEGABYTE,
         peak_worker=max((peak[pid] for pid in others), default=0.0) / _MEGABYTE,
         load=load,
+        table=hashlib.sha256((out / "boards.csv").read_bytes()).hexdigest()[:16],
     )
 
 
@@ -103,34 +121,87 @@ def _descendants(ancestor: int) -> Iterator[tuple[int, float, float]]:
 
 
 def main() -> None:
-    """Measure, print as it comes, and write JSON if asked to."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--boards", type=int, nargs="+", default=[10, 40])
+    """Measure what is not measured yet, print it as it comes, and write the page if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--boards", type=int, nargs="+", default=[10, 200])
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--dask", action="store_true", help="a cluster of two processes as well")
-    parser.add_argument("--out", type=Path, help="write JSON to this file too")
+    parser.add_argument("--many", type=int, help="so many boards as well, by the largest number of workers alone")
+    parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
+    parser.add_argument("--publish", type=Path, help="folder of the page")
     arguments = parser.parse_args()
-    rows = []
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for n in arguments.boards:
-            cards = write_cards(folder / f"cards-{n}", n)
-            for told, options in _ways(arguments.workers, dask=arguments.dask):
-                with options as given:
-                    row = measured(cards, folder / f"out-{n}-{told}", given, told)
-                rows.append(row)
-                print(
-                    f"{row.boards:>6} boards, {row.workers:>7}: {row.seconds:8.1f} s, processor {row.cpu_parent:.1f} s "
-                    f"here and {row.cpu_workers:.1f} s in workers, peak {row.peak_parent:.0f} MB here and "
-                    f"{row.peak_worker:.0f} MB in a worker, load before {row.load:.1f}",
-                    flush=True,
-                )
-            tables = {
-                (folder / f"out-{n}-{row.workers}" / "boards.csv").read_bytes() for row in rows if row.boards == n
-            }
-            print(f"{n:>6} boards: {'the same table' if len(tables) == 1 else 'DIFFERENT TABLES'}")
-    if arguments.out is not None:
-        arguments.out.write_text(json.dumps([asdict(row) for row in rows], indent=2) + "\n", encoding="utf-8")
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    rows = [Measured(**json.loads(line)) for line in _lines(arguments.out)]
+    wanted = [(n, way) for n in arguments.boards for way in _ways(arguments.workers, dask=arguments.dask)]
+    if arguments.many:
+        wanted += [(arguments.many, way) for way in _ways([max(arguments.workers)], dask=False)]
+    for n, (told, options) in wanted:
+        row = next((row for row in rows if (row.boards, row.workers) == (n, told)), None)
+        if row is None:
+            with tempfile.TemporaryDirectory() as name, options as given:
+                row = measured(write_cards(Path(name) / "cards", n), Path(name) / "out", given, told)
+            rows.append(row)
+            with arguments.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(row)) + "\n")
+        print(
+            f"{row.boards:>6} boards, {row.workers:>7}: {row.seconds:8.1f} s, processor {row.cpu_parent:.1f} s "
+            f"here and {row.cpu_workers:.1f} s in workers, peak {row.peak_parent:.0f} MB here and "
+            f"{row.peak_worker:.0f} MB in a worker, load before {row.load:.1f}",
+            flush=True,
+        )
+    for ratio in ratios(rows):
+        print(ratio.row)
+    if arguments.publish is not None:
+        arguments.publish.mkdir(parents=True, exist_ok=True)
+        (arguments.publish / "batch.md").write_text(page(rows), encoding="utf-8")
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+
+
+def ratios(rows: Sequence[Measured]) -> Iterator[Ratio]:
+    """What is asked of the runs, as far as they were made: each ratio with its limit."""
+    by_way = {(row.boards, row.workers): row for row in rows}
+    counts = sorted({row.boards for row in rows})
+    for n in counts:
+        for told, limit in SPEED.items():
+            if n >= FEWEST_FOR_SPEED and {(n, "1"), (n, told)} <= set(by_way):
+                faster = by_way[n, "1"].seconds / by_way[n, told].seconds
+                yield Ratio(f"speed beside one worker, {n:,} boards, {WAYS[told]}", faster, limit, at_least=True)
+    for told in WAYS:
+        own = [by_way[n, told] for n in counts if (n, told) in by_way]
+        if len(own) < 2:
+            continue
+        few, many = own[0], own[-1]
+        for what, attribute in (("the command", "peak_parent"), ("a worker", "peak_worker")):
+            named = f"memory of {what}, {many.boards:,} boards beside {few.boards:,}, {WAYS[told]}"
+            yield Ratio(named, getattr(many, attribute) / getattr(few, attribute), MOST_MEMORY, at_least=False)
+        few = next(row for row in own if row.boards >= FEWEST_FOR_SPEED or row is many)
+        if few is not many:
+            named = f"time of a board, {many.boards:,} boards beside {few.boards:,}, {WAYS[told]}"
+            per_board = (many.seconds / many.boards) / (few.seconds / few.boards)
+            yield Ratio(named, per_board, MOST_OVER_LINEAR, at_least=False)
+    for n in counts:
+        own = [row.table for row in rows if row.boards == n]
+        if len(own) > 1:
+            yield Ratio(
+                f"different tables of {n:,} boards, computed in {len(own)} ways", len(set(own)), 1.0, at_least=False
+            )
+
+
+def page(rows: Sequence[Measured]) -> str:
+    """The page of the runs and their ratios."""
+    lines = [HEAD, "| what | ratio | limit | |", "|---|---:|---:|---|", *(ratio.row for ratio in ratios(rows)), ""]
+    lines += ["| boards | computed by | s | s per board | processor, s | memory, MB | of a worker, MB | load before |"]
+    lines += ["|---:|---|---:|---:|---:|---:|---:|---:|"]
+    for row in sorted(rows, key=lambda row: (row.boards, row.workers)):
+        lines.append(
+            f"| {row.boards:,} | {WAYS[row.workers]} | {row.seconds:.1f} | {row.seconds / row.boards:.2f} | "
+            f"{row.cpu_parent + row.cpu_workers:.0f} | {row.peak_parent:.0f} | {row.peak_worker:.0f} | {row.load:.1f} |"
+        )
+    about = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in machine().items() if key != "load_average")
+    return "\n".join([*lines, "", f"Measured with {about}.", ""])
 
 
 def _ways(workers: Sequence[int], *, dask: bool):

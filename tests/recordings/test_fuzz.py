@@ -158,7 +158,8 @@ def flac() -> bytes:
     """A short FLAC file."""
     import io
 
-    soundfile = pytest.importorskip("soundfile", reason="the extra bayesplate[recordings] is not installed")
+    import soundfile
+
     stream = io.BytesIO()
     soundfile.write(stream, 0.5 * RING, RATE, format="FLAC", subtype="PCM_16")
     return stream.getvalue()

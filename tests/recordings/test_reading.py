@@ -190,7 +190,8 @@ def test_the_extra_is_named_where_it_is_missing(tmp_path, monkeypatch, ending, l
 
 
 def test_flac_is_read(tmp_path):
-    soundfile = pytest.importorskip("soundfile", reason="the extra bayesplate[recordings] is not installed")
+    import soundfile
+
     soundfile.write(tmp_path / "a.flac", 0.5 * RING, RATE, subtype="PCM_24")
 
     one = only(tmp_path / "a.flac")
@@ -201,7 +202,8 @@ def test_flac_is_read(tmp_path):
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_uff_is_read_in_time_and_frequency(tmp_path):
     """Binary data sets, 58b; the library leaves the files open that it writes."""
-    pyuff = pytest.importorskip("pyuff", reason="the extra bayesplate[recordings] is not installed")
+    import pyuff
+
     hertz = np.arange(200) * 0.5
     common = {"rsp_node": 1, "rsp_dir": 3, "ref_node": 1, "ref_dir": 3, "binary": 1, "return_full_dict": True}
     common |= {"abscissa_spacing": 1, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13}

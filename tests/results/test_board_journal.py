@@ -82,7 +82,8 @@ def test_a_cell_that_a_sheet_would_execute_is_a_text(tmp_path):
 
 
 def test_a_table_in_parquet_has_the_same_cells(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: pip install bayesplate[parquet]")
+    from pyarrow import parquet
+
     rows = [ROW, REFUSED] * 700
     found = parquet.read_table(write_table(tmp_path, "parquet", rows))
 

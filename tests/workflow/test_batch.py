@@ -210,8 +210,9 @@ def test_killed_at_a_random_moment_and_resumed_the_table_is_the_same(cards, two,
 
 
 def test_a_cluster_of_two_processes_gives_the_same_bytes(cards, two, tmp_path):
-    distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install 'bayesplate[dask]'")
     import warnings
+
+    import distributed
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the cluster's own libraries
@@ -305,12 +306,13 @@ def test_bad_rows_are_rows_of_the_table_and_no_name_leaves_the_folder(table, tmp
 
 def test_a_table_in_parquet_says_the_same(table, tmp_path):
     """Numbers as numbers, nothing where there is nothing."""
-    reason = "pyarrow is not installed: pip install 'bayesplate[parquet]'"
-    arrow, parquet = (pytest.importorskip(name, reason=reason) for name in ("pyarrow", "pyarrow.parquet"))
+    import pyarrow
+    from pyarrow import parquet
+
     rows = list(csv.DictReader(io.StringIO(TABLE)))[:2]
     columns = {name: [row[name] for row in rows] for name in rows[0]}
     hertz = {name: [float(one) if one else None for one in columns[name]] for name in columns if "(" in name}
-    parquet.write_table(arrow.table(columns | hertz), tmp_path / "tops.parquet")
+    parquet.write_table(pyarrow.table(columns | hertz), tmp_path / "tops.parquet")
     texts = []
     for file in ("tops.csv", "tops.parquet"):
         boards = boards_of(tmp_path / file, tmp_path / "template.toml")
