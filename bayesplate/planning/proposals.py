@@ -145,8 +145,20 @@ def proposals(
     -------
     tuple of Proposal
     """
-    listed = [*_of_modes(beliefs, values, costs, goal, rng, found, prior), *_of_sizes(beliefs, costs, rng, found)]
-    return _ranked(listed, goal)
+    return _ranked(every_proposal(beliefs, values, costs, goal, rng, found, prior), goal)
+
+
+def every_proposal(
+    beliefs: Beliefs,
+    values: Values,
+    costs: Costs,
+    goal: str | None,
+    rng: np.random.Generator,
+    found: Found | None = None,
+    prior: PriorCard | None = None,
+) -> tuple[Proposal, ...]:
+    """The same in no order, and with what gives nothing; parameters as of `proposals`."""
+    return (*_of_modes(beliefs, values, costs, goal, rng, found, prior), *_of_sizes(beliefs, costs, rng, found))
 
 
 def _ranked(listed: Sequence[Proposal], goal: str | None) -> tuple[Proposal, ...]:

@@ -4,8 +4,9 @@ A board is asked about two effects of the library, no effect being the third pos
 beforehand. Which of them is true, the effect's size and the noise are drawn from the very priors of the search, and the
 generator, another discretisation, makes the frequencies; boards on which not just two explanations survive, the truth
 among them, are passed over. Then
-three things are measured, each by the generator: the plan's first proposal, one drawn at random from its list, and the
-next three modes up. Explanations are settled where the true one is left alone: ten times as probable as the other.
+four things are measured, each by the generator: the plan's first proposal; one drawn at random from all that could be
+measured, its modes at random too; a line of the plan's own list at random, whose modes are chosen already; and the next
+three modes up. Explanations are settled where the true one is left alone: ten times as probable as the other.
 """
 
 from __future__ import annotations
@@ -29,17 +30,17 @@ from generator.recipes import RECIPES
 from trial.cells import KINDS, SENSORS, UNKNOWN
 from trial.shared import baseline_of_card, median_baseline, shared_law
 
-from bayesplate.cards import load_prior
+from bayesplate.cards import PriorCard, load_prior
 from bayesplate.diagnosis.decision.verdict import WITHIN
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.errors import BayesplateError
 from bayesplate.planning.beliefs import Beliefs
-from bayesplate.planning.drawn_up import drawn_up
+from bayesplate.planning.drawn_up import DrawnUp, drawn_up
 from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
 from bayesplate.planning.looks import LOOKS
-from bayesplate.planning.proposals import EXPLANATIONS, Proposal
+from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, every_proposal
 from bayesplate.planning.stations import known_mass
 from bayesplate.planning.survivors import survivors
 from bayesplate.plate.board import Board
@@ -63,7 +64,9 @@ ASKED = {
 NEXT = 3
 _MOST_BOARDS = 60
 _SEARCHED = 34
-WAYS = ("first", "random", "next")
+WAYS = ("first", "random", "listed", "next")
+CALIBRATED = ("first", "random", "listed")
+"""Ways whose expected drops are compared with the realised ones."""
 EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 1.01)
 """Of bins of the expected drop, as a share of the entropy."""
 
@@ -182,7 +185,8 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     listed = plan.proposals
     chosen = {
         "first": listed[0],
-        "random": listed[int(rng.integers(len(listed)))],
+        "random": _at_random(plan, asked.found, prior, rng),
+        "listed": listed[int(rng.integers(len(listed)))],
         "next": _next_up(plan.beliefs, listed, rng),
     }
     names = [list(one.members) for one in plan.beliefs.explanations]
@@ -201,6 +205,18 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
             "true": round(own, 5),
         }
     return record
+
+
+def _at_random(plan: DrawnUp, found: Found, prior: PriorCard, rng: np.random.Generator) -> Proposal:
+    """One of all the things that could be measured; where modes are chosen for it, others in their place."""
+    every = every_proposal(plan.beliefs, plan.values, Costs(), EXPLANATIONS, rng, found, prior)
+    one = every[int(rng.integers(len(every)))]
+    if one.what != "modes" or one.further is None:
+        return one
+    rows = sorted(rng.choice(one.further.n, size=len(one.rows), replace=False).tolist())
+    readings = one.further.some(rows)
+    gain = expected_gain(plan.beliefs, readings, rng)
+    return replace(one, readings=readings, rows=tuple(one.every_row[i] for i in rows), gain=gain)
 
 
 def _next_up(beliefs: Beliefs, listed: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
@@ -289,7 +305,7 @@ def calibration(records: Sequence[Record]) -> list[Record]:
     for record in judged(records):
         before = np.array(record["before"])
         whole = float(-(before * np.log(before)).sum())
-        rows += [(one["expected"] / whole, one["realised"] / whole) for one in (record["first"], record["random"])]
+        rows += [(one["expected"] / whole, one["realised"] / whole) for one in (record[way] for way in CALIBRATED)]
     pairs = np.array(rows)
     table = []
     for low, high in pairwise(EDGES):

@@ -1,8 +1,9 @@
 """Calibrate plans: `python tests/calibration/run_plans.py --boards 200 --workers 2 --out results/plans.jsonl`.
 
-Prints how often the first proposal of a plan settles which of two explanations is true, beside a random proposal and
-the next modes up, and whether expected gains are realised. Exit code 0: every bar met; 1: some are missed, and stay
-there as missed; 2: usage. A run that was interrupted goes on where it stopped if it is given the same file.
+Prints how often the first proposal of a plan settles which of two explanations is true, beside a random proposal, a
+random line of the plan and the next modes up, and whether expected gains are realised. Exit code 0: every bar met; 1:
+some are missed, and stay there as missed; 2: usage. A run that was interrupted goes on where it stopped if it is given
+the same file.
 """
 
 from __future__ import annotations
@@ -38,14 +39,19 @@ from calibration.records import Record, add_to, publish, read_done
 
 SEED = 2
 """Boards of seed 1 were looked at while the trial was written."""
-_WORDS = {"first": "the plan's first proposal", "random": "a random proposal", "next": f"the next {NEXT} modes up"}
+_WORDS = {
+    "first": "the plan's first proposal",
+    "random": "a random proposal",
+    "listed": "a random line of the plan",
+    "next": f"the next {NEXT} modes up",
+}
 
 
 def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
     """Do what is not done yet, and return the records of all boards asked for, in their order."""
     asked = {design: list(effects) for design, effects in ASKED.items()}
     identity = {
-        "format": 1, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
+        "format": 2, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
     }  # fmt: skip
     records = read_done(out, identity)
     done = {record["simulation"] for record in records}
@@ -79,7 +85,7 @@ def told(records: Sequence[Record]) -> list[str]:
             lines.append(f"  {_WORDS[way]:34s} {share:6.1f} % {100.0 * false / len(some):6.1f} % {minutes:4.0f}")
         lines.append("")
     lines += ["what the plan puts first: " + _counted(every, "first"), ""]
-    lines += ["drop of the doubt, share of the entropy: first and random proposals", "  expected  realised"]
+    lines += ["drop of the doubt, share of the entropy: first and random proposals and lines", "  expected  realised"]
     lines += [f"  {row['expected']:8.3f}  {row['realised']:8.3f} +- {row['sd']:.3f}  n = {row['n']}"
               for row in calibration(records)]  # fmt: skip
     lines += ["", *(f"{'met   ' if met else 'MISSED'} {bar}" for bar, met in bars(records).items())]
@@ -106,8 +112,10 @@ def draw(records: Sequence[Record], path: Path) -> None:
     left.set(xlabel="expected drop of the doubt", ylabel="realised drop", xlim=(0, 1), ylim=(-0.1, 1.05))
     left.set_title("Expected and realised, two standard errors", fontsize=9)
     found = shares(records)
-    right.bar(range(len(WAYS)), [100 * found[way] for way in WAYS], color=["#0072B2", "0.7", "#E69F00"])
-    right.set_xticks(range(len(WAYS)), ["plan's\nfirst", "random\nproposal", "next\nmodes up"])
+    right.bar(range(len(WAYS)), [100 * found[way] for way in WAYS], color=["#0072B2", "0.7", "0.5", "#E69F00"])
+    right.set_xticks(
+        range(len(WAYS)), ["plan's\nfirst", "random\nproposal", "random line\nof the plan", "next\nmodes up"]
+    )
     right.set(ylabel="boards settled, %", ylim=(0, 100))
     right.set_title("Which explanation is true, settled", fontsize=9)
     figure.savefig(path, dpi=150, metadata={"Software": None})

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calibration.plans import bars, calibration, is_calibrated, settled, wrongly
+from calibration.plans import WAYS, bars, calibration, is_calibrated, settled, wrongly
 
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
@@ -52,7 +52,7 @@ def record(rng, index, true_noise):
     }
     return {
         "simulation": index, "boards": 1, "explanations": [[], ["made"]], "before": list(beliefs.probabilities),
-        "first": told, "random": told, "next": told,
+        "first": told, "random": told, "listed": told, "next": told,
     }  # fmt: skip
 
 
@@ -80,7 +80,7 @@ def test_those_of_a_noise_taken_for_a_quarter_of_what_it_is_do_not():
 
 def made(first, random, following):
     """A record by what is left for the truth."""
-    ways = zip(("first", "random", "next"), (first, random, following), strict=True)
+    ways = zip(WAYS, (first, random, random, following), strict=True)
     return {"before": [0.5, 0.5], **{way: {"true": p, "expected": 0.3, "realised": 0.3} for way, p in ways}}
 
 
