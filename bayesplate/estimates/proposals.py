@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from bayesplate.cards import MISSED, SPURIOUS, PriorCard
+from bayesplate.cards import PriorCard
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
@@ -98,7 +98,7 @@ def proposals(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[
         estimate = weighted_least_squares(labelled, _MOST_STEPS)
         modes = _modes_at(labelled, estimate, max(setup.unlabelled))
         weighed[labels] = _log_weight(labelled, estimate, labels, modes, prior), _labelled(board, setup, labels)
-        better = _assign(np.log(np.sort(setup.unlabelled)), modes, np.maximum(2.0 * estimate.scales.max(), 0.01))
+        better = _assign(setup, modes, np.maximum(2.0 * estimate.scales.max(), 0.01))
         if better not in weighed and len(weighed) + len(waiting) < _MOST_FITTED:
             waiting.append(better)
     if not weighed:
@@ -143,7 +143,7 @@ def _rough_assignments(board: Board, setup: Setup, prior: PriorCard, rng: np.ran
     shifts = np.concatenate([peaks[0] - modes[:, first] for first in range(_N_FIRST)])
     rows = np.tile(np.arange(len(modes)), _N_FIRST)
     for _ in range(2):  # the second time about the mean of what the first assigned
-        cost, picked = _align(peaks, modes[rows] + shifts[:, None], _ROUGH_SD)
+        cost, picked = _align(setup, peaks, modes[rows] + shifts[:, None], _ROUGH_SD)
         gaps = np.where(picked >= 0, peaks - np.take_along_axis(modes[rows], np.maximum(picked, 0), axis=1), np.nan)
         shifts = np.nansum(gaps, axis=1) / np.maximum(np.sum(picked >= 0, axis=1), 1)
     cost += _prior_cost(prior, {name: v[possible][rows] for name, v in values.items() if np.ndim(v)}, shifts)
@@ -167,11 +167,13 @@ def _prior_cost(prior: PriorCard, values: dict[str, Floats], shifts: Floats) -> 
     )
 
 
-def _align(peaks: Floats, modes: Floats, sd: float) -> tuple[Floats, NDArray[np.intp]]:
+def _align(setup: Setup, peaks: Floats, modes: Floats, sd: float) -> tuple[Floats, NDArray[np.intp]]:
     """Cheapest assignment of peaks to modes that keeps their order: cost and the mode of each peak, -1 for none.
 
     Parameters
     ----------
+    setup : Setup
+        With the probabilities of a missed mode and of a peak that is none.
     peaks : (n_peaks,) array
         ln f, ascending.
     modes : (n_draws, n_modes) array
@@ -186,7 +188,7 @@ def _align(peaks: Floats, modes: Floats, sd: float) -> tuple[Floats, NDArray[np.
     picked : (n_draws, n_peaks) array of int
     """
     n_draws, n_modes = modes.shape
-    miss, seen, stray = -np.log(MISSED), -np.log(1.0 - MISSED), -np.log(SPURIOUS)
+    miss, seen, stray = -np.log(setup.missed), -np.log(1.0 - setup.missed), -np.log(setup.spurious)
     seen += np.log(sd * np.sqrt(2.0 * np.pi))
     cost = np.full((peaks.size + 1, n_modes + 1, n_draws), _NEVER)
     came = np.zeros((peaks.size + 1, n_modes + 1, n_draws), dtype=np.int8)
@@ -233,9 +235,9 @@ def _on_card(label: Label | None) -> Label | None:
     return label if label is not None and max(label) <= HIGHEST_INDEX else None
 
 
-def _assign(peaks: Floats, modes: Named, sd: float) -> Assignment:
+def _assign(setup: Setup, modes: Named, sd: float) -> Assignment:
     """Labels of the peaks by the modes at an estimate."""
-    _, picked = _align(peaks, np.array([[log for log, _ in modes]]), sd)
+    _, picked = _align(setup, np.log(np.sort(setup.unlabelled)), np.array([[log for log, _ in modes]]), sd)
     return tuple(modes[j][1] if j >= 0 else None for j in picked[0])
 
 
@@ -254,6 +256,6 @@ def _log_weight(board: Board, estimate: Estimate, labels: Assignment, modes: Nam
     elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     by_name = dict(values) | elastic._asdict()
     density = sum(float(one.log_density_of_log(np.log(by_name[name]))) for name, one in prior.constants.items())
-    seen = n_missed * np.log(MISSED) + n_seen * np.log(1.0 - MISSED) + n_stray * np.log(SPURIOUS)
+    seen = n_missed * np.log(setup.missed) + n_seen * np.log(1.0 - setup.missed) + n_stray * np.log(setup.spurious)
     usual = 0.0 if 1.0 <= elastic.E_x / elastic.E_y <= MOST_ORTHOTROPIC else np.log(UNUSUAL)
     return float(logsumexp(by_noise) + density + seen + usual)

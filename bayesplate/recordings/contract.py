@@ -11,6 +11,7 @@ from bayesplate.recordings.spectra import Spectra
 LEAST_LABEL = 0.005
 """Probability below which a label is not listed."""
 MOST_LABELS = 4
+_LEAST_SPURIOUS, _MOST_SPURIOUS = 0.002, 0.5
 
 
 @dataclass(frozen=True)
@@ -148,6 +149,11 @@ def rows(
         )
         for number, mode in enumerate(picked.modes)
     )
+
+
+def spurious_share(spurious: Sequence[float]) -> float:
+    """Probability that any of some peaks is no mode, as a card states it, from that of each."""
+    return min(max(sum(spurious) / max(len(spurious), 1), _LEAST_SPURIOUS), _MOST_SPURIOUS)
 
 
 def sign_of(spectra: Spectra, mode: PickedMode, flips: bool | None) -> str:

@@ -20,7 +20,7 @@ from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
-from bayesplate.recordings.contract import sign_of
+from bayesplate.recordings.contract import sign_of, spurious_share
 
 if TYPE_CHECKING:
     from bayesplate.estimates.proposals import Proposal
@@ -41,7 +41,8 @@ def bare_board(board: Board, likely: Sequence[PickedMode], picked: Picked, flips
     peaks = tuple(
         Peak(Quantity.from_mean(one.frequency, one.sd), sign_of(picked.spectra, one, flips)) for one in likely
     )
-    return replace(board, setups=(replace(setup, readings=(), peaks=peaks),))
+    spurious = spurious_share([one.spurious for one in likely])
+    return replace(board, setups=(replace(setup, readings=(), peaks=peaks, spurious=spurious),))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from bayesplate.cards.writing import array, number, table, text
-from bayesplate.recordings.contract import PickedRow
+from bayesplate.recordings.contract import PickedRow, spurious_share
 
 if TYPE_CHECKING:
     from bayesplate.recordings.signals import Place
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 _MILLI = 1e-3
 _LEAST_SD = 1e-5
 """Of a frequency, relative: no laboratory's clock is better."""
-_LEAST_SPURIOUS, _MOST_SPURIOUS = 0.002, 0.5
 _MOST_SURE = 0.999
 
 
@@ -56,9 +55,9 @@ def fragment_text(
     if name:
         lines.append(f"name = {text(name)}")
     bare = [(i, peak) for i, peak in likely if i not in labelled]
-    doubt = sum(peak.spurious_probability for _, peak in likely) / max(len(likely), 1)
+    doubt = spurious_share([peak.spurious_probability for _, peak in likely])
     if bare:
-        lines.append(f"spurious_probability = {number(round(min(max(doubt, _LEAST_SPURIOUS), _MOST_SPURIOUS), 4))}")
+        lines.append(f"spurious_probability = {number(round(doubt, 4))}")
     named = [(peak, *labelled[i]) for i, peak in likely if i in labelled]
     if named:
         lines += ["", "[setup.frequencies_hz]"]

@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 
 MOST_PROPOSING = 12
 """Lowest peaks whose labels are proposed: higher ones lie where a thin plate is less and less like a real one."""
+SURE, FEWEST_SURE = 0.05, 6
+"""Probability of being no mode below which a peak is taken for one, and how many such peaks are enough to begin."""
 _LEAST_SHARE, _MOST_WAYS = 0.01, 3
 _POLARITY_SURE = float(np.log(20.0))
 _STATED, _BEYOND_DOUBT = 0.5, 0.99
@@ -104,7 +106,7 @@ def label_peaks(
     if len(likely) < FEWEST_PEAKS:
         raise NotIdentifiableError(f"{FEWEST_PEAKS} peaks or more are needed to tell modes by their frequencies")
     unsigned = bare_board(board, likely, picked, None)
-    ways = proposals(bare_board(board, likely[:MOST_PROPOSING], picked, None), prior, np.random.default_rng(0))
+    ways = proposals(bare_board(board, proposing(likely), picked, None), prior, np.random.default_rng(0))
     ways = [way for way in ways if way.probability > _LEAST_SHARE][:_MOST_WAYS]
     if not ways:
         raise NotIdentifiableError("no plate of these sizes and edges has such peaks")
@@ -125,6 +127,12 @@ def label_peaks(
         _add(totals, one.probabilities(own), one.names, share)
         _add(alone, _alone(own, one, likely), one.names, share)
     return Labels(tuple(map(_sorted, totals)), tuple(map(_sorted, alone)), flips)
+
+
+def proposing(likely: Sequence[PickedMode]) -> Sequence[PickedMode]:
+    """The lowest of the peaks that are surely modes, or of all where there are few: one that is none leads astray."""
+    sure = [one for one in likely if one.spurious < SURE]
+    return (sure if len(sure) >= FEWEST_SURE else likely)[:MOST_PROPOSING]
 
 
 def _add(totals: list[dict[str, float]], probabilities: Floats, names: Sequence[str], share: float) -> None:

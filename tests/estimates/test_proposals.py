@@ -13,7 +13,7 @@ import ritz
 from bayesplate.cards import load_prior
 from bayesplate.estimates import proposals as proposed
 from bayesplate.estimates.least_squares import weighted_least_squares
-from bayesplate.estimates.proposals import MISSED, SPURIOUS, UNUSUAL, probabilities, proposals
+from bayesplate.estimates.proposals import UNUSUAL, probabilities, proposals
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
@@ -23,6 +23,8 @@ from bayesplate.quantities import Quantity
 PLATE = ritz.Plate.from_moduli(10e9, 0.8e9, 0.75e9, 0.4, rho=430.0, h=3e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2))
 MISSING = (0, 2)
+MISSED, SPURIOUS = 0.3, 0.1
+"""As a card states them, other than by default."""
 
 
 def board_of(peaks: list[float]) -> Board:
@@ -123,6 +125,7 @@ def cost_of(pairs: list[tuple[int, int]], peaks: np.ndarray, modes: np.ndarray, 
 
 def test_the_cheapest_assignment_is_that_of_enumeration():
     rng = np.random.default_rng(2)
+    setup = replace(made_boards.setup_of(ritz.ALL_FREE, {}), missed=MISSED, spurious=SPURIOUS)
     for _ in range(30):
         n_peaks, n_modes, sd = int(rng.integers(1, 5)), 6, 0.05
         peaks, modes = np.sort(rng.uniform(0, 1, n_peaks)), np.sort(rng.uniform(0, 1, n_modes))
@@ -133,10 +136,25 @@ def test_the_cheapest_assignment_is_that_of_enumeration():
             for others in combinations(range(n_modes), k)
         }
         best = min(ways, key=lambda pairs: cost_of(list(pairs), peaks, modes, sd))
-        cost, picked = proposed._align(peaks, modes[None], sd)
+        cost, picked = proposed._align(setup, peaks, modes[None], sd)
 
         assert cost[0] == pytest.approx(cost_of(list(best), peaks, modes, sd))
         assert tuple((i, j) for i, j in enumerate(picked[0]) if j >= 0) == best
+
+
+def test_a_peak_that_is_no_mode_is_left_alone_sooner_where_the_card_expects_such(found):
+    """Weights of the same labels: by the logarithm of the ratio of the stated probabilities for each peak left out."""
+    truth, ways = found
+    labels = (*truth[:-1], None)
+    weights = []
+    for spurious in (0.02, 0.2):
+        setup = replace(ways[0].board.setups[0], spurious=spurious)
+        board = replace(ways[0].board, setups=(setup,))
+        estimate = weighted_least_squares(board)
+        modes = proposed._modes_at(board, estimate, max(setup.measured))
+        weights.append(proposed._log_weight(board, estimate, labels, modes, load_prior("spruce")))
+
+    assert weights[1] - weights[0] == pytest.approx(np.log(10.0))
 
 
 def test_a_peak_takes_along_what_is_known_of_it():

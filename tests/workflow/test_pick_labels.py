@@ -1,8 +1,10 @@
-"""Which label of a picked peak a card states, and how sure it is said to be."""
+"""Which peaks labels are proposed for, which label of a peak a card states, and how sure it is said to be."""
+
+from types import SimpleNamespace
 
 import pytest
 
-from bayesplate.workflow.pick_labels import Labels
+from bayesplate.workflow.pick_labels import FEWEST_SURE, MOST_PROPOSING, SURE, Labels, proposing
 
 CASES = {
     "both say the same: the confidence is that of sand and residues": (
@@ -23,3 +25,21 @@ CASES = {
 @pytest.mark.parametrize(("by_all", "by_evidence", "expected"), CASES.values(), ids=CASES)
 def test_the_label_stated_is_never_another_than_the_most_probable(by_all, by_evidence, expected):
     assert Labels((by_all,), (by_evidence,), None).stated(0) == expected
+
+
+def peaks(*spurious):
+    """Peaks in the order of frequency, by the probability that each is no mode."""
+    return [SimpleNamespace(frequency=50.0 * (i + 1), spurious=one) for i, one in enumerate(spurious)]
+
+
+def test_labels_are_proposed_for_the_lowest_peaks_that_are_sure():
+    """Parts of split peaks and resonances of a support, taken for modes, lead the labels of all others astray."""
+    every = peaks(*([0.0, 0.9 * SURE, SURE, 0.3] * MOST_PROPOSING))
+    assert proposing(every) == [one for one in every if one.spurious < SURE][:MOST_PROPOSING]
+
+
+def test_where_few_peaks_are_sure_all_take_part():
+    few = peaks(*[0.0] * (FEWEST_SURE - 1), 0.2, 0.3)
+    assert proposing(few) == few
+    enough = peaks(*[0.0] * FEWEST_SURE, 0.2)
+    assert proposing(enough) == enough[:-1]

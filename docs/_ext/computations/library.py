@@ -83,6 +83,17 @@ CHECKS = (
         "errors, bias, false and missed modes, and a control that reads the highest line.",
     ),
     (
+        "measured-recordings",
+        "make measured",
+        "Hits and frequency responses of two measured half-tops, against peaks that another method read off: which are "
+        "found, which are new, and which modes of the board those are. The recordings are no part of the project.",
+    ),
+    (
+        "batch",
+        "make batch",
+        "Thousands of simulated boards through `batch`: time and memory by one worker, two, and a Dask cluster.",
+    ),
+    (
         "spectra",
         "make spectra",
         "Simulated free boards with two labels, missed modes and a spurious peak: probabilities of assignments, and "
