@@ -28,7 +28,7 @@ _GAP = 0.30
 _BAND = 0.055
 _AIR = 0.25
 _LONGEST_HEADING = 62
-_MOST_COLUMNS = 4
+_FEWEST_COLUMNS, _MOST_COLUMNS = 2, 4
 _N_COMBINED = 3
 _SAND, _LOW = "black", "0.86"
 
@@ -61,7 +61,7 @@ def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
     width = A4[0] - 2 * _MARGIN
     height = A4[1] - _HEAD - _FOOT - (_BETWEEN if has_combined else 0.0)
     found = []
-    for n_columns in range(3, _MOST_COLUMNS + 1):
+    for n_columns in range(_N_COMBINED if has_combined else _FEWEST_COLUMNS, _MOST_COLUMNS + 1):
         n_rows = -(-n_modes // n_columns)
         cell = width / n_columns, height / (n_rows + has_combined)
         side = min(cell[0] - _GAP, (cell[1] - _CAPTION - _GAP) * aspect_ratio)

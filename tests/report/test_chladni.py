@@ -94,6 +94,14 @@ def test_nothing_overlaps_or_leaves_the_page(aspect_ratio, n_modes):
             assert overlap_x < 0.5 or overlap_y < 0.5
 
 
+def test_few_figures_fill_the_sheet():
+    """Two columns where no mixtures, three in a row, set the width: a sheet for the bench is read from afar."""
+    few, many = (layout(n, 2.2, has_combined=False) for n in (6, 24))
+    assert (few.n_columns, few.n_rows) == (2, 3)
+    assert few.panel[0] > 1.4 * layout(6, 2.2, has_combined=True).panel[0]
+    assert many.panel[0] < few.panel[0]
+
+
 def test_panels_keep_the_boards_proportions():
     for aspect_ratio in (0.4, 1.0, 2.2):
         plan = layout(12, aspect_ratio, has_combined=True)
