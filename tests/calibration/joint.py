@@ -19,9 +19,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from calibration.layouts import LABELS
 from calibration.records import Record
-from calibration.sbc import Design, reference
+from calibration.truths import Design, reference
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -79,7 +78,7 @@ def density(posterior: ByRow, theta: Floats) -> Floats:
 def reference_posterior() -> Posterior:
     """The board of the design under one linear law, with the large noise; its readings are replaced."""
     problem = reference(DESIGN)
-    board = DESIGN.board(dict.fromkeys(LABELS[DESIGN.edges], 1.0), NOISE)
+    board = DESIGN.board(DESIGN.unread, NOISE)
     return Posterior(board, problem.prior, problem.posterior.models, "linear")
 
 

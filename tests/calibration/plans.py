@@ -30,14 +30,14 @@ from generator.recipes import RECIPES
 from trial.cells import KINDS, SENSORS, UNKNOWN
 from trial.shared import baseline_of_card, median_baseline, shared_law
 
-from bayesplate.cards import PriorCard, load_prior
+from bayesplate.cards import load_prior
 from bayesplate.diagnosis.decision.verdict import WITHIN
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.errors import BayesplateError
 from bayesplate.planning.beliefs import Beliefs
-from bayesplate.planning.drawn_up import DrawnUp, drawn_up
+from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
 from bayesplate.planning.looks import LOOKS
 from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, every_proposal
@@ -183,11 +183,12 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     seed = int(rng.integers(2**31))
     plan = drawn_up(asked.found, prior, seed, goal=EXPLANATIONS, with_sequences=False)
     listed = plan.proposals
+    every = every_proposal(plan.beliefs, plan.values, Costs(), EXPLANATIONS, rng, asked.found, prior)
     chosen = {
         "first": listed[0],
-        "random": _at_random(plan, asked.found, prior, rng),
+        "random": _at_random(plan.beliefs, every, rng),
         "listed": listed[int(rng.integers(len(listed)))],
-        "next": _next_up(plan.beliefs, listed, rng),
+        "next": _next_up(plan.beliefs, every, rng),
     }
     names = [list(one.members) for one in plan.beliefs.explanations]
     record: Record = {"explanations": names, "before": [round(float(p), 5) for p in plan.beliefs.probabilities]}
@@ -207,26 +208,27 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     return record
 
 
-def _at_random(plan: DrawnUp, found: Found, prior: PriorCard, rng: np.random.Generator) -> Proposal:
+def _at_random(beliefs: Beliefs, every: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
     """One of all the things that could be measured; where modes are chosen for it, others in their place."""
-    every = every_proposal(plan.beliefs, plan.values, Costs(), EXPLANATIONS, rng, found, prior)
     one = every[int(rng.integers(len(every)))]
     if one.what != "modes" or one.further is None:
         return one
     rows = sorted(rng.choice(one.further.n, size=len(one.rows), replace=False).tolist())
     readings = one.further.some(rows)
-    gain = expected_gain(plan.beliefs, readings, rng)
+    gain = expected_gain(beliefs, readings, rng)
     return replace(one, readings=readings, rows=tuple(one.every_row[i] for i in rows), gain=gain)
 
 
-def _next_up(beliefs: Beliefs, listed: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
+def _next_up(beliefs: Beliefs, every: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
     """The next modes up in the session that goes on, as a proposal."""
-    of_modes = [one for one in listed if one.what == "modes" and one.further is not None]
+    of_modes = [one for one in every if one.what == "modes" and one.further is not None]
+    if not of_modes:
+        raise RuntimeError("no mode is left to be read in the session that goes on")
     best = max(of_modes, key=lambda one: len(one.rows))
     assert best.further is not None
-    every: Readings = best.further
-    rows = list(range(min(NEXT, every.n)))
-    readings = every.some(rows)
+    further: Readings = best.further
+    rows = list(range(min(NEXT, further.n)))
+    readings = further.some(rows)
     first = best.every_row[0]
     kept = tuple(best.every_row[i] for i in rows)
     assert first == min(best.every_row)

@@ -1,9 +1,10 @@
 """Calibrate the inference: `python tests/calibration/run.py --workers 2 --out results/calibration.jsonl`.
 
-Four parts, each with its own file of records beside the one that is named: ranks of the truth among draws over a prior,
-with the mutants that they must find out; draws against closed forms; ranks at the paper's two boards; the joint
-distribution of constants and readings. Prints what each found. Exit code 0: calibrated and every mutant caught; 1: not,
-or not all of it was run; 2: usage. A run that was interrupted goes on where it stopped if it is given the same file.
+Parts, each with its own file of records beside the one that is named: ranks of the truth among draws over a prior, with
+the mutants that they must find out; the same ranks for further models; draws against closed forms; ranks at the paper's
+two boards; the joint distribution of constants and readings. Prints what each found. Exit code 0: calibrated and every
+mutant caught; 1: not, or not all of it was run; 2: usage. A run that was interrupted goes on where it stopped if it is
+given the same file.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from calibration import again, joint, oracle
 from calibration.layouts import EFFECTS
 from calibration.mutants import FITTED
 from calibration.records import Record, add_to, read_done
-from calibration.sbc import Design, identity, simulate_one
+from calibration.sbc import identity, simulate_one
 from calibration.table import MUTANTS, NOT_COUNTED, family_p_value, is_calibrated, is_caught, rows, text
+from calibration.truths import Design
 
 FEWEST_OF_MUTANT = 60
 TITLE = "Calibration of the posterior"
@@ -35,6 +37,18 @@ SECTIONS = {
         "Constants, noise and the size of an effect drawn from their priors, readings from them, and the rank of each "
         "among the draws of the fit; a frequency that was not read and the log likelihood are ranked too. Each mutant "
         "is a wrong posterior that the same bands must find out.",
+    ),
+    "linear": (
+        "Ranks under the linear law",
+        "The same without an effect, readings and fit by one linear law: nothing but the sampler can be wrong.",
+    ),
+    "exact": (
+        "Ranks under the exact law",
+        "The same without an effect.",
+    ),
+    "both": (
+        "Ranks of a joint fit",
+        "One board held free, then clamped at one end: constants in common, noise of each setup its own.",
     ),
     "oracle": (
         "Closed forms",
@@ -89,8 +103,18 @@ class Part:
         return [one for one in found if one is not None]
 
 
-def parts(sets: int, simulations: int, steps: int) -> dict[str, Part]:
-    """The parts beside the ranks, of so many data sets of each kind, simulations at each board, and steps."""
+MODELS = {
+    "linear": Design(law="fixed-linear", resolution=0.0),
+    "exact": Design(),
+    "both": Design(edges="both"),
+}
+"""Models that are ranked without mutants, by the name of their part."""
+
+
+def parts(sets: int, simulations: int, steps: int, ranked: int) -> dict[str, Part]:
+    """The parts beside the ranks with mutants, of so many data sets of each kind, simulations at each board, steps,
+    and simulations of each further model.
+    """
     sets_of = [(kind, i) for i in range(sets) for kind in oracle.KINDS]
     at_boards = [(name, i) for i in range(simulations) for name in again.BOARDS]
     of_sets = [({"kind": kind, "set": i}, (kind, i)) for kind, i in sets_of]
@@ -98,7 +122,11 @@ def parts(sets: int, simulations: int, steps: int) -> dict[str, Part]:
     chains = [
         ({"mutant": mutant, "steps": steps}, (joint.N_CHAINS, steps, 1, mutant)) for mutant in ("", *joint.MUTANTS)
     ]
-    return {
+    models = {
+        name: Part(simulate_one, identity(design), [({"simulation": i}, (design, i)) for i in range(ranked)], ranks_of)
+        for name, design in MODELS.items()
+    }
+    return models | {
         "oracle": Part(oracle.check_one, oracle.identity(), of_sets, oracle.judge),
         "boards": Part(again.simulate_again, again.identity(), of_boards, again.judge),
         "joint": Part(joint.check_one, joint.identity(), chains, joint.judge),
@@ -119,6 +147,11 @@ def run(
     records += add_to(out, simulate_one, jobs, workers, quiet=quiet) if jobs and workers else []
     latest = {record["simulation"]: record for record in records if record["simulation"] < n_simulations}
     return [latest[i] for i in sorted(latest)]
+
+
+def ranks_of(records: Sequence[Record]) -> tuple[list[str], bool]:
+    """Paragraphs on the ranks of simulations, no mutant asked for, and whether all is well."""
+    return judge(list(records), {})
 
 
 def fitted_mutants(index: int, n_mutants: int) -> tuple[str, ...]:
@@ -176,6 +209,7 @@ def main() -> int:
                         help="what is computed; of the others what was done before is told")  # fmt: skip
     parser.add_argument("--simulations", type=int, default=1000, help="of the ranks")
     parser.add_argument("--mutants", type=int, default=1000, help="simulations for which mutants are fitted too")
+    parser.add_argument("--ranked", type=int, default=1000, help="simulations of each further model")
     parser.add_argument("--sets", type=int, default=oracle.N_SETS, help="of each kind of closed form")
     parser.add_argument("--at-boards", type=int, default=again.N_SIMULATIONS, help="simulations at each of two boards")
     parser.add_argument("--steps", type=int, default=joint.N_STEPS, help="of the joint distribution")
@@ -203,7 +237,8 @@ def main() -> int:
         at_work = workers if "ranks" in arguments["parts"] else 0
         found["ranks"], is_right = judge(run(design, arguments["simulations"], arguments["mutants"], at_work, out))
         well &= is_right
-    for name, part in parts(arguments["sets"], arguments["at_boards"], arguments["steps"]).items():
+    counts = (arguments[name] for name in ("sets", "at_boards", "steps", "ranked"))
+    for name, part in parts(*counts).items():
         beside = out.with_name(f"{out.stem}-{name}{out.suffix}")
         records = part.run(beside, workers) if name in arguments["parts"] else part.done(beside)
         if records:

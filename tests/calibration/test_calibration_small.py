@@ -8,20 +8,12 @@ import numpy as np
 import pytest
 import ritz
 from calibration.layouts import EFFECTS, HELD_OUT, LABELS, TWICE
-from calibration.mutants import counted_twice, flipped_sign, half_noise, narrowed
+from calibration.mutants import FITTED, TWICE_COUNTED, counted_twice, flipped_sign, half_noise, narrowed
 from calibration.records import read_done
-from calibration.run import judge, run
-from calibration.sbc import (
-    N_DRAWS,
-    Design,
-    draw_truth,
-    held_out,
-    identity,
-    make_problem,
-    quantities,
-    simulate_one,
-)
+from calibration.run import FEWEST_OF_MUTANT, fitted_mutants, judge, run
+from calibration.sbc import N_DRAWS, held_out, identity, quantities, simulate_one
 from calibration.table import MUTANTS, family_p_value, is_calibrated, is_caught, rows
+from calibration.truths import Design, draw_truth, make_problem
 
 from bayesplate.plate.material import RIGIDITIES
 
@@ -122,11 +114,32 @@ def test_an_interrupted_run_goes_on(small, tmp_path):
     out = tmp_path / "ranks.jsonl"
     lines = [json.dumps(identity(SMALL)), *(json.dumps(record) for record in small)]
     out.write_text("\n".join(lines[:-1]) + "\n" + lines[-1][:40])  # killed while it wrote the last one
-    records = run(SMALL, N_SMALL - 1, N_SMALL - 1, 1, out, quiet=True)
+    records = run(SMALL, N_SMALL - 1, 0, 1, out, quiet=True)
     assert records == small[:-1]  # nothing was left to do
     assert len(out.read_text().splitlines()) == N_SMALL
     _, well = judge(records)
     assert not well  # too few simulations of the mutants to say that they would be caught
+
+
+def test_each_mutant_is_fitted_as_often_as_it_takes():
+    assert fitted_mutants(0, 1000) == FITTED
+    assert fitted_mutants(FEWEST_OF_MUTANT, 1000) == (TWICE_COUNTED,)
+    assert fitted_mutants(999, 1000) == (TWICE_COUNTED,)
+    assert fitted_mutants(1000, 2000) == ()
+    assert fitted_mutants(10, 10) == ()
+    assert max(MUTANTS[name] for name in FITTED if name != TWICE_COUNTED) <= FEWEST_OF_MUTANT
+
+
+def test_a_simulation_without_its_mutants_is_made_again(tmp_path):
+    """The one that has those that are asked for is left as it is."""
+    out = tmp_path / "ranks.jsonl"
+    first = run(SMALL, 1, 0, 1, out, quiet=True)
+    again = run(SMALL, 1, 1, 1, out, quiet=True)
+    assert set(again[0]["ranks"]) - set(first[0]["ranks"]) | set(again[0]["refused"]) == set(FITTED)
+    assert again[0]["ranks"]["production"] == first[0]["ranks"]["production"]
+    before = out.read_text()
+    assert run(SMALL, 1, 1, 1, out, quiet=True) == again
+    assert out.read_text() == before
 
 
 def test_a_file_of_another_design_is_refused(tmp_path):

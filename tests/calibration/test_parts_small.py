@@ -166,4 +166,4 @@ def test_the_page_tells_of_a_part_that_was_not_run():
     assert text.count("Not run with this version.") == len(SECTIONS) - 1
     assert "noise known, 50 data sets: agree" in text
     assert text.index("## Closed forms") < text.index("noise known") < text.index("## At the paper's boards")
-    assert set(parts(1, 1, 1)) == set(SECTIONS) - {"ranks"}
+    assert set(parts(1, 1, 1, 1)) == set(SECTIONS) - {"ranks"}
