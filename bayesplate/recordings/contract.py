@@ -12,6 +12,7 @@ LEAST_LABEL = 0.005
 """Probability below which a label is not listed."""
 MOST_LABELS = 4
 _LEAST_SPURIOUS, _MOST_SPURIOUS = 0.002, 0.5
+_NOTED = 0.1
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,9 @@ class PickedRow:
         Share of its power that is the same from hit to hit.
     labels : tuple of LabelChance
         The most probable first; none without a card.
+    unlabelled_probability : float or None
+        That it is none of the modes that the board of the card has, though a mode by the recordings; None without a
+        card, and for a peak that is likely no mode.
     """
 
     hz: float
@@ -63,11 +67,24 @@ class PickedRow:
     seen: float
     alike: float
     labels: tuple[LabelChance, ...] = ()
+    unlabelled_probability: float | None = None
 
     @property
     def is_likely(self) -> bool:
-        """Whether it is a mode rather than not."""
+        """Whether it is a mode rather than not, by the recordings."""
         return self.spurious_probability < 0.5
+
+    @property
+    def mode_probability(self) -> float:
+        """That it is a mode of the board, by the recordings and by the modes that the board has."""
+        return (1.0 - self.spurious_probability) * (1.0 - (self.unlabelled_probability or 0.0))
+
+    def chances(self, most: int) -> dict[str, float]:
+        """The most probable labels and that it has none where that is not improbable; empty without a card."""
+        found = {one.label: one.probability for one in self.labels[:most]}
+        if self.unlabelled_probability is not None and self.unlabelled_probability >= _NOTED:
+            found["none"] = self.unlabelled_probability
+        return found
 
 
 @dataclass(frozen=True)
@@ -146,6 +163,7 @@ def rows(
             seen=mode.seen,
             alike=mode.alike,
             labels=tuple(LabelChance(*one) for one in labels.get(number, ()) if one[1] >= LEAST_LABEL)[:MOST_LABELS],
+            unlabelled_probability=max(1.0 - sum(p for _, p in labels[number]), 0.0) if number in labels else None,
         )
         for number, mode in enumerate(picked.modes)
     )

@@ -14,7 +14,7 @@ from bayesplate.report.recordings_figures import every_picture
 from bayesplate.report.saving import save_pictures
 from bayesplate.results.folder import FIGURES, write_text
 from bayesplate.results.tables import Table
-from bayesplate.results.words import MISSING, percent, two_digits
+from bayesplate.results.words import MISSING, chances, percent, two_digits
 
 RECORDINGS_PAGE = "recordings.html"
 
@@ -92,7 +92,7 @@ def modes_table(report: PickReport) -> Table:
             peak.sign or MISSING,
             f"{peak.amplitude:.3f}",
             percent(peak.spurious_probability, 1),
-            _labels(peak),
+            chances(peak.chances(3)),
         )
         for peak in report.likely
     )
@@ -106,7 +106,3 @@ def aside_table(aside: list[PickedRow]) -> Table:
         for peak in aside
     )
     return Table("Set aside", ("Hz", "taken for", "strength", "no mode"), rows)
-
-
-def _labels(peak: PickedRow) -> str:
-    return ", ".join(f"{one.label} {percent(one.probability)}" for one in peak.labels[:3]) or MISSING

@@ -10,6 +10,7 @@ from bayesplate.results.words import (
     CONSTANTS,
     GPA,
     MISSING,
+    chances,
     mode_name,
     narrow_name,
     number,
@@ -132,12 +133,8 @@ def _proposed_table(report: ModesReport) -> Table:
     rows = []
     for one in report.proposed:
         label = one.label or _NO_MODE
-        others = [
-            f"{name} {percent(share)}"
-            for name, share in one.probability.items()
-            if name != label and share > _LEAST_TOLD
-        ]
-        rows.append((f"{one.measured_hz:.6g}", label, percent(one.probability[label]), ", ".join(others) or MISSING))
+        others = {name: p for name, p in one.probability.items() if name != label and p > _LEAST_TOLD}
+        rows.append((f"{one.measured_hz:.6g}", label, percent(one.probability[label]), chances(others)))
     return Table(f"Labels proposed for the peaks of {report.name}", ("Hz", "mode", "probability", "or"), tuple(rows))
 
 

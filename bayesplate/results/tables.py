@@ -14,12 +14,12 @@ from bayesplate.results.words import (
     CONSTANTS,
     GPA,
     MISSING,
+    chances,
     decimals,
     interval,
     mode_name,
     narrow_name,
     number,
-    percent,
     plus_minus,
     two_digits,
 )
@@ -115,12 +115,12 @@ def peaks_table(summary: Summary) -> Table | None:
     several = len(summary.spectra) > 1
     rows = []
     for peak in summary.peaks:
-        told = [f"{one.label} {percent(one.probability)}" for one in peak.assignments[:MOST_LISTED]]
+        found = {one.label: one.probability for one in peak.assignments[:MOST_LISTED]}
         if peak.spurious_probability >= LEAST:
-            told.append(f"no mode {percent(peak.spurious_probability)}")
+            found["no mode"] = peak.spurious_probability
         name = f"{peak.hz:.6g}" + (f" {peak.setup}" if several else "")
         miss = number(peak.residual_cents, 1, signed=True)
-        rows.append((name, peak.stated or MISSING, ", ".join(told), f"{peak.predicted_hz.mean:.1f}", miss))
+        rows.append((name, peak.stated or MISSING, chances(found), f"{peak.predicted_hz.mean:.1f}", miss))
     return Table(
         "Peaks and the modes that they may be",
         ("peak, Hz", "on the card", "probability", "predicted, Hz", "cents"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 GPA = 1e-9
@@ -115,3 +116,8 @@ def percent(share: float | None, digits: int = 0) -> str:
 def mode_name(label: str, setup: str, *, several: bool) -> str:
     """A mode by its label, and by its setup where there are several."""
     return f"{label} {setup}" if several else label
+
+
+def chances(found: Mapping[str, float]) -> str:
+    """What something may be, each with its probability; the sign of a missing value where there is nothing."""
+    return ", ".join(f"{name} {percent(share)}" for name, share in found.items()) or MISSING

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.results.tables import Table
-from bayesplate.results.words import MISSING, percent, two_digits
+from bayesplate.results.words import MISSING, chances, percent, two_digits
 from bayesplate.workflow.shown import Shown
 
 MOST_SET_ASIDE = 8
@@ -39,15 +39,11 @@ def picked_table(report: PickReport) -> Table:
             f"{peak.damping_percent:.2f}",
             *([peak.sign or MISSING] if has_signs else []),
             percent(peak.spurious_probability),
-            *([_labels(peak)] if has_labels else []),
+            *([chances(peak.chances(2))] if has_labels else []),
         ]
         rows.append(tuple(cells))
     signs, labels = (("sign",) if has_signs else ()), (("mode",) if has_labels else ())
     return Table("Picked modes", ("Hz", "st. error", "damping, %", *signs, "no mode", *labels), tuple(rows))
-
-
-def _labels(peak: PickedRow) -> str:
-    return ", ".join(f"{one.label} {percent(one.probability)}" for one in peak.labels[:2]) or MISSING
 
 
 def _aside(peak: PickedRow) -> str:

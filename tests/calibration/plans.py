@@ -183,6 +183,8 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     seed = int(rng.integers(2**31))
     plan = drawn_up(asked.found, prior, seed, goal=EXPLANATIONS, with_sequences=False)
     listed = plan.proposals
+    if not listed:
+        raise RuntimeError("the plan is silent: nothing that could be measured would help")
     every = every_proposal(plan.beliefs, plan.values, Costs(), EXPLANATIONS, rng, asked.found, prior)
     chosen = {
         "first": listed[0],

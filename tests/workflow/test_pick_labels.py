@@ -1,9 +1,12 @@
 """Which peaks labels are proposed for, which label of a peak a card states, and how sure it is said to be."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from bayesplate.recordings.contract import LabelChance, PickedRow
+from bayesplate.results.words import chances
 from bayesplate.workflow.pick_labels import FEWEST_SURE, MOST_PROPOSING, SURE, Labels, proposing
 
 CASES = {
@@ -43,3 +46,25 @@ def test_where_few_peaks_are_sure_all_take_part():
     assert proposing(few) == few
     enough = peaks(*[0.0] * FEWEST_SURE, 0.2)
     assert proposing(enough) == enough[:-1]
+
+
+ROW = PickedRow(
+    hz=184.6, sd_hz=0.2, noise_hz=0.1, scatter_hz=0.0, window_hz=0.18, damping_percent=1.1, damping_sd_percent=0.06,
+    sign="-", amplitude=0.13, spurious_probability=0.1, kind="", seen=1.0, alike=0.99,
+    labels=(LabelChance("(1,2)", 0.35), LabelChance("(3,0)", 0.04), LabelChance("(0,2)", 0.01)),
+    unlabelled_probability=0.6,
+)  # fmt: skip
+
+
+def test_a_peak_that_fits_none_of_the_boards_modes_is_rather_no_mode_of_it():
+    """Though it is one by the recordings: a support rings too."""
+    assert ROW.is_likely
+    assert ROW.mode_probability == pytest.approx(0.9 * 0.4)
+    assert chances(ROW.chances(2)) == "(1,2) 35 %, (3,0) 4 %, none 60 %"
+    assert chances(replace(ROW, unlabelled_probability=0.05).chances(1)) == "(1,2) 35 %"
+
+
+def test_without_a_card_the_recordings_alone_decide():
+    bare = replace(ROW, labels=(), unlabelled_probability=None)
+    assert bare.mode_probability == pytest.approx(0.9)
+    assert chances(bare.chances(2)) == "–"
