@@ -95,7 +95,7 @@ def measured(cards: Path, out: Path, workers: Sequence[str], told: str) -> Measu
         seconds=taken,
         cpu_parent=ended[2].ru_utime + ended[2].ru_stime,
         cpu_workers=sum(cpu[pid] for pid in others),
-        peak_parent=ended[2].ru_maxrss * 1024 / _MEGABYTE,
+        peak_parent=peak.get(run.pid, 0.0) / _MEGABYTE,
         peak_worker=max((peak[pid] for pid in others), default=0.0) / _MEGABYTE,
         load=load,
         table=hashlib.sha256((out / "boards.csv").read_bytes()).hexdigest()[:16],
@@ -103,8 +103,7 @@ def measured(cards: Path, out: Path, workers: Sequence[str], told: str) -> Measu
 
 
 def _descendants(ancestor: int) -> Iterator[tuple[int, float, float]]:
-    """Every process that comes from one: its id, processor seconds, and bytes in memory."""
-    page = os.sysconf("SC_PAGE_SIZE")
+    """Every process that comes from one: its id, processor seconds, and bytes of memory that no file stands for."""
     found: dict[int, list[str]] = {}
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
@@ -117,7 +116,16 @@ def _descendants(ancestor: int) -> Iterator[tuple[int, float, float]]:
         family |= more
     for pid in family - {ancestor}:
         fields = found[pid]
-        yield pid, (int(fields[11]) + int(fields[12])) / _TICKS, float(fields[21]) * page
+        yield pid, (int(fields[11]) + int(fields[12])) / _TICKS, _own_memory(pid)
+
+
+def _own_memory(pid: int) -> float:
+    """Bytes that a process holds for itself: libraries, which the system may drop and read again, are not counted."""
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return next((1024.0 * float(line.split()[1]) for line in lines if line.startswith("RssAnon:")), 0.0)
 
 
 def main() -> None:

@@ -24,6 +24,7 @@ from calibration.plans import (
     CHOSEN,
     NEXT,
     NOISE_CENTS,
+    SILENT,
     WAYS,
     Settings,
     bars,
@@ -63,10 +64,12 @@ def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bo
 def told(records: Sequence[Record]) -> list[str]:
     """What came out, line by line."""
     every = judged(records)
-    failed = [record for record in records if "error" in record]
+    silent = [record for record in records if SILENT in record.get("error", "")]
+    failed = [record for record in records if "error" in record and record not in silent]
     passed_over = sum(one["boards"] for one in every) - len(every)
     lines = [
-        f"{len(every)} boards with two surviving explanations, {passed_over} passed over, {len(failed)} failed",
+        f"{len(every)} boards with two surviving explanations, {passed_over} passed over, {len(failed)} failed; of "
+        f"{len(silent)} more the plan says that nothing would help",
         "",
     ]
     kinds = {
