@@ -56,7 +56,7 @@ bars: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_bars.py --publish docs/validation --workers 2
 
 plans: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_plans.py --boards 200 --workers 2 --out results/plans.jsonl --publish docs/validation
+	$(BIN)/python tests/calibration/run_plans.py --boards 214 --workers 2 --out results/plans.jsonl --publish docs/validation
 
 trial: $(VENV)/tested-with
 	$(BIN)/python tests/trial/run.py --workers 2 --out results/trial.jsonl
