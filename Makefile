@@ -68,7 +68,7 @@ benchmarks: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/run.py --publish docs/validation --repeats 3
 
 batch: $(VENV)/tested-with
-	$(BIN)/python tests/benchmarks/batch.py --boards 10 200 --workers 1 2 --dask --many 10000 --out results/batch.jsonl --publish docs/validation
+	$(BIN)/python tests/benchmarks/batch.py --boards 10 50 200 --workers 1 2 --dask --many 10000 --out results/batch.jsonl --publish docs/validation
 
 peers: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/peers/run.py --publish docs/validation --environments build/peers

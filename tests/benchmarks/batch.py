@@ -30,8 +30,10 @@ DESIGN = "cantilever-6"
 WAYS = {"1": "one worker", "2": "two workers", "dask-2": "a Dask cluster of two processes"}
 SPEED = {"2": 1.8, "dask-2": 1.5}
 """How much faster than one worker each way has to be; twice would be ideal."""
-FEWEST_FOR_SPEED = 200
-"""Boards from which on the time counts: with fewer, starting a worker is a part of it."""
+FEWEST_FOR_SPEED, FEWEST_FOR_MEMORY = 200, 40
+"""Boards from which on time and memory count: with fewer, starting a worker is a part of the time, and what is kept of
+boards under way and of their finite elements is not there yet.
+"""
 MOST_OVER_LINEAR, MOST_MEMORY = 1.2, 1.1
 HEAD = """# Many boards
 
@@ -103,7 +105,7 @@ def measured(cards: Path, out: Path, workers: Sequence[str], told: str) -> Measu
 
 
 def _descendants(ancestor: int) -> Iterator[tuple[int, float, float]]:
-    """Every process that comes from one: its id, processor seconds, and bytes of memory that no file stands for."""
+    """Every process that comes from one: its id, processor seconds, and the most bytes of memory it held so far."""
     found: dict[int, list[str]] = {}
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
@@ -116,22 +118,22 @@ def _descendants(ancestor: int) -> Iterator[tuple[int, float, float]]:
         family |= more
     for pid in family - {ancestor}:
         fields = found[pid]
-        yield pid, (int(fields[11]) + int(fields[12])) / _TICKS, _own_memory(pid)
+        yield pid, (int(fields[11]) + int(fields[12])) / _TICKS, _most_memory(pid)
 
 
-def _own_memory(pid: int) -> float:
-    """Bytes that a process holds for itself: libraries, which the system may drop and read again, are not counted."""
+def _most_memory(pid: int) -> float:
+    """Peak of a process since its program began, bytes: what it held as a copy of its parent is not counted."""
     try:
         lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     except OSError:
         return 0.0
-    return next((1024.0 * float(line.split()[1]) for line in lines if line.startswith("RssAnon:")), 0.0)
+    return next((1024.0 * float(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0.0)
 
 
 def main() -> None:
     """Measure what is not measured yet, print it as it comes, and write the page if asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--boards", type=int, nargs="+", default=[10, 200])
+    parser.add_argument("--boards", type=int, nargs="+", default=[10, 50, 200])
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--dask", action="store_true", help="a cluster of two processes as well")
     parser.add_argument("--many", type=int, help="so many boards as well, by the largest number of workers alone")
@@ -181,8 +183,11 @@ def ratios(rows: Sequence[Measured]) -> Iterator[Ratio]:
         own = [by_way[n, told] for n in counts if (n, told) in by_way]
         if len(own) < 2:
             continue
-        few, many = own[0], own[-1]
+        many = own[-1]
+        few = next(row for row in own if row.boards >= FEWEST_FOR_MEMORY or row is many)
         for what, attribute in (("the command", "peak_parent"), ("a worker", "peak_worker")):
+            if few is many:
+                break
             named = f"memory of {what}, {many.boards:,} boards beside {few.boards:,}, {WAYS[told]}"
             yield Ratio(named, getattr(many, attribute) / getattr(few, attribute), MOST_MEMORY, at_least=False)
         few = next(row for row in own if row.boards >= FEWEST_FOR_SPEED or row is many)

@@ -115,11 +115,11 @@ def draw(records: Sequence[Record], path: Path) -> None:
     left.set(xlabel="expected drop of the doubt", ylabel="realised drop", xlim=(0, 1), ylim=(-0.1, 1.05))
     left.set_title("Expected and realised, two standard errors", fontsize=9)
     found = shares(records)
-    right.bar(range(len(WAYS)), [100 * found[way] for way in WAYS], color=["#0072B2", "0.7", "0.5", "#E69F00"])
-    right.set_xticks(
-        range(len(WAYS)), ["plan's\nfirst", "random\nproposal", "random line\nof the plan", "next\nmodes up"]
-    )
-    right.set(ylabel="boards settled, %", ylim=(0, 100))
+    colours = ["#0072B2", "0.7", "0.5", "#E69F00"]
+    right.barh(range(len(WAYS)), [100 * found[way] for way in WAYS], color=colours)
+    right.set_yticks(range(len(WAYS)), [_WORDS[way] for way in WAYS], fontsize=8)
+    right.invert_yaxis()
+    right.set(xlabel="boards settled, %", xlim=(0, 100))
     right.set_title("Which explanation is true, settled", fontsize=9)
     figure.savefig(path, dpi=150, metadata={"Software": None})
 
