@@ -16,6 +16,8 @@ from docutils.statemachine import StringList
 from sphinx.util.docutils import SphinxDirective
 
 PICTURES = "_generated/pictures"
+LISTING = ("long_checks",)
+"""Functions that list files, among which new ones may be: their pages are read with every build."""
 
 
 def setup(app: Any) -> dict[str, Any]:
@@ -39,6 +41,8 @@ class Computed(SphinxDirective):
         name, *arguments = self.arguments
         text = getattr(computations, name)(folder, *arguments)
         self.env.note_dependency(computations.__file__)
+        if name in LISTING:
+            self.env.note_reread()
         place = nodes.Element()
         self.state.nested_parse(StringList(text.splitlines(), f"computed {name}"), self.content_offset, place)
         return place.children
