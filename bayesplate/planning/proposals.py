@@ -125,6 +125,8 @@ def proposals(
     rng: np.random.Generator,
     found: Found | None = None,
     prior: PriorCard | None = None,
+    *,
+    least: float = FAINT,
 ) -> tuple[Proposal, ...]:
     """Everything that could be measured next, the most promising first.
 
@@ -140,30 +142,20 @@ def proposals(
     found : Found, optional
         The search that the explanations come from.
     prior : PriorCard, optional
+    least : float
+        Nats above which a proposal is listed.
 
     Returns
     -------
     tuple of Proposal
     """
-    return _ranked(every_proposal(beliefs, values, costs, goal, rng, found, prior), goal)
+    listed = [*_of_modes(beliefs, values, costs, goal, rng, found, prior), *_of_sizes(beliefs, costs, rng, found)]
+    return _ranked(listed, goal, least)
 
 
-def every_proposal(
-    beliefs: Beliefs,
-    values: Values,
-    costs: Costs,
-    goal: str | None,
-    rng: np.random.Generator,
-    found: Found | None = None,
-    prior: PriorCard | None = None,
-) -> tuple[Proposal, ...]:
-    """The same in no order, and with what gives nothing; parameters as of `proposals`."""
-    return (*_of_modes(beliefs, values, costs, goal, rng, found, prior), *_of_sizes(beliefs, costs, rng, found))
-
-
-def _ranked(listed: Sequence[Proposal], goal: str | None) -> tuple[Proposal, ...]:
-    """The most promising first; those that give nothing are left out."""
-    kept = [one for one in listed if score(one.gain, goal) > FAINT]
+def _ranked(listed: Sequence[Proposal], goal: str | None, least: float = FAINT) -> tuple[Proposal, ...]:
+    """The most promising first; those that give no more than the least are left out."""
+    kept = [one for one in listed if score(one.gain, goal) > least]
     return tuple(sorted(kept, key=lambda one: -score(one.gain, goal)))
 
 

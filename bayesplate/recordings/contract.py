@@ -13,6 +13,7 @@ LEAST_LABEL = 0.005
 MOST_LABELS = 4
 _LEAST_SPURIOUS, _MOST_SPURIOUS = 0.002, 0.5
 _NOTED = 0.1
+"""Probability of having no label from which on it is listed among the labels."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class PickedRow:
         """That it is a mode of the board, by the recordings and by the modes that the board has."""
         return (1.0 - self.spurious_probability) * (1.0 - (self.unlabelled_probability or 0.0))
 
-    def chances(self, most: int) -> dict[str, float]:
+    def may_be(self, most: int) -> dict[str, float]:
         """The most probable labels and that it has none where that is not improbable; empty without a card."""
         found = {one.label: one.probability for one in self.labels[:most]}
         if self.unlabelled_probability is not None and self.unlabelled_probability >= _NOTED:

@@ -92,7 +92,7 @@ def modes_table(report: PickReport) -> Table:
             peak.sign or MISSING,
             f"{peak.amplitude:.3f}",
             percent(peak.spurious_probability, 1),
-            chances(peak.chances(3)),
+            chances(peak.may_be(3)),
         )
         for peak in report.likely
     )

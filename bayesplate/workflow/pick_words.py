@@ -39,7 +39,7 @@ def picked_table(report: PickReport) -> Table:
             f"{peak.damping_percent:.2f}",
             *([peak.sign or MISSING] if has_signs else []),
             percent(peak.spurious_probability),
-            *([chances(peak.chances(2))] if has_labels else []),
+            *([chances(peak.may_be(2))] if has_labels else []),
         ]
         rows.append(tuple(cells))
     signs, labels = (("sign",) if has_signs else ()), (("mode",) if has_labels else ())

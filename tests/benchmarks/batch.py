@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -34,7 +34,6 @@ FEWEST_FOR_SPEED, FEWEST_FOR_MEMORY = 200, 40
 """Boards from which on time and memory count: with fewer, starting a worker is a part of the time, and what is kept of
 boards under way and of their finite elements is not there yet.
 """
-MOST_OVER_LINEAR, MOST_MEMORY = 1.2, 1.1
 HEAD = """# Many boards
 
 Written by `make batch`; do not edit. Simulated cards of one design with constants of their own, six readings each,
@@ -166,6 +165,14 @@ def main() -> None:
         (arguments.publish / "batch.md").write_text(page(rows), encoding="utf-8")
 
 
+GROWTH: tuple[tuple[str, int, float, Callable[[Measured], float]], ...] = (
+    ("memory of the command", FEWEST_FOR_MEMORY, 1.1, lambda row: row.peak_parent),
+    ("memory of a worker", FEWEST_FOR_MEMORY, 1.1, lambda row: row.peak_worker),
+    ("time of a board", FEWEST_FOR_SPEED, 1.2, lambda row: row.seconds / row.boards),
+)
+"""What must hardly grow with the number of boards: from how many on it counts, the limit, and what it is of a run."""
+
+
 def _lines(path: Path) -> list[str]:
     return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
 
@@ -179,22 +186,13 @@ def ratios(rows: Sequence[Measured]) -> Iterator[Ratio]:
             if n >= FEWEST_FOR_SPEED and {(n, "1"), (n, told)} <= set(by_way):
                 faster = by_way[n, "1"].seconds / by_way[n, told].seconds
                 yield Ratio(f"speed beside one worker, {n:,} boards, {WAYS[told]}", faster, limit, at_least=True)
-    for told in WAYS:
-        own = [by_way[n, told] for n in counts if (n, told) in by_way]
-        if len(own) < 2:
-            continue
-        many = own[-1]
-        few = next(row for row in own if row.boards >= FEWEST_FOR_MEMORY or row is many)
-        for what, attribute in (("the command", "peak_parent"), ("a worker", "peak_worker")):
-            if few is many:
-                break
-            named = f"memory of {what}, {many.boards:,} boards beside {few.boards:,}, {WAYS[told]}"
-            yield Ratio(named, getattr(many, attribute) / getattr(few, attribute), MOST_MEMORY, at_least=False)
-        few = next(row for row in own if row.boards >= FEWEST_FOR_SPEED or row is many)
-        if few is not many:
-            named = f"time of a board, {many.boards:,} boards beside {few.boards:,}, {WAYS[told]}"
-            per_board = (many.seconds / many.boards) / (few.seconds / few.boards)
-            yield Ratio(named, per_board, MOST_OVER_LINEAR, at_least=False)
+    for told, words in WAYS.items():
+        for what, fewest, limit, of in GROWTH:
+            own = [by_way[n, told] for n in counts if n >= fewest and (n, told) in by_way]
+            if len(own) > 1:
+                few, many = own[0], own[-1]
+                named = f"{what}, {many.boards:,} boards beside {few.boards:,}, {words}"
+                yield Ratio(named, of(many) / of(few), limit, at_least=False)
     for n in counts:
         own = [row.table for row in rows if row.boards == n]
         if len(own) > 1:

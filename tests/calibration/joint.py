@@ -78,7 +78,7 @@ def density(posterior: ByRow, theta: Floats) -> Floats:
 def reference_posterior() -> Posterior:
     """The board of the design under one linear law, with the large noise; its readings are replaced."""
     problem = reference(DESIGN)
-    board = DESIGN.board(DESIGN.unread, NOISE)
+    board = DESIGN.board(DESIGN.placeholders, NOISE)
     return Posterior(board, problem.prior, problem.posterior.models, "linear")
 
 

@@ -15,7 +15,7 @@ HELD_OUT = {"free": (1, 3), "cantilever": (0, 3)}
 """A mode that is not read: its frequency is predicted."""
 TWICE = {"free": (0, 2), "cantilever": (0, 2)}
 """The mode that tells most of a constant: what counting it twice would change most."""
-EFFECTS = {"free": "support_stiffness", "cantilever": "clamp_rotation", "both": ""}
+EFFECTS = {"free": "support_stiffness", "cantilever": "clamp_rotation"}
 """An effect whose size is drawn and ranked too."""
 LENGTHS = {"free": (0.45, 0.20), "cantilever": (0.30, 0.16), "both": (0.36, 0.18)}
 """Sides, m, at which few modes of one class come close to each other over the prior."""

@@ -40,7 +40,7 @@ from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
 from bayesplate.planning.looks import LOOKS
-from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, every_proposal
+from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, proposals
 from bayesplate.planning.stations import known_mass
 from bayesplate.planning.survivors import survivors
 from bayesplate.plate.board import Board
@@ -64,7 +64,6 @@ ASKED = {
 NEXT = 3
 _MOST_BOARDS = 60
 _SEARCHED = 34
-SILENT = "the plan is silent: nothing that could be measured would help"
 WAYS = ("first", "random", "listed", "next")
 CALIBRATED = ("first", "random", "listed")
 """Ways whose expected drops are compared with the realised ones."""
@@ -185,8 +184,10 @@ def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     plan = drawn_up(asked.found, prior, seed, goal=EXPLANATIONS, with_sequences=False)
     listed = plan.proposals
     if not listed:
-        raise RuntimeError(SILENT)
-    every = every_proposal(plan.beliefs, plan.values, Costs(), EXPLANATIONS, rng, asked.found, prior)
+        return {"silent": True}
+    every = proposals(
+        plan.beliefs, plan.values, Costs(), EXPLANATIONS, rng, asked.found, prior, least=float("-inf")
+    )  # fmt: skip
     chosen = {
         "first": listed[0],
         "random": _at_random(plan.beliefs, every, rng),
@@ -291,7 +292,7 @@ def wrongly(record: Record, way: str) -> bool:
 
 def judged(records: Sequence[Record]) -> list[Record]:
     """Records of boards that could be asked and measured."""
-    return [one for one in records if "error" not in one]
+    return [one for one in records if not {"error", "silent"} & set(one)]
 
 
 def shares(records: Sequence[Record]) -> dict[str, float]:

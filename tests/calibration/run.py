@@ -30,6 +30,7 @@ from calibration.table import MUTANTS, NOT_COUNTED, family_p_value, is_calibrate
 from calibration.truths import Design
 
 FEWEST_OF_MUTANT = 60
+"""Simulations in which every mutant is fitted, though some are found out by fewer."""
 TITLE = "Calibration of the posterior"
 SECTIONS = {
     "ranks": (
@@ -208,7 +209,9 @@ def main() -> int:
     parser.add_argument("--parts", nargs="+", choices=tuple(SECTIONS), default=list(SECTIONS),
                         help="what is computed; of the others what was done before is told")  # fmt: skip
     parser.add_argument("--simulations", type=int, default=1000, help="of the ranks")
-    parser.add_argument("--mutants", type=int, default=1000, help="simulations for which mutants are fitted too")
+    parser.add_argument(
+        "--mutants", type=int, default=1000, help="simulations in which mutants are fitted too, at most"
+    )
     parser.add_argument("--ranked", type=int, default=1000, help="simulations of each further model")
     parser.add_argument("--sets", type=int, default=oracle.N_SETS, help="of each kind of closed form")
     parser.add_argument("--at-boards", type=int, default=again.N_SIMULATIONS, help="simulations at each of two boards")

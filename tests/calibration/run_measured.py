@@ -3,9 +3,9 @@
 The raw hits of a free half-top (2R), its frequency response, and that of another (1R), against peaks that were read off
 by another method. The data have no stated licence and are not part of the project: where the folder is absent, this
 says so and ends with exit code 0. Otherwise 0: all peaks found within 0.3 % or the listed spread, their signs agree but
-for one polarity, and no more than two further peaks are rather modes of the board than not, by the recordings and by
-the modes that the board of the card has; 1: not, with what is missed; 2: usage. The listing need not be complete: it is
-told which modes the further ones are. `--publish` writes the same to a page.
+for one polarity, and no more than two further peaks are rather modes than not by the recordings; 1: not, with what is
+missed; 2: usage. The listing need not be complete: it is told which of the further ones are modes that the board of the
+card has. `--publish` writes the same to a page.
 """
 
 from __future__ import annotations
@@ -59,14 +59,14 @@ def compared(words: str, peaks: Sequence[dict[str, Any]], picked: Sequence[Picke
     lines.append(f"  further peaks that are rather modes than not by the recordings: {len(further)}")
     lines += [
         f"    {mode.hz:.1f} Hz: a mode of the board {percent(mode.mode_probability)}; no mode by the recordings alone "
-        f"{percent(mode.spurious_probability)}, among the board's modes {chances(mode.chances(2))}"
+        f"{percent(mode.spurious_probability)}, among the board's modes {chances(mode.may_be(2))}"
         for mode in further
     ]
     lines.append(f"  of these, rather modes of the board than not: {len(modes)}")
     held = {
         f"all peaks found within {100 * WITHIN:.1f} % or the listed spread": found == len(peaks),
         "their signs agree": min(alike.values()) == 0,
-        f"{MOST_FURTHER} further modes of the board at most": len(modes) <= MOST_FURTHER,
+        f"{MOST_FURTHER} further peaks at most": len(further) <= MOST_FURTHER,
     }
     lines += [f"  {'met' if is_met else 'MISSED'}: {bar}" for bar, is_met in held.items()]
     return lines, all(held.values())

@@ -24,7 +24,6 @@ from calibration.plans import (
     CHOSEN,
     NEXT,
     NOISE_CENTS,
-    SILENT,
     WAYS,
     Settings,
     bars,
@@ -52,7 +51,7 @@ def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bo
     """Do what is not done yet, and return the records of all boards asked for, in their order."""
     asked = {design: list(effects) for design, effects in ASKED.items()}
     identity = {
-        "format": 2, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
+        "format": 3, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
     }  # fmt: skip
     records = read_done(out, identity)
     done = {record["simulation"] for record in records}
@@ -64,8 +63,8 @@ def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bo
 def told(records: Sequence[Record]) -> list[str]:
     """What came out, line by line."""
     every = judged(records)
-    silent = [record for record in records if SILENT in record.get("error", "")]
-    failed = [record for record in records if "error" in record and record not in silent]
+    silent = [record for record in records if "silent" in record]
+    failed = [record for record in records if "error" in record]
     passed_over = sum(one["boards"] for one in every) - len(every)
     lines = [
         f"{len(every)} boards with two surviving explanations, {passed_over} passed over, {len(failed)} failed; of "

@@ -103,7 +103,7 @@ class Design:
         return SETUPS[self.edges]
 
     @property
-    def unread(self) -> Hertz:
+    def placeholders(self) -> Hertz:
         """Every mode that is read, at a frequency that says nothing."""
         return {name: dict.fromkeys(LABELS[name], 1.0) for name in self.setups}
 
@@ -115,7 +115,7 @@ class Design:
 @lru_cache(maxsize=8)
 def amplitudes(design: Design) -> dict[str, Quantity]:
     """Priors of the parameters of the declared effect."""
-    return {one.name: one.prior for one in design.board(design.unread).parameters if one.is_of_effect}
+    return {one.name: one.prior for one in design.board(design.placeholders).parameters if one.is_of_effect}
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def _frequencies(design: Design, values: Mapping[str, float]) -> tuple[Hertz, tu
     if design.law == "fixed-linear":
         models = reference(design).posterior.models
     else:
-        models = models_at(design.board(design.unread), [values[n] for n in RIGIDITIES], **values)
+        models = models_at(design.board(design.placeholders), [values[n] for n in RIGIDITIES], **values)
     every = {
         name: dict(zip(LABELS[name], np.exp(model.log_frequencies(arrays, "linear")[0]).tolist(), strict=True))
         for name, model in zip(design.setups, models, strict=True)
