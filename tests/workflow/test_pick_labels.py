@@ -4,10 +4,14 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from made_recordings import CARD, board
 
 from bayesplate.recordings.contract import LabelChance, PickedRow
+from bayesplate.recordings.picking import PickedMode
 from bayesplate.results.words import chances
-from bayesplate.workflow.pick_labels import FEWEST_SURE, Labels, proposing
+from bayesplate.workflow import pick_labels
+from bayesplate.workflow.pick_labels import FEWEST_SURE, Labels, label_peaks, proposing
+from bayesplate.workflow.prepare import prepare
 
 CASES = {
     "both say the same: the confidence is that of sand and residues": (
@@ -47,6 +51,33 @@ def test_where_few_peaks_are_sure_all_take_part():
     assert proposing(few) == few
     enough = peaks(*[0.0] * FEWEST_SURE, 0.2)
     assert proposing(enough) == enough[:-1]
+
+
+PEAK = PickedMode(
+    frequency=0.0, sd=0.0, noise_sd=0.0, scatter_sd=0.0, window_sd=0.0, damping=0.01, damping_sd=0.001, mobility=(1.0,),
+    mobility_sd=(0.1,), complexity=0.0, alike=1.0, amplitude=1.0, seen=1.0, spurious=0.0, kind="",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("rule", ["the sure ones", "all of them"])
+def test_false_peaks_among_the_lowest_do_not_change_the_labels_of_the_others(rule, tmp_path, monkeypatch):
+    """Labels proposed for all peaks alike, as they once were, are wrong on most: the second case says so."""
+    if rule == "all of them":
+        monkeypatch.setattr(pick_labels, "proposing", lambda likely: likely[:12])
+    (tmp_path / "planted.toml").write_text(CARD)
+    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
+    names = ["({},{})".format(*name) for name, _ in board().modes.names()[:8]]
+    truth = board().damped[:8]
+    planted = [(hz, 0.0, name) for hz, name in zip(truth, names, strict=True)]
+    false = [(0.5 * truth[0], 0.1, ""), (1.04 * truth[0], 0.15, ""), (1.05 * truth[2], 0.2, "")]
+    every = sorted(planted + false)
+    likely = tuple(replace(PEAK, frequency=hz, sd=1e-3 * hz, spurious=spurious) for hz, spurious, _ in every)
+    picked = SimpleNamespace(likely=likely, spectra=SimpleNamespace(force=None, between=((None, None),)))
+
+    labels = label_peaks(prepared.stated, prepared.prior, picked, None, {})
+
+    right = [labels.of(i)[0][0] == name and labels.of(i)[0][1] > 0.99 for i, (_, _, name) in enumerate(every) if name]
+    assert sum(right) == len(right) if rule == "the sure ones" else sum(right) < len(right) / 2
 
 
 ROW = PickedRow(
