@@ -1,12 +1,12 @@
 """Boards with two surviving explanations: does what a plan proposes settle them, and as often as it expects?
 
-A board is asked about two effects of the library, no effect being the third possibility, all three equally probable
-beforehand. Which of them is true, the effect's size and the noise are drawn from the very priors of the search, and the
-generator, another discretisation, makes the frequencies; boards on which not just two explanations survive, the truth
-among them, are passed over. Then
-four things are measured, each by the generator: the plan's first proposal; one drawn at random from all that could be
-measured, its modes at random too; a line of the plan's own list at random, whose modes are chosen already; and the next
-three modes up. Explanations are settled where the true one is left alone: ten times as probable as the other.
+A board is asked about two effects of the library, no effect being the third possibility. Which of the three is true,
+the effect's size and the noise are drawn from the very priors of the search, and the generator, another
+discretisation, makes the frequencies; boards on which not just two explanations survive, the truth among them, are
+passed over. Then four things are measured, each by the generator: the plan's first proposal; one drawn at random from
+all that could be measured, its modes at random too; a line of the plan's own list at random, whose modes are chosen
+already; and the next three modes up. Explanations are settled where the true one is left alone: ten times as probable
+as the other.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from trial.shared import baseline_of_card, median_baseline, shared_law
 
 from bayesplate.cards import load_prior
 from bayesplate.diagnosis.decision.verdict import WITHIN
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, Hypothesis
 from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.errors import BayesplateError
@@ -64,6 +64,8 @@ ASKED = {
 NEXT = 3
 _MOST_BOARDS = 60
 _SEARCHED = 34
+_NO_EFFECT = NONE / (NONE + ONE)
+"""Probability, as the search has it, that a board has no effect, where it may have one at most."""
 WAYS = ("first", "random", "listed", "next")
 CALIBRATED = ("first", "random", "listed")
 """Ways whose expected drops are compared with the realised ones."""
@@ -118,8 +120,7 @@ def _asked(rng: np.random.Generator, design: str) -> tuple[Asked, int]:
     """Boards until two explanations survive on one, the true one among them; and how many it took."""
     for n_boards in range(1, _MOST_BOARDS + 1):
         pair = tuple(str(one) for one in rng.choice(ASKED[design], size=2, replace=False))
-        which = int(rng.integers(3))
-        true = () if which == 0 else (pair[which - 1],)
+        true = () if rng.random() < _NO_EFFECT else (pair[int(rng.integers(2))],)
         try:
             planted = _planted(rng, design, true)
         except (RuntimeError, ValueError):
@@ -299,6 +300,13 @@ def shares(records: Sequence[Record]) -> dict[str, float]:
     """Share of the boards that each way settles."""
     every = judged(records)
     return {way: float(np.mean([settled(one, way) for one in every])) for way in WAYS}
+
+
+def foremost(records: Sequence[Record]) -> tuple[float, float]:
+    """Mean probability stated of the more probable explanation, and the share of boards on which it is the true one."""
+    every = judged(records)
+    stated = float(np.mean([max(one["before"]) for one in every]))
+    return stated, float(np.mean([one["explanations"][int(np.argmax(one["before"]))] == one["true"] for one in every]))
 
 
 def calibration(records: Sequence[Record]) -> list[Record]:

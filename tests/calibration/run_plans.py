@@ -28,6 +28,7 @@ from calibration.plans import (
     Settings,
     bars,
     calibration,
+    foremost,
     is_group,
     judged,
     settled,
@@ -51,7 +52,7 @@ def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bo
     """Do what is not done yet, and return the records of all boards asked for, in their order."""
     asked = {design: list(effects) for design, effects in ASKED.items()}
     identity = {
-        "format": 3, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
+        "format": 4, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
     }  # fmt: skip
     records = read_done(out, identity)
     done = {record["simulation"] for record in records}
@@ -66,9 +67,12 @@ def told(records: Sequence[Record]) -> list[str]:
     silent = [record for record in records if "silent" in record]
     failed = [record for record in records if "error" in record]
     passed_over = sum(one["boards"] for one in every) - len(every)
+    stated, true = foremost(records)
     lines = [
         f"{len(every)} boards with two surviving explanations, {passed_over} passed over, {len(failed)} failed; of "
         f"{len(silent)} more the plan says that nothing would help",
+        f"before: the more probable explanation is the true one on {100 * true:.0f} % of the boards, stated "
+        f"{100 * stated:.0f} %",
         "",
     ]
     kinds = {
