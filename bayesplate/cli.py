@@ -391,7 +391,3 @@ def batch(
             say(f"written to {result.folder}")
     with reporting(as_json=False, debug=debug):
         result.require_all()
-
-
-if __name__ == "__main__":
-    main()

@@ -251,7 +251,7 @@ def test_an_internal_error_is_one_line_without_debug(monkeypatch):
 def test_the_commands_and_exit_codes_of_a_real_process():
     """The same through an interpreter of its own: what click's runner may hide."""
     Path("my-board.toml").write_text(spoiled(*BAD_CARDS["negative"][0]), encoding="utf-8")
-    program = [sys.executable, "-m", "bayesplate.cli"]
+    program = [sys.executable, "-m", "bayesplate"]
     done = subprocess.run([*program, "fit", "my-board.toml"], capture_output=True, text=True, check=False)
     shown = subprocess.run([*program, "--version"], capture_output=True, text=True, check=True)
 
@@ -263,7 +263,7 @@ def test_the_commands_and_exit_codes_of_a_real_process():
 
 def test_a_reader_that_stops_early_is_no_error():
     """`bayesplate check ... | head -1`: the pipe is closed before anything is printed."""
-    program = [sys.executable, "-m", "bayesplate.cli", "check", "fiemme-spruce-clamped"]
+    program = [sys.executable, "-m", "bayesplate", "check", "fiemme-spruce-clamped"]
     with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         process.stdout.close()

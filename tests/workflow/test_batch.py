@@ -184,7 +184,7 @@ def processes_of(session: int) -> list[int]:
 def test_killed_at_a_random_moment_and_resumed_the_table_is_the_same(cards, two, tmp_path):
     """Killed with a board or two in the journal and the next line half written; its workers end with it."""
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "bayesplate.cli", "batch", str(cards), "--workers", "2", "--out", str(out)]
+    command = [sys.executable, "-m", "bayesplate", "batch", str(cards), "--workers", "2", "--out", str(out)]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     run = subprocess.Popen([*command, "--no-report"], env=environment, start_new_session=True,
                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip

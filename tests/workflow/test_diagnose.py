@@ -307,7 +307,7 @@ def test_a_signal_while_sampling_is_heeded_and_the_run_resumes(tmp_path, stop):
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     folder = tmp_path / "out"
-    program = [sys.executable, "-m", "bayesplate.cli", "diagnose", CALM, "--out", str(folder), "--quiet"]
+    program = [sys.executable, "-m", "bayesplate", "diagnose", CALM, "--out", str(folder), "--quiet"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(program, **pipes, text=True, env=dict(os.environ), preexec_fn=heed_interrupts) as process:
         chunk = folder / "checkpoint" / "before" / "linear" / "chunk-0000.npz"

@@ -98,7 +98,7 @@ def test_the_installed_package_finds_its_cards(installed, tmp_path):
 
 
 def test_the_installed_command_checks_a_shipped_board(installed, tmp_path):
-    printed = elsewhere(installed, tmp_path, "-m", "bayesplate.cli", "check", "finnish-spruce-cantilever", "--json")
+    printed = elsewhere(installed, tmp_path, "-m", "bayesplate", "check", "finnish-spruce-cantilever", "--json")
 
     assert read_json(printed) == as_json(bayesplate.check("finnish-spruce-cantilever"))
     assert list(tmp_path.iterdir()) == []
