@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,13 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
+from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
 from bayesplate.modes.plate import Beams, PlateMatrices
 from bayesplate.modes.reduced import ACCEPTED_CENTS, reduced_order_model
 from bayesplate.modes.solve import solve_up_to
 from bayesplate.plate.board import Values
+from bayesplate.plate.sessions import discrepancy_names
 from bayesplate.plate.setup import Setup
 
 _SLACK = 0.01
@@ -36,6 +39,12 @@ class OtherMode:
 
     place: Place
     beams: Beams | None
+
+
+def every_label(setup: Setup, others: Sequence[OtherMode]) -> tuple[Label | None, ...]:
+    """Labels of a setup's readings, then of other modes; None where a shape clearly resembles no beam functions."""
+    first, beams = setup.first_label, (other.beams for other in others)
+    return (*setup.labels, *(None if one is None else Label(one[0] + first.m, one[1] + first.n) for one in beams))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +102,31 @@ class SetupModel:
         """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         return log_frequency(self.law(law).squared(self.system.weights(values)))
 
+    def every_log_frequency_of_board(self, values: Values, law: LawName) -> NDArray[np.float64]:
+        """The same with the discrepancies of the board from its plate that sessions share: (n_draws, n_every) array."""
+        return self.every_log_frequency(values, law) + self.discrepancies(values)
+
+    def discrepancies(self, values: Values) -> NDArray[np.float64]:
+        """ln f of the board less that of its plate, of all modes: (n_draws, n_every) array, or a zero of any shape."""
+        names = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
+        known = {i: one for i, one in names.items() if one is not None and one[1] in values}
+        if not known:
+            return np.zeros((1, 1))
+        shifts = {i: np.ravel(values[scale] * values[standard]) for i, (scale, standard) in known.items()}
+        found = np.zeros((max(one.size for one in shifts.values()), len(self.every_place)))
+        for i, shift in shifts.items():
+            found[:, i] = shift
+        return found
+
     def tangent(self, values: Values) -> SetupModel:
         """The same with the linear law of the modes that the exact law has at one draw of values."""
         assert self.exact is not None
         return replace(self, linear=self.exact.tangent(self.system.weights(values)))
+
+    @cached_property
+    def every_label(self) -> tuple[Label | None, ...]:
+        """Labels of the labelled modes, then of the others."""
+        return every_label(self.setup, self.others)
 
     @property
     def every_beams(self) -> tuple[Beams | None, ...]:

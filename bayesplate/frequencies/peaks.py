@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.assignment import LEAST, Assignments
-from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.model import SetupModel, every_label
 from bayesplate.frequencies.residues import share_seen, sign_probabilities
 from bayesplate.labels import Label
 from bayesplate.plate.readings import ReadingErrors
@@ -106,7 +106,8 @@ class PeakLikelihood:
         if residues is not None:
             seen = seen * np.where(np.isnan(residues), 1.0, share_seen(np.nan_to_num(residues)))
         log_pair = np.log(seen) + np.log1p(-setup.spurious)
-        labels = tuple(_labels(model)[column] for column in columns)
+        every = every_label(setup, model.others)
+        labels = tuple(every[column] for column in columns)
         log_label = _log_labels(setup, readings, labels)
         highest = max([*setup.measured, *setup.unlabelled])
         wide = np.where(errors.rounded, errors.resolution, errors.frequency) / highest
@@ -243,13 +244,6 @@ def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[tupl
         every[unsigned] = tried
         members = [(np.flatnonzero(every == sign), np.flatnonzero(log_sign[sign] > -np.inf)) for sign in (1, -1)]
         yield tuple((own, of, log_sign[every[own]][:, of]) for own, of in members)
-
-
-def _labels(model: SetupModel) -> list[Label | None]:
-    """Of all modes of a model."""
-    first = model.setup.first_label
-    beams = (other.beams for other in model.others)
-    return [*model.setup.labels, *(None if b is None else Label(b[0] + first.m, b[1] + first.n) for b in beams)]
 
 
 def _log_labels(setup: Setup, readings: Rows, labels: Sequence[Label | None]) -> Floats:

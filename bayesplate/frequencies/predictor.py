@@ -37,7 +37,7 @@ class Predictor:
     def __call__(self, x: Floats) -> Floats:
         """From (n, n_free) parameters to (n, n_modes) ln f."""
         values = self.values(x)
-        every = np.concatenate([model.every_log_frequency(values, self.law) for model in self.models], axis=1)
+        every = np.concatenate([one.every_log_frequency_of_board(values, self.law) for one in self.models], axis=1)
         return every if self.rows is None else every[:, self.rows]
 
     def of(self, rows: NDArray[np.intp]) -> Predictor:

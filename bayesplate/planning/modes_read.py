@@ -15,6 +15,7 @@ from bayesplate.planning.looks import members_of
 from bayesplate.planning.shifts import EffectShift, Nodes, form_shift
 from bayesplate.planning.stations import BareLaw, Station
 from bayesplate.plate.readings import ReadingErrors
+from bayesplate.plate.sessions import shared_share
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
@@ -105,10 +106,39 @@ def station_readings(
     return StationReadings(
         readings(rows, kept or new),
         tuple(rows),
-        readings(old, new) if n_old and is_followed[old].all() else None,
+        _another_day(beliefs, station, readings(old, new), kept) if n_old and is_followed[old].all() else None,
         tuple(_plus(readings(old, kept), readings(old, kept, spot)) for spot in whole),
         tuple(spot - 1 for spot in whole),
     )
+
+
+def _another_day(beliefs: Beliefs, station: Station, readings: Readings, kept: Sequence[Floats]) -> Readings:
+    """Readings of another session beside those of the first, with which they share the board's discrepancy.
+
+    Of the variance of a lone session's noise the share of its prior is the discrepancy's. What the first reading of a
+    mode is off by then tells of the next one, which is less news: it is taken given the first, under every explanation.
+
+    Parameters
+    ----------
+    beliefs : Beliefs
+    station : Station
+    readings : Readings
+        As if they shared nothing.
+    kept : sequence of (n_terms,) array
+        Variance of the noise of the first session, by explanation.
+    """
+    setup = beliefs.board.setup(station.base.name)
+    share = shared_share(setup)
+    first, own = np.log(setup.measured), ReadingErrors.of(setup).own_variance
+    new = ReadingErrors.of(station.setup).own_variance[: station.n_old]
+    shift, slopes, variance = [], [], []
+    for k, each in enumerate(kept):
+        common = share * each[:, None]
+        told = common / (each[:, None] + own)
+        shift.append((1.0 - told) * readings.shift[k] + told * first)
+        slopes.append((1.0 - told)[:, :, None] * readings.slopes[k])
+        variance.append(new + (1.0 - share) * (readings.variance[k] - new) + common * (1.0 - told))
+    return Readings(tuple(shift), tuple(slopes), tuple(variance))
 
 
 def _plus(one: Readings, other: Readings) -> Readings:

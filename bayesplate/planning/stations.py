@@ -296,4 +296,5 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
     start = centre[parameters.fitted_columns]
     slopes = sensitivities(Predictor(at, [model], "linear"), start)
     found = solved(station, board, values)
-    return BareLaw(station, found, found[0] - slopes[:, N_RIGIDITIES:] @ start[N_RIGIDITIES:], slopes)
+    there = found[0] + model.discrepancies(at(start[None, :]))[0]
+    return BareLaw(station, found, there - slopes[:, N_RIGIDITIES:] @ start[N_RIGIDITIES:], slopes)

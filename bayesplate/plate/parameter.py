@@ -96,8 +96,13 @@ class Parameter:
 
     @property
     def is_component(self) -> bool:
-        """Whether a budget counts it together with its effect's other ones."""
+        """Whether a budget counts it together with others."""
         return bool(self.look)
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether it is told of by itself: a component that belongs to no effect means nothing alone."""
+        return self.is_of_effect or not self.is_component
 
     @property
     def nominal(self) -> float:

@@ -66,7 +66,7 @@ def card_text(board: Board) -> str:
 def _uncertain(board: Board) -> Iterator[tuple[str, Quantity, Kind]]:
     """Every quantity of a board that a card holds: its place, itself, and the kind of density that its key takes."""
     for one in board.parameters:
-        if not one.is_of_effect:
+        if not one.is_of_effect and one.owner.kind != "group":  # sessions are found again when the card is read
             yield one.name, one.prior, "normal" if one.name == "poisson_xy" else "log-normal"
     for name, modulus in (("shear_xz", board.shear_xz), ("shear_yz", board.shear_yz)):
         if modulus is not None:

@@ -24,6 +24,7 @@ from bayesplate.estimates.unusual import unusual
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.plate.board import Board
+from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
@@ -137,7 +138,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     if faults:
         raise InputError(faults)
     proposed = propose_labels(board, prior)
-    board = proposed.board
+    board = with_discrepancies(proposed.board)
     require_labels(board)
     estimate = weighted_least_squares(board, start=proposed.rigidities)
     found = identifiability(estimate.sensitivities, estimate.scales)

@@ -140,7 +140,7 @@ class Posterior:
     def every_log_frequency(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
         values = self.parameters.values(theta)
-        return [model.every_log_frequency(values, self.law) for model in self.models]
+        return [model.every_log_frequency_of_board(values, self.law) for model in self.models]
 
     def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """ln f of the labelled modes: one (n_draws, n_modes) array per setup."""

@@ -157,7 +157,7 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
 def inputs_table(board: Board, summary: Summary) -> Table:
     """What the card states, and what became of it where it was uncertain."""
     rows = []
-    for one in board.parameters:
+    for one in filter(lambda one: one.is_listed, board.parameters):
         words, factor, unit = input_words(one, board)
         after = plus_minus(summary.inputs[one.name], factor) if one.name in summary.inputs else MISSING
         rows.append((f"{words}, {unit}" if unit else words, _stated(one.prior, factor), after))

@@ -88,8 +88,9 @@ def chosen(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
         columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i].ravel()
     shares = input_shares(draws)
     largest = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
-    for name in sorted(largest, key=lambda one: -largest[one])[: MOST - len(columns)]:
-        words, factor, unit = input_words(problem.board.parameter(name), problem.board)
+    every = {one.name: one for one in problem.board.uncertain if one.is_listed}
+    for name in sorted(every, key=lambda one: -largest[one])[: MOST - len(columns)]:
+        words, factor, unit = input_words(every[name], problem.board)
         columns[f"{words}, {unit}" if unit else words] = draws.inputs[name].ravel() * factor
     return columns
 

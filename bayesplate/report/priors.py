@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.plate.parameter import Parameter, unit_of_people
+from bayesplate.plate.sessions import DISCREPANCY
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.quantities import Quantity
@@ -85,7 +86,7 @@ def compared(problem: PosedProblem, draws: Draws) -> list[Compared]:
         noise = setup.noise.scaled(100.0)
         prior = (np.log(noise.median), noise.log_sd)
         found.append(_compared(name, "%", 100.0 * draws.noise[..., i], _of(noise), True, prior))
-    for one in problem.board.uncertain:
+    for one in filter(lambda one: one.is_listed, problem.board.uncertain):
         words, factor, told = input_words(one, problem.board)
         scaled = one.prior.scaled(factor)
         is_log = scaled.kind != "normal"
@@ -96,7 +97,7 @@ def compared(problem: PosedProblem, draws: Draws) -> list[Compared]:
 
 def input_words(parameter: Parameter, board: Board) -> tuple[str, float, str]:
     """What a parameter is called, the factor from SI, and its unit."""
-    factor, unit = unit_of_people(parameter.unit)
+    factor, unit = (100.0, "%") if parameter.key == DISCREPANCY else unit_of_people(parameter.unit)
     where = f" ({parameter.owner.name})" if parameter.owner.name and len(board.setups) > 1 else ""
     return f"{parameter.words or parameter.key}{where}", factor, unit
 

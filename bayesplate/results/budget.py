@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.plate.board import Board
+from bayesplate.plate.sessions import OF_MODES
 from bayesplate.posterior.draws import Draws
 
 LARGE_SHARE = 0.5
+_OF_DISCREPANCIES = ", which more sessions do not narrow: read other modes, or look for what the plate lacks (diagnose)"
 
 
 def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
@@ -30,13 +32,13 @@ def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
 def budget(draws: Draws, board: Board) -> dict[str, dict[str, float]]:
     """Share of the variance of the logarithm of each modulus that goes with each row of the budget, 0 to 1.
 
-    A row is an uncertain input, as in `input_shares`, or an effect whose components mean nothing alone: theirs is the
-    part of the variance that a regression on all of them explains.
+    A row is an uncertain input, as in `input_shares`, or what means nothing but together, an effect's components or the
+    discrepancies of all modes: theirs is the part of the variance that a regression on all of them explains.
     """
     together: dict[str, list[str]] = {}
     for one in board.uncertain:
         if one.is_component:
-            together.setdefault(one.effect, []).append(one.name)
+            together.setdefault(one.effect or one.words, []).append(one.name)
     components = {name for names in together.values() for name in names}
     shares = input_shares(draws)
     for modulus, values in draws.moduli.items():
@@ -82,7 +84,7 @@ def input_remarks(draws: Draws, board: Board) -> list[str]:
             least, most = 100 * min(ruled.values()), 100 * max(ruled.values())
             share = f"{most:.0f} %" if most - least < 1 else f"{least:.0f} to {most:.0f} %"
             sentences.append(
-                f"{share} of the uncertainty (variance) of {', '.join(ruled)} comes from the "
-                f"{row_words(name, board)}: measure it better before anything else"
+                f"{share} of the uncertainty (variance) of {', '.join(ruled)} comes from the {row_words(name, board)}"
+                f"{_OF_DISCREPANCIES if name == OF_MODES else ': measure it better before anything else'}"
             )
     return sentences

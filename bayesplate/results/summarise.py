@@ -119,7 +119,9 @@ def summarise(
         effects=_effects(problem, draws),
         noise={setup.name: Spread.of(draws.noise[..., i], "1") for i, setup in enumerate(board.setups)},
         inputs={
-            one.name: Spread.of(draws.inputs[one.name], one.unit) for one in board.uncertain if not one.is_of_effect
+            one.name: Spread.of(draws.inputs[one.name], one.unit)
+            for one in board.uncertain
+            if one.is_listed and not one.is_of_effect
         },
         derived={name: Spread.of(item.values, item.unit) for name, item in draws.derived.items()},
         joint=Joint.of(draws),

@@ -113,7 +113,7 @@ def check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
             )
             for setup in board.setups
         ),
-        uncertain_inputs=tuple(board.uncertain_inputs),
+        uncertain_inputs=tuple(one.name for one in board.uncertain if one.is_listed),
         estimate=Constants(*(float(value) for value in (*elastic, *estimate.rigidities))),
         expected_sd_percent=Elastic(**{name: 100.0 * value for name, value in expected.items()}),
         condition_number=found.condition_number,

@@ -29,6 +29,7 @@ from bayesplate.estimates.plausibility import require_plausible
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.plate.board import Board
 from bayesplate.plate.from_card import board_from_card
+from bayesplate.plate.sessions import notes as session_notes
 from bayesplate.plate.writing import card_text
 
 Card = str | os.PathLike[str] | Board
@@ -144,7 +145,7 @@ def prepared_card(read: BoardCard, named: NamedCards, effects: Sequence[str] | N
     if faults or named.prior is None:
         raise InputError(faults)
     require_plausible(board, named.prior, np.random.default_rng(0))
-    told = (*board.notes, *remarks(read, board.effects), *notes(board))
+    told = (*board.notes, *remarks(read, board.effects), *notes(board), *session_notes(board))
     return Prepared(read, named, stated, declare(replace(board, notes=told)))
 
 

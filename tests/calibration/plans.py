@@ -44,6 +44,7 @@ from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, proposa
 from bayesplate.planning.stations import known_mass
 from bayesplate.planning.survivors import survivors
 from bayesplate.plate.board import Board
+from bayesplate.plate.sessions import shared_share
 
 Record = dict[str, Any]
 
@@ -261,8 +262,14 @@ def _read(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
     exact = np.log([found[b][0] for b in beams])
     name = design.setups[0].name
     stays = one.what in ("modes", "mass")
-    noise = truth.drawn_noise[name] * np.log(2.0) / 1200.0 if stays else drawn(setup.noise, rng)
-    return np.asarray(exact + noise * rng.standard_normal(len(exact)))
+    first = truth.drawn_noise[name] * np.log(2.0) / 1200.0
+    noise = first if stays else drawn(setup.noise, rng)
+    if one.what != "again":
+        return np.asarray(exact + noise * rng.standard_normal(len(exact)))
+    before = asked.found.ground.baseline.board.setup(station.base.name)
+    share, off = shared_share(before), np.log(before.measured) - exact
+    discrepancy = share * off + (share * (1.0 - share)) ** 0.5 * first * rng.standard_normal(len(exact))
+    return np.asarray(exact + discrepancy + (1.0 - share) ** 0.5 * noise * rng.standard_normal(len(exact)))
 
 
 def _looked_at(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:

@@ -1,91 +1,148 @@
-"""Sessions that hold a plate alike: solved once, with the frequencies that each has alone."""
+"""Sessions of one setup: what the board does that its plate does not tells once, what clamping changes each time."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 import ritz
-from made_boards import CANTILEVER_LABELS, board_of, setup_of
+from made_boards import CANTILEVER_LABELS, NARROW, board_of, models_at, peaks_of, setup_of
 
 from bayesplate.cards import load_prior
-from bayesplate.effects import declare
-from bayesplate.posterior import laplace
-from bayesplate.posterior.inference import pose
+from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.frequencies.model import OtherMode
+from bayesplate.modes.naming import Place
+from bayesplate.modes.plate import Parity
+from bayesplate.plate.board import Board
+from bayesplate.plate.sessions import discrepancy_names, sessions, with_discrepancies
+from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem
+from bayesplate.posterior.inference import PosedProblem, pose
+from bayesplate.posterior.normal_case import NormalCase
 from bayesplate.quantities import Quantity
 
-HERTZ = ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS)
-SESSIONS = (
-    setup_of(ritz.CANTILEVER, HERTZ, name="monday"),
-    setup_of(ritz.CANTILEVER, {label: HERTZ[label] for label in CANTILEVER_LABELS[::-1]}, name="tuesday"),
-    setup_of(ritz.ALL_FREE, ritz.simulate(replace(ritz.FINNISH, edges=ritz.ALL_FREE), [(1, 1), (2, 0)]), name="free"),
-)
+SCATTER, DISCREPANCY, N_SESSIONS, N_BOARDS = 0.003, 0.006, 4, 400
+SCALE = "discrepancy[day 1 to day 4]"
 
 
-@pytest.fixture
-def solved(monkeypatch):
-    names = []
-    made = laplace.with_exact
-
-    def with_exact(model, *arguments):
-        names.append(model.setup.name)
-        return made(model, *arguments)
-
-    monkeypatch.setattr(laplace, "with_exact", with_exact)
-    return names
+def board(n_sessions: int = N_SESSIONS, discrepancy: float = DISCREPANCY, *, is_rough: bool = False) -> Board:
+    """A board in some sessions of one setup, of known noise and, where a name is given to it, discrepancy."""
+    hertz = ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS)
+    noise = Quantity.from_median(SCATTER, NARROW)
+    if is_rough:  # the third and the fifth mode of the board lie elsewhere than those of its plate, every day
+        hertz |= {label: 1.012 * hertz[label] for label in (CANTILEVER_LABELS[2], CANTILEVER_LABELS[4])}
+    days = [setup_of(ritz.CANTILEVER, hertz, name=f"day {i + 1}", noise=noise) for i in range(n_sessions)]
+    made = with_discrepancies(board_of(ritz.FINNISH, days))
+    return made if n_sessions == 1 else made.with_priors({SCALE: Quantity.exact(discrepancy)})
 
 
-def frequencies(problem, setup):
-    model = problem.posterior.models[setup]
-    values = problem.parameters.values(problem.centre[None, :])
-    every = model.every_log_frequency(values, "exact")[0]
-    return {reading.beams: log for reading, log in zip(model.setup.readings, every, strict=True)}
+@lru_cache(maxsize=4)
+def posed(discrepancy: float = DISCREPANCY, n_sessions: int = N_SESSIONS) -> PosedProblem:
+    """The problem of such a board."""
+    return pose(board(n_sessions, discrepancy), load_prior("weakly-informative"), law="linear")
 
 
-def test_they_are_solved_once_and_keep_their_own_order(solved):
-    problem = pose(board_of(ritz.FINNISH, SESSIONS), load_prior("spruce"))
+def test_setups_that_hold_and_load_the_board_alike_are_sessions():
+    hertz = ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS)
+    one = setup_of(ritz.CANTILEVER, hertz, name="one")
+    others = [
+        replace(one, name="another day", hammer=(0.01, 0.01)),
+        replace(one, name="deeper", clamped={"x0": Quantity.exact(0.03)}),
+        replace(one, name="loaded", attached=(AttachedItem("weight", ((0.1, 0.1),), Quantity.exact(1e-3)),)),
+        replace(one, name="free", ends_x=("free", "free")),
+        replace(one, name="third day", noise=Quantity.from_median(0.01, 2.0)),
+    ]
+    made = board_of(ritz.FINNISH, [one, *others])
 
-    assert set(solved) == {"monday", "free"}
-    assert frequencies(problem, 0) == frequencies(problem, 1)
-    for label, log in frequencies(problem, 1).items():
-        assert np.exp(log) == pytest.approx(HERTZ[label], rel=2e-3)
+    assert [[setup.name for setup in group] for group in sessions(made)] == [["one", "another day", "third day"]]
+    found = with_discrepancies(made)
+    assert [one.name for one in found.setups if one.shares is not None] == ["one", "another day", "third day"]
+    assert found.inputs["discrepancy[one to third day]"] == DEFAULT_NOISE
+    assert len(found.parameters) == len(made.parameters) + 1 + len(CANTILEVER_LABELS)
+    assert with_discrepancies(found) == found
+    assert found.to_card() == made.to_card()
+    alone = board_of(ritz.FINNISH, [one, *others[1:4]])
+    assert with_discrepancies(alone) == alone
 
 
-def test_sessions_that_hold_it_otherwise_are_solved_each(solved):
-    """A clamp that covers more has the same matrices with other weights; one that may be softer leaves the region."""
-    monday, tuesday, _ = SESSIONS
-    covered = board_of(ritz.FINNISH, [monday, replace(tuesday, clamped={"x0": Quantity.exact(0.004)})])
-    pose(covered, load_prior("spruce"))
-    assert set(solved) == {"monday", "tuesday"}
-
-    solved.clear()
-    soft = declare(replace(board_of(ritz.FINNISH, [monday, tuesday]), effects=("clamp_rotation",)))
-    own = next(one for one in soft.parameters if one.owner.name == "tuesday" and one.is_of_effect)
-    pose(soft.with_parameters([replace(own, prior=replace(own.prior, sd=3.0 * own.prior.sd))]), load_prior("spruce"))
-    assert set(solved) == {"monday", "tuesday"}
-
-
-def test_sessions_with_a_size_of_their_own_each_are_solved_once(solved):
-    """The law of one with the sizes of the other: each answers to its own alone."""
-    monday, tuesday, _ = SESSIONS
-    soft = declare(replace(board_of(ritz.FINNISH, [monday, tuesday]), effects=("clamp_rotation",)))
-    problem = pose(soft, load_prior("spruce"))
-
-    assert set(solved) == {"monday"}
-    sizes = [one.name for one in problem.parameters.uncertain if one.is_of_effect]
-    values = problem.parameters.values(problem.centre[None, :])
-    first, second = problem.posterior.models
-    for own, model in zip(sizes, (first, second), strict=True):
-        changed = {**values, own: values[own] + 1e-3}
-        log = model.every_log_frequency(values, "exact")[0]
-        assert np.all(model.every_log_frequency(changed, "exact")[0] < log)
-        other = second if model is first else first
-        np.testing.assert_array_equal(
-            other.every_log_frequency(changed, "exact"), other.every_log_frequency(values, "exact")
+def test_the_constants_are_as_uncertain_as_readings_that_share_a_part_of_their_errors():
+    """Generalised least squares with the covariance of the readings written out, and what independent errors say."""
+    problem = posed()
+    slopes = problem.estimate.sensitivities
+    mode = np.tile(np.arange(len(CANTILEVER_LABELS)), N_SESSIONS)
+    alike = (mode[:, None] == mode).astype(float)
+    expected, taken_for_independent = (
+        np.linalg.inv(slopes.T @ np.linalg.solve(one, slopes))
+        for one in (
+            SCATTER**2 * np.eye(mode.size) + DISCREPANCY**2 * alike,
+            (SCATTER**2 + DISCREPANCY**2) * np.eye(mode.size),
         )
-    both = {**values, sizes[0]: values[sizes[0]] + 1e-3, sizes[1]: values[sizes[0]] + 1e-3}
-    order = [first.every_beams.index(beams) for beams in second.every_beams]
-    np.testing.assert_allclose(
-        second.every_log_frequency(both, "exact")[0], first.every_log_frequency(both, "exact")[0][order], rtol=1e-12
     )
+
+    assert problem.covariance[:3, :3] == pytest.approx(expected, rel=0.01)
+    ratio = np.sqrt(np.diagonal(expected) / np.diagonal(taken_for_independent))
+    of_sessions, of_all = SCATTER**2 / N_SESSIONS, (SCATTER**2 + DISCREPANCY**2) / N_SESSIONS
+    assert ratio == pytest.approx(np.full(3, np.sqrt((of_sessions + DISCREPANCY**2) / of_all)))
+    assert ratio.min() > 1.8
+
+
+@pytest.mark.parametrize("believed", [DISCREPANCY, 1e-9], ids=["shared", "taken for nothing"])
+def test_constants_of_boards_with_a_discrepancy_are_covered(believed):
+    """The negative control takes every session for new evidence, and covers far less than it says."""
+    case = NormalCase.of(posed(believed))
+    rng = np.random.default_rng(3)
+    n_modes = len(CANTILEVER_LABELS)
+    log_noise = np.log(np.full((1, N_SESSIONS), SCATTER))
+    held = np.zeros(3)
+    for _ in range(N_BOARDS):
+        shared = np.tile(DISCREPANCY * rng.standard_normal(n_modes), N_SESSIONS)
+        read = replace(case, misfit=shared + SCATTER * rng.standard_normal(shared.size))
+        mean, covariance = read.given_noise(log_noise)
+        off = (mean[0] - case.at[case.parameters.fitted_columns])[:3]
+        held += np.abs(off) < 1.6449 * np.sqrt(np.diagonal(covariance[0])[:3])
+    tolerance = 3.5 * np.sqrt(0.9 * 0.1 / N_BOARDS)
+
+    assert (np.abs(held / N_BOARDS - 0.9) < tolerance).all() == (believed == DISCREPANCY), held / N_BOARDS
+    assert believed == DISCREPANCY or (held / N_BOARDS).max() < 0.6
+
+
+def test_a_discrepancy_moves_the_mode_in_all_sessions_and_no_other():
+    problem = posed()
+    parameters, label = problem.parameters, problem.board.setups[0].labels[2]
+    theta = np.tile(problem.centre, (2, 1))
+    _, standard = discrepancy_names(problem.board.setups[0], label)
+    theta[1, parameters.names.index(f"z[{standard}]")] += 1.5
+    moved = np.diff(
+        [np.concatenate(one) for one in zip(*problem.posterior.log_frequencies(theta), strict=True)], axis=0
+    )
+
+    expected = np.zeros((N_SESSIONS, len(CANTILEVER_LABELS)))
+    expected[:, 2] = 1.5 * DISCREPANCY
+    assert moved.reshape(expected.shape) == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_peak_that_may_be_the_mode_is_moved_too():
+    made = board()
+    setup = replace(made.setups[0], readings=made.setups[0].readings[:3], peaks=peaks_of(300.0))
+    beams, values = CANTILEVER_LABELS[3], {**made.nominal(), "discrepancy (0,2)[day 1 to day 4]": np.array([2.0, -1.0])}
+    (model,) = models_at(replace(made, setups=(setup,)), [30.0, 1.6, 6.0])
+    model = replace(model, others=(OtherMode(Place(Parity(0, 1), 1, 0.9), beams), OtherMode(model.places[0], None)))
+
+    assert model.discrepancies(values) == pytest.approx(DISCREPANCY * np.outer([2.0, -1.0], [0, 0, 0, 1, 0]))
+
+
+def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be():
+    """At the size at which it does nothing an effect shifts nothing, though the board is not its plate."""
+    problem = pose(board(is_rough=True), load_prior("weakly-informative"), law="linear")
+    baseline = baseline_of(problem)
+    assert np.abs(baseline.every.discrepancy).max() > 1e-3
+    for name in ("attached_mass", "density_gradient"):  # the one follows shapes, the other the ranks of classes
+        every = forms(baseline.board)
+        form = every[name][0]
+        nothing = {free.name: np.array([free.null + 1e-9]) for free in form.free}
+        law = form_law(baseline, form).placed(baseline)
+        shift = law.log_frequencies(baseline, baseline.log_rigidities[None, :], nothing) - baseline.log_frequency
+        assert np.abs(shift).max() < 2e-4, name

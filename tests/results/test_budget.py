@@ -6,7 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import ritz
+from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
+from bayesplate.plate.sessions import with_discrepancies
+from bayesplate.quantities import Quantity
 from bayesplate.results.budget import budget, input_remarks, input_shares, row_words
 from bayesplate.workflow.prepare import prepare
 
@@ -40,3 +44,19 @@ def test_a_row_has_words(read):
     assert row_words("mass", board) == "mass"
     (said,) = input_remarks(draws, board)
     assert said.startswith("61 % of the uncertainty (variance) of E_x comes from the thickness profile: measure it")
+
+
+def test_discrepancies_of_sessions_are_one_row_and_no_reason_to_measure_better():
+    hertz = dict(zip(CANTILEVER_LABELS, (50.0, 98.0, 310.0, 340.0, 480.0, 700.0), strict=True))
+    days = [setup_of(ritz.CANTILEVER, hertz, name=name) for name in ("monday", "friday")]
+    board = with_discrepancies(board_of(ritz.FINNISH, days, poisson_xy=Quantity.from_mean(0.4, 0.08, "normal")))
+    of_modes = [one.name for one in board.uncertain if not one.is_listed]
+    columns = np.linalg.qr(np.column_stack([np.ones(400), np.random.default_rng(2).standard_normal((400, 7))]))[0].T[1:]
+    log_modulus = 0.6 * columns[0] + 0.5 * columns[1] + 0.1 * columns[6]
+    inputs = dict(zip((*of_modes, "poisson_xy"), columns, strict=True))
+    draws = SimpleNamespace(moduli={"E_x": np.exp(log_modulus)}, inputs=inputs)
+
+    assert len(of_modes) == 6
+    assert set(budget(draws, board)["E_x"]) == {"poisson_xy", "discrepancies of the modes"}
+    (said,) = input_remarks(draws, board)
+    assert "comes from the discrepancies of the modes, which more sessions do not narrow: read other modes" in said

@@ -206,6 +206,8 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     at = problem.centre[columns]
     slopes = sensitivities(predict, at)
     inputs = at[N_RIGIDITIES:]
+    values = parameters.values(problem.centre[None, :])
+    discrepancies = [np.broadcast_to(one.discrepancies(values)[0], len(one.every_place)) for one in models]
     spectrum = Spectrum(
         log_frequency=predict(at[None, :])[0],
         slopes=slopes[:, :N_RIGIDITIES],
@@ -214,11 +216,12 @@ def baseline_of(problem: PosedProblem) -> Baseline:
         inputs=inputs,
         peaks=problem.posterior.peaks,
         predict=predict.with_fixed(inputs),
+        discrepancy=np.concatenate(discrepancies),
     )
     rows = spectrum.first_of_each([len(setup.readings) for setup in board.setups])
     bare = Baseline(
         board=board,
-        values={name: np.asarray(np.ravel(v)[0]) for name, v in parameters.values(problem.centre[None, :]).items()},
+        values={name: np.asarray(np.ravel(value)[0]) for name, value in values.items()},
         log_rigidities=at[:N_RIGIDITIES],
         log_frequency=np.zeros(rows.size),
         residual=log_measured(board),

@@ -65,7 +65,7 @@ class FormLaw:
         there: Values = inputs | dict(values) | constants
         followed = self.following or ((),) * len(self.models)
         parts = [_log_frequencies(model, each, there) for model, each in zip(self.models, followed, strict=True)]
-        return np.concatenate(parts, axis=1)
+        return np.concatenate(parts, axis=1) + baseline.every.discrepancy
 
     def placed(self, baseline: Baseline) -> FormLaw:
         """The same law with the modes of a baseline, which may be another board of the same sizes.
@@ -118,7 +118,8 @@ class FormLaw:
         assert model.exact is not None
         weights = model.system.weights(self._without(baseline))
         start = baseline.every.starts[setup]
-        wanted = baseline.every.log_frequency[start : start + len(of_base)]
+        of_plate = baseline.every.log_frequency - baseline.every.discrepancy
+        wanted = of_plate[start : start + len(of_base)]
         found: dict[int, Place] = {}
         for block in model.exact.reduced.blocks:
             rows = [

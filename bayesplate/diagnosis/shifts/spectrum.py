@@ -37,6 +37,8 @@ class Spectrum:
         For each setup what its peaks say of its modes; None where all labels are certain.
     predict : callable, optional
         ln f (Hz) of all of them as a function of x, without an effect; by default linear.
+    discrepancy : (n_every,) array or 0
+        ln f of the board less that of its plate, at the estimate: `bayesplate.plate.sessions`.
     """
 
     log_frequency: Floats
@@ -46,6 +48,7 @@ class Spectrum:
     inputs: Floats
     peaks: tuple[PeakLikelihood | None, ...]
     predict: Predict | None = None
+    discrepancy: Floats | float = 0.0
 
     @cached_property
     def flat_places(self) -> tuple[Place, ...]:

@@ -16,7 +16,15 @@ from computations.library import (
     verdict_limits,
 )
 from computations.plates import convergence, paper_table
-from computations.runs import both_laws, exact_law, files_of, provenance, sheet_of, thickness_part
+from computations.runs import (
+    both_laws,
+    exact_law,
+    files_of,
+    provenance,
+    sessions_together,
+    sheet_of,
+    thickness_part,
+)
 from computations.sight import cosines, designs, leverages, rounding, visible_parts
 
 __all__ = [
@@ -40,6 +48,7 @@ __all__ = [
     "reference",
     "references",
     "rounding",
+    "sessions_together",
     "sheet_of",
     "symbols",
     "thickness_part",

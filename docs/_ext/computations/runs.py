@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from bayesplate.plate.sessions import DISCREPANCY
 from commands import bench, printed
 from computations.markdown import picture, table, words_table
 
@@ -104,3 +105,20 @@ def exact_law(folder: Path, *cards: str) -> str:
     rows = [(f"`{card}`", f"{_summary(card)['error']['exact_law_worst_cents']:.3f}") for card in cards]
     text = words_table(("board", "largest error over all modes and held-out points, cents"), rows)
     return text + "\nEvery fit makes this comparison and states it; a tenth of a cent is accepted.\n"
+
+
+def sessions_together(folder: Path) -> str:
+    """What three sessions of one board say together: the scatter of each, and what the board does in all of them."""
+    summary = _summary("nemus-D")
+    rows = [(f"noise of {name}", _percents(entry)) for name, entry in summary["noise"].items()]
+    rows += [
+        ("discrepancy of the board", _percents(entry))
+        for name, entry in summary["inputs"].items()
+        if name.startswith(DISCREPANCY)
+    ]
+    return table(("", "median, %", "90 % interval, %"), [(words, *numbers) for words, numbers in rows])
+
+
+def _percents(entry: dict[str, float]) -> tuple[str, str]:
+    low, median, high = (100 * entry[key] for key in ("q05", "q50", "q95"))
+    return f"{median:.2f}", f"{low:.2f} to {high:.2f}"

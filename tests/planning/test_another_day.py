@@ -1,0 +1,73 @@
+"""The modes that were read, on another day: what the first day's readings were off by tells of the second day's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import ritz
+from made_boards import CANTILEVER_LABELS, board_of, setup_of
+
+from bayesplate.planning.gains import Readings
+from bayesplate.planning.modes_read import _another_day
+from bayesplate.plate.parameter import Owner
+from bayesplate.plate.readings import ReadingErrors
+from bayesplate.plate.sessions import shared_share
+from bayesplate.plate.setup import DEFAULT_NOISE
+from bayesplate.quantities import Quantity
+
+HERTZ = dict(zip(CANTILEVER_LABELS, (50.0, 98.0, 310.0, 340.0, 480.0, 700.0), strict=True))
+SETUP = setup_of(ritz.CANTILEVER, HERTZ, resolution=1.0, noise=Quantity.from_median(0.004, 1.6))
+N, N_U = len(HERTZ), 3
+RNG = np.random.default_rng(4)
+SLOPES, SHIFT = RNG.standard_normal((N, N_U)), RNG.standard_normal(N)
+FIRST, SECOND = 0.005, 0.003
+"""Noise of the first day as the search has it, and what is expected of the second."""
+
+
+def another_day(setup):
+    """Readings of one term on the second day, given the first."""
+    board = board_of(ritz.FINNISH, [setup])
+    station = SimpleNamespace(base=setup, setup=setup, n_old=N)
+    own = ReadingErrors.of(setup).own_variance
+    alone = Readings((SHIFT[None],), (SLOPES[None],), ((SECOND**2 + own)[None],))
+    return _another_day(SimpleNamespace(board=board), station, alone, [np.array([FIRST**2])])
+
+
+def test_both_days_tell_what_their_joint_covariance_says():
+    """Normal equations of all readings, their covariance written out, against the second day given the first."""
+    share, own = shared_share(SETUP), ReadingErrors.of(SETUP).own_variance
+    assert share == pytest.approx(9.0 / 25.0)
+    common = share * FIRST**2
+    one, other = FIRST**2 + own, common + (1.0 - share) * SECOND**2 + own
+    covariance = np.block([[np.diag(one), common * np.eye(N)], [common * np.eye(N), np.diag(other)]])
+    read = np.concatenate([np.log(list(HERTZ.values())), RNG.standard_normal(N)])
+    whole = np.vstack([SLOPES, SLOPES])
+    weighted = np.linalg.solve(covariance, whole)
+    precision = weighted.T @ whole
+    mean = np.linalg.solve(precision, weighted.T @ (read - np.tile(SHIFT, 2)))
+
+    given = another_day(SETUP)
+    slopes, variance = given.slopes[0][0], given.variance[0][0]
+    later = SLOPES.T @ (SLOPES / one[:, None]) + slopes.T @ (slopes / variance[:, None])
+    told = SLOPES.T @ ((read[:N] - SHIFT) / one) + slopes.T @ ((read[N:] - given.shift[0][0]) / variance)
+
+    assert later == pytest.approx(precision, rel=1e-10)
+    assert np.linalg.solve(later, told) == pytest.approx(mean, rel=1e-8)
+    independent = SLOPES.T @ (SLOPES * (1.0 / one + 1.0 / (SECOND**2 + own))[:, None])
+    assert np.linalg.slogdet(later)[1] < np.linalg.slogdet(independent)[1] - 0.5  # the second day is no new board
+
+
+def test_where_sessions_share_their_discrepancies_already_another_one_is_as_new_as_they_were():
+    setup = replace(SETUP, shares=Owner("group", "monday to friday"))
+    assert shared_share(setup) == 0.0
+    given = another_day(setup)
+    assert given.slopes[0][0] == pytest.approx(SLOPES)
+    assert given.shift[0][0] == pytest.approx(SHIFT)
+    assert given.variance[0][0] == pytest.approx(SECOND**2 + ReadingErrors.of(SETUP).own_variance)
+
+
+def test_a_free_board_finds_half_of_its_noise_again():
+    assert shared_share(replace(SETUP, noise=DEFAULT_NOISE)) == pytest.approx(0.5)
