@@ -51,6 +51,11 @@ SECTIONS = {
         "Ranks of a joint fit",
         "One board held free, then clamped at one end: constants in common, noise of each setup its own.",
     ),
+    "sessions": (
+        "Ranks of two sessions",
+        "One board clamped twice, under the linear law: the discrepancies of its modes from the plate, of a scale that "
+        "is drawn too, are in both sessions.",
+    ),
     "oracle": (
         "Closed forms",
         "Data sets whose posterior is known: normal where the noise is known, Student's where it is not.",
@@ -108,6 +113,7 @@ MODELS = {
     "linear": Design(law="fixed-linear", resolution=0.0),
     "exact": Design(),
     "both": Design(edges="both"),
+    "sessions": Design(edges="days", law="fixed-linear", resolution=0.0, n_walkers=32),
 }
 """Models that are ranked without mutants, by the name of their part."""
 

@@ -21,13 +21,14 @@ from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
+from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.plate.setup import DEFAULT_NOISE
 from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 
-Edges = Literal["free", "cantilever", "both"]
+Edges = Literal["free", "cantilever", "both", "days"]
 Generator = Literal["package", "ritz"]
 Law = Literal["exact", "auto", "fixed-linear"]
 Hertz = Mapping[str, Mapping[tuple[int, int], float]]
@@ -40,8 +41,8 @@ class Design:
 
     Attributes
     ----------
-    edges : "free", "cantilever" or "both"
-        Both: one board in two setups, fitted together.
+    edges : "free", "cantilever", "both" or "days"
+        Both: one board in two setups, fitted together. Days: in two sessions of one setup.
     generator : "package" or "ritz"
         Whose frequencies are the truth: a full solve of the package, or the independent solver.
     law : "exact", "auto" or "fixed-linear"
@@ -95,7 +96,8 @@ class Design:
             for name in self.setups
             if name in hertz
         ]
-        return declare(made_board("simulated", self.inputs, setups, prior=self.prior, effects=self._effects))
+        board = made_board("simulated", self.inputs, setups, prior=self.prior, effects=self._effects)
+        return with_discrepancies(declare(board))
 
     @property
     def setups(self) -> tuple[str, ...]:
@@ -114,8 +116,9 @@ class Design:
 
 @lru_cache(maxsize=8)
 def amplitudes(design: Design) -> dict[str, Quantity]:
-    """Priors of the parameters of the declared effect."""
-    return {one.name: one.prior for one in design.board(design.placeholders).parameters if one.is_of_effect}
+    """Priors of the parameters of the declared effect, and of the discrepancies that sessions share."""
+    every = design.board(design.placeholders).parameters
+    return {one.name: one.prior for one in every if one.is_of_effect or one.owner.kind == "group"}
 
 
 @dataclass(frozen=True)
@@ -181,10 +184,15 @@ def _frequencies(design: Design, values: Mapping[str, float]) -> tuple[Hertz, tu
     else:
         models = models_at(design.board(design.placeholders), [values[n] for n in RIGIDITIES], **values)
     every = {
-        name: dict(zip(LABELS[name], np.exp(model.log_frequencies(arrays, "linear")[0]).tolist(), strict=True))
+        name: dict(zip(LABELS[name], np.exp(of_board(model, arrays)).tolist(), strict=True))
         for name, model in zip(design.setups, models, strict=True)
     }
     return every, ranks_in_class(models)
+
+
+def of_board(model: SetupModel, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """ln f of the modes that are read, by the linear law: (n_modes,) array."""
+    return model.every_log_frequency_of_board(values, "linear")[0, : len(model.places)]
 
 
 def ranks_in_class(models: Sequence[SetupModel]) -> tuple[int, ...]:
