@@ -107,7 +107,13 @@ class SetupModel:
         return self.every_log_frequency(values, law) + self.discrepancies(values)
 
     def discrepancies(self, values: Values) -> NDArray[np.float64]:
-        """ln f of the board less that of its plate, of all modes: (n_draws, n_every) array, or a zero of any shape."""
+        """ln f of the board less that of its plate, of all modes.
+
+        Returns
+        -------
+        (n_draws, n_every) array
+            A single zero where no session shares any.
+        """
         names = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
         known = {i: one for i, one in names.items() if one is not None and one[1] in values}
         if not known:

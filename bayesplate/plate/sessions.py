@@ -75,7 +75,7 @@ def with_discrepancies(board: Board) -> Board:
         owner = Owner("group", f"{group[0].name} to {group[-1].name}")
         labels = sorted({label for setup in group for label in setup.labels})
         new = (one for one in _parameters(owner, labels) if one.name not in board.inputs)
-        setups = tuple(replace(one, shares=owner) if one in group else one for one in found.setups)
+        setups = tuple(replace(one, group=owner) if one in group else one for one in found.setups)
         found = replace(found.with_parameters(new), setups=setups)
     return found
 
@@ -94,7 +94,7 @@ def shared_share(setup: Setup) -> float:
 
     None where its sessions share their discrepancies already: what is called noise there is the scatter of a session.
     """
-    if setup.shares is not None:
+    if setup.group is not None:
         return 0.0
     shared = DEFAULT_NOISE.median**2
     return float(shared / (shared + setup.noise.median**2))
@@ -102,9 +102,9 @@ def shared_share(setup: Setup) -> float:
 
 def discrepancy_names(setup: Setup, label: Label) -> tuple[str, str] | None:
     """Names of the parameters whose product shifts ln f of a mode of a setup; None where it shares nothing."""
-    if setup.shares is None:
+    if setup.group is None:
         return None
-    return shown_name(DISCREPANCY, setup.shares), shown_name(_key(label), setup.shares)
+    return shown_name(DISCREPANCY, setup.group), shown_name(_key(label), setup.group)
 
 
 def _key(label: Label) -> str:

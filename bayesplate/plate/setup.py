@@ -83,7 +83,7 @@ class Setup:
     hammer : tuple of float or None, m
     air : DeclaredAir or None
         None: not declared.
-    shares : Owner or None
+    group : Owner or None
         The group of sessions that the setup is one of (`bayesplate.plate.sessions`).
     """
 
@@ -102,7 +102,7 @@ class Setup:
     attached: tuple[AttachedItem, ...] = ()
     hammer: tuple[float, float] | None = None
     air: DeclaredAir | None = None
-    shares: Owner | None = None
+    group: Owner | None = None
 
     @classmethod
     def from_frequencies(

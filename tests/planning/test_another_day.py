@@ -61,7 +61,7 @@ def test_both_days_tell_what_their_joint_covariance_says():
 
 
 def test_where_sessions_share_their_discrepancies_already_another_one_is_as_new_as_they_were():
-    setup = replace(SETUP, shares=Owner("group", "monday to friday"))
+    setup = replace(SETUP, group=Owner("group", "monday to friday"))
     assert shared_share(setup) == 0.0
     given = another_day(setup)
     assert given.slopes[0][0] == pytest.approx(SLOPES)

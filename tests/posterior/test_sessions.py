@@ -59,7 +59,7 @@ def test_setups_that_hold_and_load_the_board_alike_are_sessions():
 
     assert [[setup.name for setup in group] for group in sessions(made)] == [["one", "another day", "third day"]]
     found = with_discrepancies(made)
-    assert [one.name for one in found.setups if one.shares is not None] == ["one", "another day", "third day"]
+    assert [one.name for one in found.setups if one.group is not None] == ["one", "another day", "third day"]
     assert found.inputs["discrepancy[one to third day]"] == DEFAULT_NOISE
     assert len(found.parameters) == len(made.parameters) + 1 + len(CANTILEVER_LABELS)
     assert with_discrepancies(found) == found
