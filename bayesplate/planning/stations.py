@@ -21,6 +21,7 @@ from bayesplate.labels import Label
 from bayesplate.modes.solve import Modes
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.measured import Reading
+from bayesplate.plate.sessions import under_prior_scales
 from bayesplate.plate.setup import Ends, Setup, assumed_noise
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.quantities import Quantity
@@ -297,4 +298,6 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
     slopes = sensitivities(Predictor(at, [model], "linear"), start)
     found = solved(station, board, values)
     there = found[0] + model.discrepancies(at(start[None, :]))[0]
-    return BareLaw(station, found, there - slopes[:, N_RIGIDITIES:] @ start[N_RIGIDITIES:], slopes)
+    of_inputs, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], start[N_RIGIDITIES:])
+    every = np.concatenate([slopes[:, :N_RIGIDITIES], of_inputs], axis=1)
+    return BareLaw(station, found, there - of_inputs @ inputs, every)

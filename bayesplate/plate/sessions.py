@@ -19,11 +19,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import Owner, Parameter, shown_name
 from bayesplate.plate.setup import DEFAULT_NOISE, Setup
 from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
 
 DISCREPANCY, OF_MODES = "discrepancy", "discrepancies of the modes"
 _SOURCE = "free boards, which no clamp disturbs, settle at 0.24-0.30 %"
@@ -105,6 +110,39 @@ def discrepancy_names(setup: Setup, label: Label) -> tuple[str, str] | None:
     if setup.group is None:
         return None
     return shown_name(DISCREPANCY, setup.group), shown_name(_key(label), setup.group)
+
+
+def under_prior_scales(board: Board, values: Values, slopes: Floats, inputs: Floats) -> tuple[Floats, Floats]:
+    """Slopes and places of the inputs where discrepancies have the size that is expected beforehand.
+
+    A fit lets their scale follow the residual. Who judges the residual must not: like noise that is left free, a scale
+    that has followed it would let any residual pass.
+
+    Parameters
+    ----------
+    board : Board
+    values : dict of float
+        Where the slopes were taken.
+    slopes : (n_modes, n_inputs) array
+        d ln f by the standard coordinates of the board's uncertain parameters.
+    inputs : (n_inputs,) array
+        These coordinates.
+
+    Returns
+    -------
+    slopes, inputs : arrays of the same shapes
+        The discrepancies themselves are what they were; their scale moves nothing.
+    """
+    slopes, inputs = slopes.copy(), inputs.copy()
+    for i, one in enumerate(board.uncertain):
+        if one.owner.kind != "group":
+            continue
+        scale = shown_name(DISCREPANCY, one.owner)
+        prior = board.inputs[scale]
+        factor = float(np.hypot(prior.mean, prior.sd) / values[scale]) if one.name != scale else 0.0
+        slopes[:, i] *= factor
+        inputs[i] = inputs[i] / factor if factor else 0.0
+    return slopes, inputs
 
 
 def _key(label: Label) -> str:

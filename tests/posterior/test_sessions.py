@@ -11,6 +11,8 @@ import ritz
 from made_boards import CANTILEVER_LABELS, NARROW, board_of, models_at, peaks_of, setup_of
 
 from bayesplate.cards import load_prior
+from bayesplate.diagnosis.evidence.search import prepare_search, search
+from bayesplate.diagnosis.shifts import baseline as home
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.diagnosis.shifts.laws import form_law
@@ -28,15 +30,15 @@ SCATTER, DISCREPANCY, N_SESSIONS, N_BOARDS = 0.003, 0.006, 4, 400
 SCALE = "discrepancy[day 1 to day 4]"
 
 
-def board(n_sessions: int = N_SESSIONS, discrepancy: float = DISCREPANCY, *, is_rough: bool = False) -> Board:
-    """A board in some sessions of one setup, of known noise and, where a name is given to it, discrepancy."""
+def board(n_sessions: int = N_SESSIONS, discrepancy: float | None = DISCREPANCY, *, is_rough: bool = False) -> Board:
+    """A board in some sessions of one setup, of known noise and, unless it is none, known discrepancy."""
     hertz = ritz.simulate(ritz.FINNISH, CANTILEVER_LABELS)
     noise = Quantity.from_median(SCATTER, NARROW)
     if is_rough:  # the third and the fifth mode of the board lie elsewhere than those of its plate, every day
-        hertz |= {label: 1.012 * hertz[label] for label in (CANTILEVER_LABELS[2], CANTILEVER_LABELS[4])}
+        hertz |= {label: 1.03 * hertz[label] for label in (CANTILEVER_LABELS[2], CANTILEVER_LABELS[4])}
     days = [setup_of(ritz.CANTILEVER, hertz, name=f"day {i + 1}", noise=noise) for i in range(n_sessions)]
     made = with_discrepancies(board_of(ritz.FINNISH, days))
-    return made if n_sessions == 1 else made.with_priors({SCALE: Quantity.exact(discrepancy)})
+    return made if discrepancy is None else made.with_priors({SCALE: Quantity.exact(discrepancy)})
 
 
 @lru_cache(maxsize=4)
@@ -134,10 +136,15 @@ def test_a_peak_that_may_be_the_mode_is_moved_too():
     assert model.discrepancies(values) == pytest.approx(DISCREPANCY * np.outer([2.0, -1.0], [0, 0, 0, 1, 0]))
 
 
-def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be():
+@pytest.fixture(scope="module")
+def rough():
+    """A board that is far from its plate in two modes, every day, with a discrepancy that may follow."""
+    return pose(board(discrepancy=None, is_rough=True), load_prior("weakly-informative"), law="linear")
+
+
+def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be(rough):
     """At the size at which it does nothing an effect shifts nothing, though the board is not its plate."""
-    problem = pose(board(is_rough=True), load_prior("weakly-informative"), law="linear")
-    baseline = baseline_of(problem)
+    baseline = baseline_of(rough)
     assert np.abs(baseline.every.discrepancy).max() > 1e-3
     for name in ("attached_mass", "density_gradient"):  # the one follows shapes, the other the ranks of classes
         every = forms(baseline.board)
@@ -146,3 +153,17 @@ def test_a_search_begins_where_the_board_is_and_not_where_its_plate_would_be():
         law = form_law(baseline, form).placed(baseline)
         shift = law.log_frequencies(baseline, baseline.log_rigidities[None, :], nothing) - baseline.log_frequency
         assert np.abs(shift).max() < 2e-4, name
+
+
+@pytest.mark.parametrize("judge", ["prior", "fit"])
+def test_a_scale_that_has_followed_the_residual_does_not_excuse_it(judge, rough, monkeypatch):
+    """By the prior of the discrepancies the residual is too large for chance, by the scale of the fit it is not."""
+    if judge == "fit":
+        monkeypatch.setattr(home, "under_prior_scales", lambda board, values, slopes, inputs: (slopes, inputs))
+    baseline = baseline_of(rough)
+    found = search(prepare_search(baseline, tried=()))
+
+    assert rough.parameters.values(rough.centre[None])[SCALE][0] > 2.0 * DEFAULT_NOISE.median
+    of_plate = baseline.log_frequency - baseline.every.discrepancy
+    assert judge == "fit" or baseline.middle == pytest.approx(of_plate, abs=1e-9)
+    assert (found.p_value(0) < 0.01) == (judge == "prior"), found.p_value(0)

@@ -27,6 +27,7 @@ from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
+from bayesplate.plate.sessions import under_prior_scales
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
@@ -205,23 +206,23 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     predict = every_predictor(board, models, "exact", problem.centre)
     at = problem.centre[columns]
     slopes = sensitivities(predict, at)
-    inputs = at[N_RIGIDITIES:]
-    values = parameters.values(problem.centre[None, :])
+    values = {name: np.asarray(np.ravel(v)[0]) for name, v in parameters.values(problem.centre[None, :]).items()}
+    input_slopes, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], at[N_RIGIDITIES:])
     discrepancies = [np.broadcast_to(one.discrepancies(values)[0], len(one.every_place)) for one in models]
     spectrum = Spectrum(
         log_frequency=predict(at[None, :])[0],
         slopes=slopes[:, :N_RIGIDITIES],
-        input_slopes=slopes[:, N_RIGIDITIES:],
+        input_slopes=input_slopes,
         places=tuple(model.every_place for model in models),
         inputs=inputs,
         peaks=problem.posterior.peaks,
-        predict=predict.with_fixed(inputs),
+        predict=predict.with_fixed(at[N_RIGIDITIES:]),
         discrepancy=np.concatenate(discrepancies),
     )
     rows = spectrum.first_of_each([len(setup.readings) for setup in board.setups])
     bare = Baseline(
         board=board,
-        values={name: np.asarray(np.ravel(value)[0]) for name, value in values.items()},
+        values=values,
         log_rigidities=at[:N_RIGIDITIES],
         log_frequency=np.zeros(rows.size),
         residual=log_measured(board),
