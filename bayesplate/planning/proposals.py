@@ -167,7 +167,7 @@ def _of_modes(
     effects = {name for one in beliefs.explanations for name in one.members}
     nodes = {n: nodes_of(found, n) for n in sorted(effects) if n in found.ground.candidates} if found else {}
     listed = []
-    for station in stations(beliefs.board, values, prior):
+    for station in filter(lambda one: one.goes_on(beliefs.board), stations(beliefs.board, values, prior)):
         law = bare_law(beliefs.board, station, values)
         shifts = effect_shifts(found, nodes, law) if found else {}
         every = station_readings(beliefs, law, rng, found, shifts)

@@ -64,6 +64,12 @@ class Station:
         """Whether the board was never held so."""
         return self.setup.name != self.base.name
 
+    def goes_on(self, board: Board) -> bool:
+        """Whether something more can be read in it: of several sessions of one setup, in the last."""
+        if self.is_new or self.base.group is None:
+            return True
+        return self.base.name == [one.name for one in board.setups if one.group == self.base.group][-1]
+
     @property
     def spots(self) -> tuple[tuple[float, float], ...]:
         """Where a known mass could stand, as fractions of the vibrating sides; nowhere where nothing was read."""

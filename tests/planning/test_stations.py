@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from generator.effects import AttachedMass
@@ -12,6 +14,7 @@ from made_boards import setup_of
 from bayesplate.planning.stations import bare_law, known_mass, stations
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
+from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.quantities import Quantity
 
 FREE, CLAMPED = (dict.fromkeys(("x0", "x1", "y0", "y1"), word) for word in ("free", "clamped"))
@@ -44,6 +47,15 @@ def test_a_free_board_is_proposed_as_a_cantilever_and_no_board_as_what_it_was(fr
     assert free[1].setup.edges == {"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"}
     assert [one.setup.name for one in clamped] == ["setup", "free"]
     assert (free[1].n_old, free[1].spots) == (0, ())
+
+
+def test_of_several_sessions_only_the_last_goes_on():
+    made = board(FREE)
+    days = [replace(made.setups[0], name=name) for name in ("monday", "friday", "sunday")]
+    held = with_discrepancies(replace(made, setups=(*days, setup_of(CLAMPED, {(0, 0): 90.0}, name="clamped"))))
+
+    assert [one.setup.name for one in stations(held, values()) if one.goes_on(held)] == ["sunday", "clamped"]
+    assert all(one.goes_on(made) for one in stations(made, values()))
 
 
 def test_modes_that_were_read_come_first_and_none_twice(free):
