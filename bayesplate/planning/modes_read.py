@@ -22,6 +22,11 @@ from bayesplate.quantities import Quantity
 Floats = NDArray[np.float64]
 Effects = Mapping[str, EffectShift]
 
+REPEATED = 2e-4
+"""Relative scatter of a frequency that is read once more in one session: what five hits on a free board leave open."""
+_PLACED = 0.03
+"""Of what a known mass adds, the part that a few millimetres off its place change."""
+
 
 def effect_shifts(found: Found, nodes: Mapping[str, tuple[Nodes, ...]], law: BareLaw) -> dict[str, EffectShift]:
     """What every effect that survives does to the modes of a station.
@@ -101,22 +106,28 @@ def station_readings(
 
     rows = [i for i in range(n_old, n) if is_followed[i]]
     old = list(range(n_old))
+
+    def once_more(noise: Sequence[Floats], shares: Sequence[Floats]) -> Readings:
+        return _given_first(beliefs, station, readings(old, noise), kept, shares)
+
+    of_board = shared_share(beliefs.board.setup(station.base.name))
+    other_day = [np.full(len(one), of_board) for one in kept]
+    same_day = [np.maximum(1.0 - REPEATED**2 / one, 0.0) for one in kept]
     spots = range(1, 1 + len(station.spots)) if n_old else ()
     whole = [spot for spot in spots if is_followed[[*old, *(spot * n + i for i in old)]].all()]
     return StationReadings(
         readings(rows, kept or new),
         tuple(rows),
-        _another_day(beliefs, station, readings(old, new), kept) if n_old and is_followed[old].all() else None,
-        tuple(_plus(readings(old, kept), readings(old, kept, spot)) for spot in whole),
+        once_more(new, other_day) if n_old and is_followed[old].all() else None,
+        tuple(_with_mass(once_more(kept, same_day), readings(old, kept, spot)) for spot in whole),
         tuple(spot - 1 for spot in whole),
     )
 
 
-def _another_day(beliefs: Beliefs, station: Station, readings: Readings, kept: Sequence[Floats]) -> Readings:
-    """Readings of another session beside those of the first, with which they share the board's discrepancy.
-
-    Of the variance of a lone session's noise the share of its prior is the discrepancy's. What the first reading of a
-    mode is off by then tells of the next one, which is less news: it is taken given the first, under every explanation.
+def _given_first(
+    beliefs: Beliefs, station: Station, readings: Readings, kept: Sequence[Floats], shares: Sequence[Floats]
+) -> Readings:
+    """The modes that were read once more, given the first reading, with which they share a part of what it is off by.
 
     Parameters
     ----------
@@ -125,14 +136,16 @@ def _another_day(beliefs: Beliefs, station: Station, readings: Readings, kept: S
     readings : Readings
         As if they shared nothing.
     kept : sequence of (n_terms,) array
-        Variance of the noise of the first session, by explanation.
+        Variance of the noise of the first readings, by explanation.
+    shares : sequence of (n_terms,) array
+        The part of it that is found again.
     """
     setup = beliefs.board.setup(station.base.name)
-    share = shared_share(setup)
     first, own = np.log(setup.measured), ReadingErrors.of(setup).own_variance
     new = ReadingErrors.of(station.setup).own_variance[: station.n_old]
     shift, slopes, variance = [], [], []
-    for k, each in enumerate(kept):
+    for k, (each, part) in enumerate(zip(kept, shares, strict=True)):
+        share = part[:, None]
         common = share * each[:, None]
         told = common / (each[:, None] + own)
         shift.append((1.0 - told) * readings.shift[k] + told * first)
@@ -141,9 +154,14 @@ def _another_day(beliefs: Beliefs, station: Station, readings: Readings, kept: S
     return Readings(tuple(shift), tuple(slopes), tuple(variance))
 
 
-def _plus(one: Readings, other: Readings) -> Readings:
-    """Readings with what a known mass adds to them."""
-    return replace(one, shift=tuple(a + b for a, b in zip(one.shift, other.shift, strict=True)))
+def _with_mass(readings: Readings, added: Readings) -> Readings:
+    """Readings with what a known mass adds to them, somewhat uncertain for it may stand a little off its place."""
+    both = zip(readings.variance, added.shift, strict=True)
+    return replace(
+        readings,
+        shift=tuple(a + b for a, b in zip(readings.shift, added.shift, strict=True)),
+        variance=tuple(variance + (_PLACED * shift) ** 2 for variance, shift in both),
+    )
 
 
 def _kept(beliefs: Beliefs, one: Explanation, station: Station) -> Floats:

@@ -22,7 +22,7 @@ import numpy as np
 from calibration.planted import drawn
 from generator import effects as planted_effects
 from generator.boards import PlantedBoard, plant
-from generator.designs import DESIGNS, MEDIANS, POISSON
+from generator.designs import DESIGNS, MEDIANS, POISSON, Design
 from generator.designs import Setup as Held
 from generator.naming import LEAST_CORRELATION, frequencies, named
 from generator.plate import solve
@@ -40,6 +40,7 @@ from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
 from bayesplate.planning.looks import LOOKS
+from bayesplate.planning.modes_read import REPEATED
 from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, proposals
 from bayesplate.planning.stations import known_mass
 from bayesplate.planning.survivors import survivors
@@ -255,21 +256,28 @@ def _read(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
         board = asked.found.ground.baseline.board
         place = station.places(board)[one.spot]
         acting.append(planted_effects.AttachedMass(known_mass(board), (place,)))
-    plate = design.plate(held, truth.constants)
-    found = named(solve(plate, acting, _SEARCHED), plate.edges)
-    if any(b not in found for b in beams):
-        raise RuntimeError(f"{one.sentence}: a mode was not found on the true board")
-    exact = np.log([found[b][0] for b in beams])
-    name = design.setups[0].name
-    stays = one.what in ("modes", "mass")
-    first = truth.drawn_noise[name] * np.log(2.0) / 1200.0
-    noise = first if stays else drawn(setup.noise, rng)
-    if one.what != "again":
+    exact = _solved(design, held, truth.constants, acting)
+    first = truth.drawn_noise[design.setups[0].name] * np.log(2.0) / 1200.0
+    if one.what not in ("again", "mass"):
+        noise = first if one.what == "modes" else drawn(setup.noise, rng)
         return np.asarray(exact + noise * rng.standard_normal(len(exact)))
     before = asked.found.ground.baseline.board.setup(station.base.name)
-    share, off = shared_share(before), np.log(before.measured) - exact
+    bare = exact if one.what == "again" else _solved(design, held, truth.constants, acting[:-1])
+    off = np.log(before.measured) - bare
+    if one.what == "mass":
+        return np.asarray(exact + off + REPEATED * rng.standard_normal(len(exact)))
+    share, noise = shared_share(before), drawn(setup.noise, rng)
     discrepancy = share * off + (share * (1.0 - share)) ** 0.5 * first * rng.standard_normal(len(exact))
     return np.asarray(exact + discrepancy + (1.0 - share) ** 0.5 * noise * rng.standard_normal(len(exact)))
+
+
+def _solved(design: Design, held: Held, constants: Mapping[str, float], acting: Sequence[Any]) -> np.ndarray:
+    """ln f (Hz) of the modes that are read, by the generator."""
+    plate = design.plate(held, constants)
+    found = named(solve(plate, acting, _SEARCHED), plate.edges)
+    if any(b not in found for b in held.beams):
+        raise RuntimeError("a mode was not found on the true board")
+    return np.asarray(np.log([found[b][0] for b in held.beams]))
 
 
 def _looked_at(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:

@@ -16,6 +16,7 @@ import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is imported
@@ -56,6 +57,9 @@ def compared(words: str, peaks: Sequence[dict[str, Any]], picked: Sequence[Picke
     further = [mode for j, mode in enumerate(likely) if j not in of_peak.values()]
     lines.append(f"  {found} of {len(peaks)} peaks found; signs {max(alike.values())} of {sum(alike.values())} agree")
     modes = [mode for mode in further if mode.mode_probability >= RATHER]
+    lines.append(
+        f"  median standard error of a frequency: {100 * median(mode.sd_hz / mode.hz for mode in likely):.3f} %"
+    )
     lines.append(f"  further peaks that are rather modes than not by the recordings: {len(further)}")
     lines += [
         f"    {mode.hz:.1f} Hz: a mode of the board {percent(mode.mode_probability)}; no mode by the recordings alone "

@@ -52,7 +52,7 @@ def run(settings: Settings, n_boards: int, workers: int, out: Path, *, quiet: bo
     """Do what is not done yet, and return the records of all boards asked for, in their order."""
     asked = {design: list(effects) for design, effects in ASKED.items()}
     identity = {
-        "format": 5, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
+        "format": 6, "settings": asdict(settings), "designs": list(CHOSEN), "asked": asked, "noise_cents": NOISE_CENTS,
     }  # fmt: skip
     records = read_done(out, identity)
     done = {record["simulation"] for record in records}

@@ -1,4 +1,4 @@
-"""The modes that were read, on another day: what the first day's readings were off by tells of the second day's."""
+"""The modes that were read, once more: what the first readings were off by tells of the next."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import ritz
 from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
 from bayesplate.planning.gains import Readings
-from bayesplate.planning.modes_read import _another_day
+from bayesplate.planning.modes_read import REPEATED, _given_first
 from bayesplate.plate.parameter import Owner
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share
@@ -27,13 +27,13 @@ FIRST, SECOND = 0.005, 0.003
 """Noise of the first day as the search has it, and what is expected of the second."""
 
 
-def another_day(setup):
-    """Readings of one term on the second day, given the first."""
+def once_more(setup, share, noise=SECOND):
+    """Readings of one term, given the first."""
     board = board_of(ritz.FINNISH, [setup])
     station = SimpleNamespace(base=setup, setup=setup, n_old=N)
     own = ReadingErrors.of(setup).own_variance
-    alone = Readings((SHIFT[None],), (SLOPES[None],), ((SECOND**2 + own)[None],))
-    return _another_day(SimpleNamespace(board=board), station, alone, [np.array([FIRST**2])])
+    alone = Readings((SHIFT[None],), (SLOPES[None],), ((noise**2 + own)[None],))
+    return _given_first(SimpleNamespace(board=board), station, alone, [np.array([FIRST**2])], [np.array([share])])
 
 
 def test_both_days_tell_what_their_joint_covariance_says():
@@ -49,7 +49,7 @@ def test_both_days_tell_what_their_joint_covariance_says():
     precision = weighted.T @ whole
     mean = np.linalg.solve(precision, weighted.T @ (read - np.tile(SHIFT, 2)))
 
-    given = another_day(SETUP)
+    given = once_more(SETUP, share)
     slopes, variance = given.slopes[0][0], given.variance[0][0]
     later = SLOPES.T @ (SLOPES / one[:, None]) + slopes.T @ (slopes / variance[:, None])
     told = SLOPES.T @ ((read[:N] - SHIFT) / one) + slopes.T @ ((read[N:] - given.shift[0][0]) / variance)
@@ -63,7 +63,7 @@ def test_both_days_tell_what_their_joint_covariance_says():
 def test_where_sessions_share_their_discrepancies_already_another_one_is_as_new_as_they_were():
     setup = replace(SETUP, group=Owner("group", "monday to friday"))
     assert shared_share(setup) == 0.0
-    given = another_day(setup)
+    given = once_more(setup, 0.0)
     assert given.slopes[0][0] == pytest.approx(SLOPES)
     assert given.shift[0][0] == pytest.approx(SHIFT)
     assert given.variance[0][0] == pytest.approx(SECOND**2 + ReadingErrors.of(SETUP).own_variance)
@@ -71,3 +71,16 @@ def test_where_sessions_share_their_discrepancies_already_another_one_is_as_new_
 
 def test_a_free_board_finds_half_of_its_noise_again():
     assert shared_share(replace(SETUP, noise=DEFAULT_NOISE)) == pytest.approx(0.5)
+
+
+def test_the_same_day_once_more_tells_of_the_constants_no_more_than_better_reading_would():
+    """Board and clamp are off by the same again: what is left is the rounding of two readings in place of one."""
+    given = once_more(SETUP, 1.0 - (REPEATED / FIRST) ** 2, FIRST)
+    own = ReadingErrors.of(SETUP).own_variance
+    slopes, variance = given.slopes[0][0], given.variance[0][0]
+    before = SLOPES.T @ (SLOPES / (FIRST**2 + own)[:, None])
+    after = before + slopes.T @ (slopes / variance[:, None])
+    of_mean = SLOPES.T @ (SLOPES / (FIRST**2 + 0.5 * (own - REPEATED**2))[:, None])
+
+    assert (np.diagonal(before) < np.diagonal(after)).all()
+    assert (np.diagonal(after) < 1.001 * np.diagonal(of_mean)).all()
