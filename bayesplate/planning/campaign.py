@@ -134,7 +134,9 @@ def _of_board(joint: Joint, place: int, costs: Costs, goal: str | None) -> Itera
         if old:
             again = f"Measure all {len(old)} modes of board {name} again on another day"
             cost = costs.clamping + len(old) * costs.reading
-            yield _of_modes(joint, place, i, old, ("again", again, cost))
+            found = _of_modes(joint, place, i, old, ("again", again, cost))
+            told, variance = (each[old] for each in one.another_day(i))
+            yield replace(found, rows=(1.0 - told)[:, None] * found.rows, variance=variance)
     columns = {column.removeprefix("z[").removesuffix("]"): i for i, column in enumerate(one.names)}
     for measured in measurements(one.board):
         if measured.parameter.name in columns:

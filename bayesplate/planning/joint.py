@@ -17,6 +17,7 @@ from bayesplate.planning.beliefs import moduli_at
 from bayesplate.planning.stations import BareLaw, bare_law, stations
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.readings import ReadingErrors
+from bayesplate.plate.sessions import shared_share
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.posterior.target import Posterior
@@ -72,6 +73,22 @@ class BoardInJoint:
     def variance(self, setup: int) -> Floats:
         """Of a reading of each mode of a law: (n_modes,) array."""
         return np.asarray(self.noise[setup] ** 2 + ReadingErrors.of(self.laws[setup].station.setup).own_variance)
+
+    def another_day(self, setup: int) -> tuple[Floats, Floats]:
+        """What the first reading of each mode tells of one on another day, and the variance that is left.
+
+        Of what a reading is off by the board's discrepancy is found again.
+
+        Returns
+        -------
+        told : (n_modes,) array
+            Share of what the first is off by that the other is expected to be off by.
+        variance : (n_modes,) array
+            Of the other reading given the first.
+        """
+        first = self.variance(setup)
+        common = shared_share(self.laws[setup].station.base) * self.noise[setup] ** 2
+        return common / first, first - common**2 / first
 
     @property
     def precision(self) -> tuple[Floats, Floats, Floats]:

@@ -7,7 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesplate.planning import joint as home
 from bayesplate.planning.joint import BoardInJoint, Joint
+from bayesplate.plate.setup import DEFAULT_NOISE
+from bayesplate.quantities import Quantity
 
 SD = 0.5
 
@@ -15,7 +18,7 @@ SD = 0.5
 def member(own, shared, setup=None):
     """A board all of whose modes were read, its noise known."""
     own, shared = np.asarray(own, dtype=float), np.asarray(shared, dtype=float)
-    base = SimpleNamespace(peaks=(), name="setup")
+    base = SimpleNamespace(peaks=(), name="setup", group=None, noise=Quantity.from_median(SD, 1.6))
     readings = (None,) * len(own)
     station = SimpleNamespace(setup=SimpleNamespace(readings=readings), n_old=len(own), base=base)
     one = BoardInJoint(
@@ -74,3 +77,24 @@ def test_another_board_is_what_it_says_of_the_shared_parameters(joint):
     three = Joint((*boards, member(boards[0].own[0], boards[0].shared[0])), 2)
     wanted = np.sqrt(np.diagonal(three.covariance)[9:] / np.diagonal(whole.covariance)[6:])
     assert shared == pytest.approx(wanted)
+
+
+def test_another_day_is_what_correlated_readings_say(joint, monkeypatch):
+    """All modes of one board twice, the covariance of the two days written out."""
+    monkeypatch.setattr(home, "shared_share", lambda base: 0.4)
+    whole, boards = joint
+    told, variance = boards[0].another_day(0)
+    rows = whole.rows(0, boards[0].own[0], boards[0].shared[0])
+
+    shared, _, _ = whole.ratios((1.0 - told)[:, None] * rows, variance)
+
+    both = np.vstack([rows, rows])
+    covariance = SD**2 * np.kron(np.array([[1.0, 0.4], [0.4, 1.0]]), np.eye(6))
+    precision = by_hand(boards) - rows.T @ rows / SD**2 + both.T @ np.linalg.solve(covariance, both)
+    wanted = np.sqrt(np.diagonal(np.linalg.inv(precision)) / np.diagonal(whole.covariance))
+    assert shared == pytest.approx(wanted[6:])
+
+
+def test_less_is_found_again_where_clamping_scatters_more(joint):
+    board = joint[1][0]
+    assert board.another_day(0)[0] == pytest.approx(DEFAULT_NOISE.median**2 / (DEFAULT_NOISE.median**2 + SD**2))
