@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from trial.causes import narrowest, overlooked, taken_for, weakest
+from trial.causes import flagged_as, narrowest, overlooked, taken_for, weakest
 from trial.cells import NOISES, Cell
 from trial.counts import (
     Mean,
@@ -73,7 +73,8 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
             nothing = of("null", design=design, noise=noise)
             cause = taken_for(nothing, is_named)
             found.append(_at_most(f"null, {design}, {words}: uniquely named", share(nothing, is_named), 0.02, cause))
-            found.append(_at_most(f"null, {design}, {words}: flagged at all", share(nothing, is_flagged), 0.05))
+            flagged = share(nothing, is_flagged)
+            found.append(_at_most(f"null, {design}, {words}: flagged at all", flagged, 0.05, flagged_as(nothing)))
     for cell in (cell for cell in cells if cell.kind in ("one", "two")):
         records = by_cell[cell.name]
         cause = taken_for(records, is_wrong_name)
@@ -99,7 +100,8 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
     found.append(_at_least("two effects: both in the set", share(pairs, is_covered), 0.65, beside=note))
     loud = of("one", noise_cents=17.0)
     found.append(_at_least("17 cents: not named", share(loud, lambda r: not is_named(r)), 0.80))
-    found.append(_at_most("17 cents: unique and wrong", share(loud, is_wrong_name), 0.02))
+    cause = taken_for(loud, is_wrong_name)
+    found.append(_at_most("17 cents: unique and wrong", share(loud, is_wrong_name), 0.02, cause))
     for design in designs:
         found += _of_constants(design, of("one", design=design, **large))
     found += _of_sizes([record for record in of("one") if is_right_name(record)])
@@ -128,7 +130,8 @@ def _of_claims(nothing: Records, something: Records) -> Iterable[Bar | None]:
     beside = join(
         f"on a right name {_shown(right)}" if right.n else "", f"on one of two {_shown(part)}" if part.n else ""
     )
-    yield _at_most("claim made on a wrong name, outside the library too", wrong, 0.10, beside=beside)
+    cause = taken_for(something, lambda one: is_wrong_name(one) and is_claimed(one))
+    yield _at_most("claim made on a wrong name, outside the library too", wrong, 0.10, cause, beside=beside)
 
 
 def _within(quantity: str, found: Share, note: str = "") -> Bar:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 
-from trial.counts import Record, Share, holds, is_best, listed, truth
+from trial.counts import ANSWERED, Record, Share, holds, is_best, listed, truth
 
 _MOST = 4
 
@@ -15,6 +15,13 @@ def taken_for(records: Sequence[Record], question: Callable[[Record], bool]) -> 
     pairs = Counter((_joined(truth(r)), _joined(r["effects"])) for r in records if question(r))
     found = [f"{planted} taken for {named} {n}" for (planted, named), n in pairs.most_common(_MOST)]
     return ", ".join(found)
+
+
+def flagged_as(records: Sequence[Record]) -> str:
+    """By which of the two rules boards without any effect are flagged: the misfit of the plate, or the odds."""
+    words = Counter(r["word"] for r in records)
+    misfit, odds = words["unexplained"], sum(n for word, n in words.items() if word in ANSWERED)
+    return f"misfit of the plate too large for chance {misfit}, an effect needed {odds}"
 
 
 def weakest(records: Sequence[Record]) -> str:

@@ -174,7 +174,7 @@ def test_claims_on_wrong_names_count_those_outside_the_library_too():
         ]
         bar = by_name((one, two, outside), records)[quantity]
         assert (bar["count"], bar["n"], bar["met"]) == (n, N, met)
-        assert bar["note"].startswith("on a right name 400/400")
+        assert bar["note"].startswith("on a right name 400/400" if met else f"rib taken for {B} {n}; on a right name")
         assert "on one of two 400/400" in bar["note"]
 
 
@@ -231,3 +231,11 @@ def test_a_trial_that_finds_everything_meets_every_bar_and_one_without_truth_doe
 
 def quiet_if_loud(cell, record):
     return record | {"word": "none needed", "effects": [], "amplitudes": {}} if cell.noise_cents == 17.0 else record
+
+
+def test_a_missed_bar_on_alarms_says_which_rule_raised_them():
+    cell = null("drawn")
+    words = ["unexplained"] * 40 + ["named"] * 9 + [GROUP] * 3
+    records = [called(words[i] if i < len(words) else "none needed")(cell, i) for i in range(N)]
+    bar = by_name((cell,), records)[f"null, {SIX}, {NOISES['drawn']}: flagged at all"]
+    assert bar["note"] == "misfit of the plate too large for chance 40, an effect needed 12"
