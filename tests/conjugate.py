@@ -50,6 +50,8 @@ class PowerLaw:
         logs = np.log(np.stack([values[name] for name in ("D_x", "D_y", "D_s")], axis=-1))
         return self.constant + logs @ self.slopes.T
 
+    every_log_frequency_of_board = every_log_frequency
+
 
 SLOPES = 0.5 * np.array(
     [[0.97, 0.0, 0.03], [0.1, 0.05, 0.85], [0.9, 0.05, 0.05], [0.05, 0.8, 0.15], [0.4, 0.1, 0.5], [0.1, 0.5, 0.4]]

@@ -76,7 +76,7 @@ def write_cards(folder: Path, n: int, seed: int = 3) -> Path:
 def measured(cards: Path, out: Path, workers: Sequence[str], told: str) -> Measured:
     """Run the command over a folder of cards, in a session of its own."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "bayesplate.cli", "batch", str(cards), "--out", str(out), "--quiet", "--no-report"]
+    command = [sys.executable, "-m", "bayesplate", "batch", str(cards), "--out", str(out), "--quiet", "--no-report"]
     load, started = os.getloadavg()[0], time.perf_counter()
     run = subprocess.Popen([*command, *workers], env=environment, start_new_session=True)
     cpu: dict[int, float] = {}

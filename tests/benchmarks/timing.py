@@ -137,7 +137,7 @@ def twelve_modes(problem: PosedProblem, repeats: int = 7) -> float:
 
 def command(*arguments: str, repeats: int = 1) -> float:
     """A whole command in a process of its own, from nothing to its exit, with one thread."""
-    program = [sys.executable, "-m", "bayesplate.cli", *arguments]
+    program = [sys.executable, "-m", "bayesplate", *arguments]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     return best(lambda: subprocess.run(program, check=True, capture_output=True, env=environment), repeats)
 

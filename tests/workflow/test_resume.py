@@ -30,7 +30,7 @@ def start(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen
     def heed_interrupts() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    program = [sys.executable, "-m", "bayesplate.cli", "fit", *arguments, "--out", str(folder)]
+    program = [sys.executable, "-m", "bayesplate", "fit", *arguments, "--out", str(folder)]
     variables = {**os.environ, **environment}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(program, **pipes, text=True, env=variables, preexec_fn=heed_interrupts)

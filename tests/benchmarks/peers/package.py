@@ -26,7 +26,7 @@ class Sampled:
 
 def command(python: str, options: tuple[str, ...], seed: int, out: Path) -> list[str]:
     """The command that fits the board, with its files written to `out`."""
-    fit = [python, "-m", "bayesplate.cli", "fit", BOARD, "--force", "--quiet", "--seed", str(seed)]
+    fit = [python, "-m", "bayesplate", "fit", BOARD, "--force", "--quiet", "--seed", str(seed)]
     return [*fit, *options, "--out", str(out)]
 
 
