@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from bayesplate.diagnosis.decision.verdict import answers, at_limit
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.null_control import simulate_null
+from bayesplate.diagnosis.evidence.predictive import noise_of_board
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.signatures import Signature, look_alikes, signatures
 from bayesplate.diagnosis.wording.entries import effect_entry
@@ -160,7 +160,7 @@ def test_simulated_nulls_are_rounded_and_have_the_spread_of_the_inputs(resolutio
     expected = np.diag(noise + resolution**2 / 12.0 / hertz**2) + rounded.input_slopes @ rounded.input_slopes.T
 
     n_sets = 40_000
-    simulated = simulate_null(ground, np.random.default_rng(5), n_sets)
+    simulated = noise_of_board(ground.baseline, np.random.default_rng(5), n_sets)
 
     products = np.einsum("ni,nj->nij", simulated, simulated)
     error = products.std(axis=0) / np.sqrt(n_sets)

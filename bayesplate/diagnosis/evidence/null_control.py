@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.folds import ALWAYS, CERTAINLY_NEEDED, nested
 from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none
+from bayesplate.diagnosis.evidence.predictive import noise_of_board
 from bayesplate.diagnosis.evidence.search import Ground
 
 Floats = NDArray[np.float64]
@@ -86,7 +87,7 @@ def null_control(
     odds: list[Floats] = []
     ratios: list[Floats] = []
     for n_done in range(0, n_sets, _BATCH):
-        residuals = simulate_null(ground, rng, min(_BATCH, n_sets - n_done))
+        residuals = noise_of_board(ground.baseline, rng, min(_BATCH, n_sets - n_done))
         odds.append(odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, residuals)))
         folded = nested(ground, residuals, ALWAYS)
         if folded is not None:
@@ -105,16 +106,3 @@ def _is_within_chance(odds: Floats, against: float) -> bool:
 
     larger = int(np.sum(odds > against))
     return larger > 0 and bool(betaincinv(larger, odds.size - larger + 1, 1.0 - _CERTAIN) > FALSE_ALARMS)
-
-
-def simulate_null(ground: Ground, rng: np.random.Generator, n_sets: int) -> Floats:
-    """Residuals of readings without any effect: (n_sets, n_modes) array, ln f.
-
-    Noise levels and inputs are drawn from their priors; the constants need no drawing, for the search does not see
-    them.
-    """
-    baseline = ground.baseline
-    noise = [setup.noise.value(rng.standard_normal(n_sets)) for setup in baseline.board.setups]
-    sd = np.sqrt(np.stack(noise, axis=1)[:, baseline.setup_index] ** 2 + baseline.own_variance)
-    inputs = rng.standard_normal((n_sets, baseline.input_slopes.shape[1]))
-    return np.asarray(sd * rng.standard_normal(sd.shape) + inputs @ baseline.input_slopes.T)

@@ -1,70 +1,91 @@
-"""The prior predictive p-value: it is uniform under noise as the prior expects it, and small for anything larger."""
+"""The prior predictive p-value: it is uniform under what the priors expect, and small for anything larger."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, one_level, table
-from scipy.stats import chi2, kstest
+from made_searches import NOISE, bare, baseline, candidate, one_level, table
+from scipy.stats import chi2, kstest, kstwobign
 
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.predictive import PASSES, predictive_p_value
+from bayesplate.diagnosis.evidence.predictive import PASSES, noise_of_board, predictive_p_value
 from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.quantities import Quantity
 
 N_SETS = 4000
+N_SIMULATED = {"bare": 20_000, "with an effect": 6000}
+"""By `predictive_p_value`, for all sets together."""
 CERTAIN = 1e-3
 """Probability at which a test of uniformity may fail a p-value that is right."""
+SETUPS = [(NOISE,), (NOISE, NOISE), (0.4 * NOISE, 3.0 * NOISE, NOISE)]
+
+
+def uniformity(p_values, n_simulated=N_SIMULATED["bare"]):
+    """Probability of as large a distance from uniform, what is simulated beside the sets counted as a sample too."""
+    share = len(p_values) * n_simulated / (len(p_values) + n_simulated)
+    return kstwobign.sf(np.sqrt(share) * kstest(p_values, "uniform").statistic)
 
 
 def noisy(base, rng, factor=1.0):
-    """Readings whose noise is drawn from the log-normal prior itself, not from the levels."""
-    (setup,) = base.board.setups
-    level = factor * setup.noise.median * np.exp(setup.noise.log_sd * rng.standard_normal((N_SETS, 1)))
-    rounding = np.sqrt(base.own_variance) * rng.standard_normal((N_SETS, base.n_modes))
-    inputs = rng.standard_normal((N_SETS, base.input_slopes.shape[1])) @ base.input_slopes.T
-    constants = rng.standard_normal((N_SETS, 3)) @ base.slopes.T
-    return level * rng.standard_normal((N_SETS, base.n_modes)) + rounding + inputs + constants
+    """Readings of the board, of any constants: a factor of their noise, whose level is drawn from its prior."""
+    return factor * noise_of_board(base, rng, N_SETS) + rng.standard_normal((N_SETS, 3)) @ base.slopes.T
 
 
+@pytest.mark.parametrize("noise", SETUPS)
 @pytest.mark.parametrize("n_inputs", [0, 1])
-def test_the_gate_is_uniform_under_noise_of_the_prior_and_not_under_three_times_it(n_inputs):
+def test_the_p_value_is_uniform_under_noise_of_the_prior_and_not_under_three_times_it(n_inputs, noise):
     rng = np.random.default_rng(1)
-    base = baseline(rng, n_inputs=n_inputs)
+    base = baseline(rng, 3 + 3 * len(noise), n_inputs=n_inputs, noise=noise, resolution=0.2)
     nothing_lacks = bare(base, noise_grid(base.board))
 
-    found = predictive_p_value(nothing_lacks, Fold(base), noisy(base, rng))
-    assert kstest(found, "uniform").pvalue > CERTAIN
+    assert uniformity(predictive_p_value(nothing_lacks, Fold(base), noisy(base, rng))) > CERTAIN
     too_large = predictive_p_value(nothing_lacks, Fold(base), noisy(base, rng, 3.0))
-    assert kstest(too_large, "uniform").pvalue < CERTAIN
+    assert uniformity(too_large) < CERTAIN
     assert np.mean(too_large < PASSES) > 0.3
 
 
-def test_the_gate_of_a_known_noise_is_that_of_chi_squared():
+def test_a_noise_that_is_fitted_to_each_set_of_readings_would_not_be_uniform():
+    """What the test above has to catch: of two setups the misfit at each level of the noise, averaged over them."""
+    rng = np.random.default_rng(2)
+    base = baseline(rng, 12, noise=(NOISE, NOISE))
+    terms = bare(base, noise_grid(base.board)).terms(Fold(base))
+    seen = noisy(base, rng) @ terms.fold.blind.T
+    squares = np.einsum("nd,lde,ne->ln", seen, np.linalg.inv(terms.noise_covariance), seen)
+    averaged = terms.noise.weights @ chi2.sf(squares, seen.shape[1])
+    assert uniformity(averaged) < CERTAIN
+    assert np.mean(averaged < PASSES) > 1.3 * PASSES
+
+
+def test_the_p_value_of_a_known_noise_is_that_of_chi_squared():
     rng = np.random.default_rng(2)
     base = baseline(rng, resolution=1.0)
-    residual = 0.01 * rng.standard_normal(6)
-    fitted = base.slopes @ np.linalg.lstsq(base.slopes / base.scales[:, None], residual / base.scales, rcond=None)[0]
-    misfit = float((((residual - fitted) / base.scales) ** 2).sum())
-    known = bare(base, one_level(base))
-    assert predictive_p_value(known, Fold(base), residual[None, :])[0] == pytest.approx(chi2.sf(misfit, 3), rel=1e-9)
-    assert predictive_p_value(known, Fold(base), 3.0 * residual[None, :])[0] == pytest.approx(
-        chi2.sf(9.0 * misfit, 3), rel=1e-9
-    )
+    (setup,) = base.board.setups
+    known = replace(setup, noise=Quantity.from_median(NOISE, 1.0 + 1e-9))
+    base = replace(base, board=replace(base.board, setups=(known,)))
+    residuals = 0.01 * rng.standard_normal((50, 6))
+    white = base.slopes / base.scales[:, None]
+    left = residuals / base.scales - (residuals / base.scales) @ np.linalg.pinv(white).T @ white.T
+    expected = chi2.sf((left**2).sum(axis=1), 3)
+    found = predictive_p_value(bare(base, one_level(base)), Fold(base), residuals)
+    bound = 4.0 * np.sqrt(expected * (1.0 - expected) / N_SIMULATED["bare"]) + 2.0 / N_SIMULATED["bare"]
+    assert np.all(np.abs(found - expected) < bound)
+    assert np.any(np.abs(found - chi2.sf((left**2).sum(axis=1), 4)) > bound)
 
 
 def test_an_effect_that_is_there_passes_as_often_as_it_should_and_its_absence_does_not():
-    """The best size leaves no more misfit than the true one: chi squared, with one degree more for its prior."""
     rng = np.random.default_rng(3)
     base = baseline(rng)
     direction = 0.02 * rng.standard_normal(6)
     there = Hypothesis(("first",), 0.5, candidate(base, "first", direction).fine, noise_grid(base.board))
     shift = np.abs(rng.standard_normal((N_SETS, 1))) * direction
     readings = noisy(base, rng) + shift
-    at_true_size = chi2.sf(chi2.isf(PASSES, 3), 4)
-    bound = at_true_size + 4.0 * np.sqrt(at_true_size / N_SETS)
+    n_simulated = N_SIMULATED["with an effect"]
+    bound = PASSES + 4.0 * np.sqrt(PASSES / N_SETS + PASSES / n_simulated)
 
-    assert np.mean(predictive_p_value(there, Fold(base), readings) < PASSES) < bound
+    assert uniformity(predictive_p_value(there, Fold(base), readings), n_simulated) > CERTAIN
     assert np.mean(predictive_p_value(bare(base, noise_grid(base.board)), Fold(base), readings) < PASSES) > bound
     assert np.mean(predictive_p_value(there, Fold(base), readings - 2.0 * shift) < PASSES) > bound
 
@@ -78,3 +99,9 @@ def test_sizes_that_the_prior_hardly_allows_count_as_misfit():
     assert predictive_p_value(likely, Fold(base), residual)[0] > 0.5
     cells.weights[...] = [1.0 - 1e-9, 1e-9]
     assert predictive_p_value(likely, Fold(base), residual)[0] < PASSES
+
+
+def test_readings_that_nothing_allows_have_the_smallest_p_value():
+    base = baseline(np.random.default_rng(5))
+    found = predictive_p_value(bare(base, noise_grid(base.board)), Fold(base), np.eye(6)[:1])
+    assert found[0] == 1.0 / (1.0 + N_SIMULATED["bare"])

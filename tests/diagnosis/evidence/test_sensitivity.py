@@ -17,8 +17,8 @@ from bayesplate.diagnosis.evidence.null_control import (
     NullControl,
     _is_within_chance,
     null_control,
-    simulate_null,
 )
+from bayesplate.diagnosis.evidence.predictive import noise_of_board
 from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width, variants, varied
 from bayesplate.diagnosis.evidence.terms import Fold, Terms
@@ -102,7 +102,7 @@ def test_simulated_nulls_have_the_noise_of_its_prior(small):
     ground, _ = small
     (setup,) = ground.baseline.board.setups
     n_sets = 20_000
-    simulated = simulate_null(ground, np.random.default_rng(5), n_sets)
+    simulated = noise_of_board(ground.baseline, np.random.default_rng(5), n_sets)
     squares = np.log(np.mean(simulated**2, axis=1))
     known = np.log(np.mean(np.random.default_rng(6).standard_normal((n_sets, 6)) ** 2, axis=1))
     variance = known.var() + (2.0 * setup.noise.log_sd) ** 2
@@ -154,7 +154,7 @@ def test_chance_is_certain_from_the_lower_bound_of_the_share_on(larger, stops):
 def test_null_sets_are_made_to_choose(small):
     """Else hardly any would, and the ratio of those that choose nothing is one."""
     ground, _ = small
-    residuals = simulate_null(ground, np.random.default_rng(7), 100)
+    residuals = noise_of_board(ground.baseline, np.random.default_rng(7), 100)
     forced, free = nested(ground, residuals, ALWAYS), nested(ground, residuals)
     assert np.all(forced.chosen == 1)
     assert np.mean(free.chosen == 0) > 0.8

@@ -106,7 +106,7 @@ def test_what_became_of_each_candidate_of_a_named_effect():
         SHEAR: "in the verdict", AIR: "does not fit", GRAIN: "does not fit", RELABELLING: "does not fit",
     }  # fmt: skip
     assert told[SHEAR].rejected_because is None
-    assert told[AIR].rejected_because == "with it alone the misfit is still too large (p = 0.013)"
+    assert told[AIR].rejected_because == "with it alone the misfit is still too large (p = 0.009)"
     assert told[RELABELLING].labels == ("(1,0)", "(2,0)")
 
 
