@@ -40,11 +40,14 @@ def null_picture(diagnosis: Diagnosis) -> Picture | None:
     legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
     caption = (
         f"{diagnosis.null_control.n_sets} boards like this one that lack nothing were simulated, and searched as this "
-        "one was. Grey: what came out of them. Above, the odds that something is lacking: beyond the dashed line, "
-        "where few of them lie, an effect is needed. Below, by how much an effect that each of them was made to "
-        "choose changes the error of modes that are left out: a claim needs a smaller ratio than nearly all of them "
-        "have by chance."
+        f"one was. Grey: what came out of them.{' Above, the' if len(rows) > 1 else ' The'} odds that something is "
+        "lacking: beyond the dashed line, where few of them lie, an effect is needed."
     )
+    if len(rows) > 1:
+        caption += (
+            f" Below, by how much an effect that {sum(rows[1].sets.counts)} of them were made to choose changes the "
+            "error of modes that are left out: a claim needs a smaller ratio than nearly all of them have by chance."
+        )
     alt = "; ".join(f"{row.axis}: this board {row.board:.3g}, limit {row.limit:.3g}" for row in rows)
     return Picture("null-control", "This board among boards that lack nothing", alt, caption, figure)
 

@@ -17,9 +17,10 @@ from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
 from bayesplate.diagnosis.decision.verdict import Verdict, answer_words, decide
+from bayesplate.diagnosis.evidence.folds import Nested
 from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
-from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, null_control
+from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, made_to_choose, null_control
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
@@ -182,6 +183,9 @@ def diagnose(
     stages.begin("the same search on simulated boards", _CONTROL)
     control = null_control(ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
+    folded = nested_of(found, control)
+    if verdict.index and folded is not None:
+        control = made_to_choose(ground, control, float(folded.ratio[0]))
     finals = verdict.stands_for[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals)
     refits: dict[int, Fitted] = {}
@@ -198,7 +202,7 @@ def diagnose(
         first, last = (one.inference.problem.board for one in (before, refits[verdict.index]))
         told = relabelled_sentence(first, last, with_words)
         notes += [told] if told else []
-    case = _case(found, verdict, control, known, before, refits, tuple(notes))
+    case = _case(found, verdict, control, folded, known, before, refits, tuple(notes))
     diagnosis, after = diagnosis_of(case), refits.get(verdict.index, before)
     if folder is not None:
         if after is not before:
@@ -216,6 +220,7 @@ def _case(
     found: Found,
     verdict: Verdict,
     control: NullControl,
+    folded: Nested | None,
     known: Sequence[KnownFit],
     before: Fitted,
     refits: Mapping[int, Fitted],
@@ -223,7 +228,6 @@ def _case(
 ) -> Case:
     after = refits.get(verdict.index, before)
     is_refitted = after is not before
-    folded = nested_of(found, control)
     return Case(
         found=found,
         verdict=verdict,

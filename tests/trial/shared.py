@@ -19,7 +19,7 @@ from generator.designs import MEDIANS
 from numpy.typing import NDArray
 from trial.cells import KINDS, SENSORS, UNKNOWN, Setting
 
-from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
+from bayesplate.diagnosis.evidence.null_control import NullControl, made_to_choose, null_control
 from bayesplate.diagnosis.evidence.search import Ground, prepare_search
 from bayesplate.diagnosis.shifts.baseline import Baseline, baseline_at
 from bayesplate.diagnosis.shifts.forms import Form, forms
@@ -88,7 +88,8 @@ def law_without_effect(design: str, estimate: Estimate) -> Predict:
 def control_of(setting: Setting) -> NullControl:
     """Null simulations of a setting: the same for every board of it, whichever process makes them."""
     planted = _median_board(setting)
-    return null_control(ground_of(planted, shared_law), setting.rng())
+    ground = ground_of(planted, shared_law)
+    return made_to_choose(ground, null_control(ground, setting.rng()))
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,16 @@ class NullControl:
     ----------
     against : (n_sets,) array
         ln odds that something is lacking against that nothing is.
-    ratio : (n_sets,) array or None
-        Nested leave-one-out rms after over before, every fold made to choose its most probable effect; None with too
-        few readings.
+    ratio : (n,) array or None
+        Nested leave-one-out rms after over before of the first n sets, every fold made to choose its most probable
+        effect; None with too few readings, or where nothing is claimed that chance might have chosen.
+    residuals : (n_sets, n_modes) array or None
+        The sets themselves, ln f.
     """
 
     against: Floats
-    ratio: Floats | None
+    ratio: Floats | None = None
+    residuals: Floats | None = None
 
     @property
     def needed_from(self) -> float:
@@ -83,26 +86,54 @@ def null_control(
     Returns
     -------
     NullControl
+        Without ratios, which take as many searches as there are readings: see `made_to_choose`.
     """
+    sets: list[Floats] = []
     odds: list[Floats] = []
-    ratios: list[Floats] = []
     for n_done in range(0, n_sets, _BATCH):
-        residuals = noise_of_board(ground.baseline, rng, min(_BATCH, n_sets - n_done))
-        odds.append(odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, residuals)))
-        folded = nested(ground, residuals, ALWAYS)
-        if folded is not None:
-            ratios.append(folded.ratio)
-        if _is_within_chance(np.concatenate(odds), against):
+        sets.append(noise_of_board(ground.baseline, rng, min(_BATCH, n_sets - n_done)))
+        odds.append(odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, sets[-1])))
+        if _share(np.concatenate(odds) > against)[0] > FALSE_ALARMS:
             break
-    return NullControl(np.concatenate(odds), np.concatenate(ratios) if ratios else None)
+    return NullControl(np.concatenate(odds), residuals=np.concatenate(sets))
 
 
-def _is_within_chance(odds: Floats, against: float) -> bool:
-    """Whether larger odds than those of the board are certainly more frequent than the false alarms.
+def made_to_choose(ground: Ground, control: NullControl, ratio: float = np.nan) -> NullControl:
+    """The same simulated boards with the errors of their readings left out, every fold made to choose an effect.
 
-    By the lower bound of Clopper and Pearson on the share of the sets.
+    Where it is clear on which side of the threshold the board at hand lies, fewer sets say so as well as many.
+
+    Parameters
+    ----------
+    ground : Ground
+    control : NullControl
+        With its sets.
+    ratio : float
+        Nested left-out rms after over before of the board at hand; by default none that fewer sets could judge.
+
+    Returns
+    -------
+    NullControl
+        With the ratios of as many of its sets as were needed; without any where there are too few readings.
     """
+    assert control.residuals is not None
+    ratios: list[Floats] = []
+    for first in range(0, len(control.residuals), _BATCH):
+        folded = nested(ground, control.residuals[first : first + _BATCH], ALWAYS)
+        if folded is None:
+            return control
+        ratios.append(folded.ratio)
+        low, high = _share(np.concatenate(ratios) <= ratio)
+        if not np.isnan(ratio) and (low > BY_CHANCE or high < BY_CHANCE):
+            break
+    return replace(control, ratio=np.concatenate(ratios))
+
+
+def _share(is_so: NDArray[np.bool_]) -> tuple[float, float]:
+    """Bounds of Clopper and Pearson on a share, each certain to `_CERTAIN`."""
     from scipy.special import betaincinv
 
-    larger = int(np.sum(odds > against))
-    return larger > 0 and bool(betaincinv(larger, odds.size - larger + 1, 1.0 - _CERTAIN) > FALSE_ALARMS)
+    n, k = is_so.size, int(is_so.sum())
+    low = float(betaincinv(k, n - k + 1, 1.0 - _CERTAIN)) if k else 0.0
+    high = float(betaincinv(k + 1, n - k, _CERTAIN)) if k < n else 1.0
+    return low, high

@@ -81,6 +81,7 @@ class NullControlSummary:
     nested_ratio_percentile : float or None
         Share of the sets with a larger ratio than these readings, percent.
     nested_ratio_of_sets : Histogram or None
+        Of as many sets as were needed to tell; this, its limit and the percentile None where nothing is claimed.
     """
 
     n_sets: int

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level
+from scipy.stats import binom
 
 from bayesplate.diagnosis.decision.constants import draw_constants
 from bayesplate.diagnosis.evidence.folds import ALWAYS, nested
@@ -15,7 +16,8 @@ from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import (
     FALSE_ALARMS,
     NullControl,
-    _is_within_chance,
+    _share,
+    made_to_choose,
     null_control,
 )
 from bayesplate.diagnosis.evidence.predictive import noise_of_board
@@ -116,7 +118,8 @@ def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_ther
     ground, one = small
     rng = np.random.default_rng(6)
     calm = null_control(ground, rng, 1000)
-    assert calm.against.shape == calm.ratio.shape == (1000,)
+    assert calm.against.shape == (1000,)
+    assert calm.ratio is None
     assert calm.flagged <= FALSE_ALARMS
     there = search(ground, 1.5 * one.visible + 0.001 * rng.standard_normal(6))
     assert there.against_none == pytest.approx(np.log(there.probability[1] / there.probability[0]))
@@ -137,7 +140,7 @@ def test_fewer_null_sets_are_made_where_chance_is_certain(small):
     whole = null_control(ground, np.random.default_rng(8), 500)
     middle, top = np.quantile(whole.against, [0.5, 0.99])
     few = null_control(ground, np.random.default_rng(8), 500, middle)
-    assert few.against.size == few.ratio.size == 100
+    assert few.against.size == len(few.residuals) == 100
     np.testing.assert_array_equal(few.against, whole.against[:100])
     assert middle < few.needed_from
     assert null_control(ground, np.random.default_rng(8), 500, top).against.size == 500
@@ -147,8 +150,30 @@ def test_fewer_null_sets_are_made_where_chance_is_certain(small):
 @pytest.mark.parametrize(("larger", "stops"), [(6, False), (7, True)])
 def test_chance_is_certain_from_the_lower_bound_of_the_share_on(larger, stops):
     """Of a hundred sets: the bound of 99 % is 0.0180 with six above, 0.0238 with seven."""
-    odds = np.r_[np.zeros(100 - larger), np.full(larger, 2.0)]
-    assert _is_within_chance(odds, 1.0) is stops
+    low, _ = _share(np.arange(100) < larger)
+    assert (low > FALSE_ALARMS) is stops
+
+
+def test_bounds_of_a_share_are_those_of_the_binomial_distribution():
+    low, high = _share(np.arange(100) < 5)
+    assert binom.sf(4, 100, low) == pytest.approx(0.01)
+    assert binom.cdf(5, 100, high) == pytest.approx(0.01)
+    assert _share(np.zeros(100, dtype=bool)) == (0.0, pytest.approx(1.0 - 0.01**0.01))
+    assert _share(np.ones(100, dtype=bool)) == (pytest.approx(0.01**0.01), 1.0)
+
+
+@pytest.mark.parametrize(("place", "n"), [(0.0, 100), (0.5, 100), (0.05, 300)])
+def test_fewer_sets_are_made_to_choose_where_the_threshold_is_clearly_passed_or_missed(small, place, n):
+    """Below all of them or in their middle a hundred are enough; at the threshold itself all are needed."""
+    ground, _ = small
+    control = null_control(ground, np.random.default_rng(8), 300)
+    whole = made_to_choose(ground, control)
+    board = np.quantile(whole.ratio, place) if place else 0.9 * whole.ratio.min()
+    found = made_to_choose(ground, control, float(board))
+    assert found.ratio.size == n
+    np.testing.assert_array_equal(found.ratio, whole.ratio[:n])
+    if place != 0.05:
+        assert (board < found.ratio_to_beat) == (board < whole.ratio_to_beat) == (place == 0.0)
 
 
 def test_null_sets_are_made_to_choose(small):
@@ -158,7 +183,7 @@ def test_null_sets_are_made_to_choose(small):
     forced, free = nested(ground, residuals, ALWAYS), nested(ground, residuals)
     assert np.all(forced.chosen == 1)
     assert np.mean(free.chosen == 0) > 0.8
-    control = null_control(ground, np.random.default_rng(7), 100)
+    control = made_to_choose(ground, null_control(ground, np.random.default_rng(7), 100))
     np.testing.assert_allclose(control.ratio, forced.ratio)
     assert control.ratio_to_beat < 1.0 < np.quantile(control.ratio, 0.95)
     assert control.ratio_to_beat == pytest.approx(np.quantile(forced.ratio, 0.05))
