@@ -30,6 +30,12 @@ class Case:
         Values by short name (of the effect's parameters), the ideal plate and the place of what is attached -> effect.
     main : str
         The parameter that stands for the effect where effects are pooled.
+    effect : str
+        Its name, where that is not the name of the case.
+    others : tuple of str
+        Uncertain inputs that are counted as well.
+    times : int
+        How many times as many boards as of other cases.
     stated : dict
         What the card says beyond the sizes, as TOML.
     is_attached : bool
@@ -44,6 +50,9 @@ class Case:
     stated: Mapping[str, str] = field(default_factory=dict)
     is_attached: bool = False
     n: Counts | None = None
+    effect: str = ""
+    others: tuple[str, ...] = ()
+    times: int = 1
 
 
 def _compliant(effect: Callable[[float], NoEffect], power: int) -> Callable[[Values, Plate, Place], NoEffect]:
@@ -62,6 +71,15 @@ CASES: dict[str, Case] = {
     ),
     "attached_mass": Case("free-12", _attached, "mass", is_attached=True),
     "clamp_rotation": Case("cantilever-9", _compliant(planted.ClampRotation, 1), "compliance"),
+    "clamp_rotation, board free too": Case(
+        "cantilever-6-free-6",
+        _compliant(planted.ClampRotation, 1),
+        "compliance",
+        {"clamped_x0_mm": "{ mean = 30.0, sd = 1.5 }"},
+        effect="clamp_rotation",
+        others=("clamped_x0",),
+        times=5,
+    ),
     "air_loading": Case(
         "clamped-9",
         lambda v, p, at: planted.AirLoading(v["density"], v["baffle"]),
@@ -82,4 +100,10 @@ CASES: dict[str, Case] = {
         "cantilever-9", lambda v, p, at: planted.PoissonRatio(v["poisson_xy"]), "poisson_xy", {"poisson_xy": "0.4"}
     ),
 }
-"""Every effect that has a parameter, on a design where the readings tell something of it."""
+"""Every effect that has a parameter, on a design where the readings tell something of it; and a clamp whose grip is not
+known either, which the board held free as well tells apart from its give: one setup alone cannot."""
+
+
+def effect_of(case: str) -> str:
+    """The effect of a case."""
+    return CASES[case].effect or case

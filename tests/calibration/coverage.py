@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
-from calibration.cases import CASES
+from calibration.cases import CASES, effect_of
 from calibration.planted import Settings, cover_one, identity
 from calibration.records import Record, add_to, publish, read_done
 from scipy import stats
@@ -87,12 +87,17 @@ def counts(records: Sequence[Record], rule: Callable[[Interval], bool] = holds) 
     found, pooled = [], dict.fromkeys(("effect", *CONSTANTS), (0, 0))
     for effect in dict.fromkeys(record["effect"] for record in records):
         boards = [record["quantities"] for record in records if record["effect"] == effect]
-        own = [name for name in boards[0] if name.startswith(f"{effect}.") or name == CASES[effect].main]
+        case, main = CASES[effect], f"{effect_of(effect)}.{CASES[effect].main}"
+        own = [
+            name
+            for name in boards[0]
+            if name.startswith(f"{effect_of(effect)}.") or name.split("[")[0] in (case.main, *case.others)
+        ]
         for name in (*own, *CONSTANTS):
             held = sum(rule(board[name]) for board in boards)
             narrowing = float(np.median([board[name].get("narrowing", np.nan) for board in boards]))
             found.append(Count(effect, name, held, len(boards), narrowing))
-            is_main = name == CASES[effect].main or name.split("[")[0] == f"{effect}.{CASES[effect].main}"
+            is_main = name.split("[")[0] in (case.main, main)
             key = name if name in CONSTANTS else "effect" if is_main else ""
             if key:
                 pooled[key] = (pooled[key][0] + held, pooled[key][1] + len(boards))
@@ -138,7 +143,7 @@ def _line(count: Count, level: float) -> str:
     mark = "" if count.is_within(level) else "  OUTSIDE"
     narrowing = "" if np.isnan(count.narrowing) else f"  sd {count.narrowing:.2f} of the prior's"
     band = f"{low}-{high} allowed"
-    return f"  {count.effect:18} {count.name:42} {_share(count):20} {band:18}{narrowing}{mark}"
+    return f"  {count.effect:30} {count.name:42} {_share(count):20} {band:18}{narrowing}{mark}"
 
 
 def run(
@@ -147,16 +152,22 @@ def run(
     """Do what is not done yet, and return the records of all boards asked for, effect after effect."""
     records = read_done(out, identity(settings))
     done = {(record["effect"], record["board"]) for record in records}
-    jobs = [(settings, effect, i) for i in range(n_boards) for effect in effects if (effect, i) not in done]
+    wanted = [(effect, i) for effect in effects for i in range(n_boards * CASES[effect].times)]
+    jobs = [(settings, *one) for one in sorted(wanted, key=lambda one: one[1]) if one not in done]
     records += add_to(out, cover_one, jobs, workers, quiet=quiet)
     by_board = {(record["effect"], record["board"]): record for record in records}
-    return [by_board[effect, i] for effect in effects for i in range(n_boards)]
+    return [by_board[one] for one in wanted]
 
 
 def main() -> int:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--boards", type=int, default=40, help="of each effect")
+    parser.add_argument(
+        "--boards",
+        type=int,
+        default=40,
+        help="of each effect, or five times as many",
+    )
     parser.add_argument("--effect", action="append", choices=list(CASES), help="repeat for several; absent: all")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")

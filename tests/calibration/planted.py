@@ -10,15 +10,16 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from calibration.cases import CASES, Place, Values
+from calibration.cases import CASES, Place, Values, effect_of
 from generator.card import card_text
-from generator.designs import DESIGNS, MEDIANS, Design
+from generator.designs import DESIGNS, MEDIANS, Design, Setup
 from generator.naming import LEAST_CORRELATION, Label, frequencies
+from generator.recipes import RECIPES
 
 from bayesplate.errors import BayesplateError
 from bayesplate.plate.board import Board
@@ -35,6 +36,7 @@ from bayesplate.workflow.prepare import Prepared, prepare
 NOISE = "{ median = 0.3, factor = 1.65 }"
 POISSON = "{ mean = 0.4, sd = 0.08 }"
 MOST_ATTEMPTS, MOST_REDRAWS = 4, 100
+Readings = Mapping[str, Mapping[Label, float]]
 
 
 @dataclass(frozen=True)
@@ -71,17 +73,17 @@ class Truth:
     ----------
     values : dict
         E_x, E_y, G_xy (Pa), and the uncertain inputs of the board by their names, SI.
-    noise : float
-        Relative.
+    noise : dict
+        Setup name -> relative noise.
     hertz : dict
-        Laboratory's label -> reading.
+        Setup name -> laboratory's label -> reading.
     redraws : int
         Draws that were passed over because a label was in doubt, as a laboratory could not name such a mode.
     """
 
     values: Values
-    noise: float
-    hertz: Mapping[Label, float]
+    noise: Mapping[str, float]
+    hertz: Readings
     redraws: int
 
 
@@ -94,18 +96,17 @@ def prior_text() -> str:
     return "\n".join(['format = 1\nname = "spread"', *tables]) + "\n"
 
 
-def prepared(folder: Path, effect: str, hertz: Mapping[Label, float], place: Place) -> Prepared:
-    """The card with these readings, read as a user's is."""
-    case = CASES[effect]
-    design = DESIGNS[case.design]
+def prepared(folder: Path, name: str, hertz: Readings, place: Place) -> Prepared:
+    """The card of a case with these readings, read as a user's is."""
+    case = CASES[name]
     text = card_text(
         "planted",
-        design,
-        {design.setups[0].name: hertz},
+        DESIGNS[case.design],
+        hertz,
         noise_cents=0.0,
         places=(place,) if case.is_attached else (),
         prior="./spread.toml",
-        stated={"effects": f'["{effect}"]', "poisson_xy": POISSON, "noise_percent": NOISE, **case.stated},
+        stated={"effects": f'["{effect_of(name)}"]', "poisson_xy": POISSON, "noise_percent": NOISE, **case.stated},
     )
     (folder / "spread.toml").write_text(prior_text())
     (folder / "planted.toml").write_text(text)
@@ -126,22 +127,37 @@ def short_names(values: Values, board: Board) -> dict[str, float]:
     return {keys.get(name, name): value for name, value in values.items()}
 
 
-def draw_truth(effect: str, asked: Prepared, place: Place, rng: np.random.Generator) -> Truth:
+def draw_truth(name: str, asked: Prepared, place: Place, rng: np.random.Generator) -> Truth:
     """Draw everything from the priors of a prepared card, until the generator names every mode beyond doubt."""
-    design = DESIGNS[CASES[effect].design]
-    (setup,) = design.setups
     for redraws in range(MOST_REDRAWS):
-        values = {name: float(density.sample(rng, 1)[0]) for name, density in asked.prior.constants.items()}
-        values |= {name: drawn(quantity, rng) for name, quantity in asked.board.uncertain_inputs.items()}
-        noise = drawn(asked.board.setups[0].noise, rng)
-        constants = {name: values[name] for name in MODULI}
-        plate = design.plate(setup, {**constants, "nu_xy": values["poisson_xy"]})
-        acting = CASES[effect].make(short_names(values, asked.board), plate, place)
-        exact, correlation = frequencies(plate, [acting], setup.beams, CASES[effect].n)
-        if correlation >= LEAST_CORRELATION:
-            read = {setup.label(b): f * float(np.exp(noise * rng.standard_normal())) for b, f in exact.items()}
+        values = {key: float(density.sample(rng, 1)[0]) for key, density in asked.prior.constants.items()}
+        values |= {key: drawn(quantity, rng) for key, quantity in asked.board.uncertain_inputs.items()}
+        noise = {setup.name: drawn(setup.noise, rng) for setup in asked.board.setups}
+        read: dict[str, dict[Label, float]] = {}
+        for setup in DESIGNS[CASES[name].design].setups:
+            exact, correlation = _frequencies(name, asked.board, setup, values, place)
+            if correlation < LEAST_CORRELATION:
+                break
+            own = noise[setup.name]
+            read[setup.name] = {
+                setup.label(b): f * float(np.exp(own * rng.standard_normal())) for b, f in exact.items()
+            }
+        else:
             return Truth(values, noise, read, redraws)
-    raise RuntimeError(f"{effect}: wanted a board with clear labels, got none in {MOST_REDRAWS} draws")
+    raise RuntimeError(f"{name}: wanted a board with clear labels, got none in {MOST_REDRAWS} draws")
+
+
+def _frequencies(
+    name: str, board: Board, setup: Setup, values: Values, place: Place
+) -> tuple[dict[Label, float], float]:
+    """What the generator gives for a setup, with the effect where it acts, and how clear its labels are."""
+    covered = values.get(f"clamped_x0[{setup.name}]", setup.covered)
+    constants = {key: values[key] for key in MODULI}
+    design = DESIGNS[CASES[name].design]
+    plate = design.plate(replace(setup, covered=covered), {**constants, "nu_xy": values["poisson_xy"]})
+    acts = RECIPES[effect_of(name)].acts(setup)
+    acting = [CASES[name].make(short_names(values, board), plate, place)] if acts else []
+    return frequencies(plate, acting, setup.beams, CASES[name].n)
 
 
 def fitted(problem: PosedProblem, settings: Settings, rng: np.random.Generator) -> tuple[Inference, Draws, int]:
@@ -171,7 +187,8 @@ def intervals(board: Board, truth: Truth, draws: Draws) -> dict[str, dict[str, f
         found[name] = {"truth": truth.values[name], **_quantiles(values)}
     for name, quantity in board.uncertain_inputs.items():
         found[name]["narrowing"] = float(np.std(quantity.standard(draws.inputs[name])) / _prior_sd(quantity))
-    found["noise"] = {"truth": truth.noise, **_quantiles(draws.noise[..., 0])}
+    first = board.setups[0].name
+    found["noise"] = {"truth": truth.noise[first], **_quantiles(draws.noise[..., 0])}
     return found
 
 
@@ -191,29 +208,29 @@ def identity(settings: Settings) -> dict[str, Any]:
     """What a file of records must agree in before more are added to it: settings, cards and priors."""
     cases = {}
     with tempfile.TemporaryDirectory() as folder:
-        for effect, case in CASES.items():
-            asked = prepared(Path(folder), effect, _unread(DESIGNS[case.design]), (0.1, 0.1))
+        for name, case in CASES.items():
+            asked = prepared(Path(folder), name, unread(DESIGNS[case.design]), (0.1, 0.1))
             uncertain = asked.board.uncertain_inputs | {"noise": asked.board.setups[0].noise}
             priors = {n: f"{q.kind} {q.mean:g} +- {q.sd:g}, {q.lower:g} to {q.upper:g}" for n, q in uncertain.items()}
-            cases[effect] = {"design": case.design, **priors}
+            cases[name] = {"design": case.design, **priors}
     return {"format": 1, "settings": asdict(settings), "constants": {n: list(v) for n, v in MEDIANS.items()}, **cases}
 
 
-def _unread(design: Design) -> dict[Label, float]:
+def unread(design: Design) -> Readings:
     """Readings for a card of which only the priors are asked."""
-    return {design.setups[0].label(beams): 100.0 for beams in design.setups[0].beams}
+    return {setup.name: {setup.label(beams): 100.0 for beams in setup.beams} for setup in design.setups}
 
 
-def cover_one(settings: Settings, effect: str, index: int) -> dict[str, Any]:
+def cover_one(settings: Settings, name: str, index: int) -> dict[str, Any]:
     """Plant one board and fit it.
 
     Parameters
     ----------
     settings : Settings
-    effect : str
+    name : str
         One of `CASES`.
     index : int
-        Seeds everything random, together with the effect and the base seed.
+        Seeds everything random, together with the case and the base seed.
 
     Returns
     -------
@@ -221,15 +238,15 @@ def cover_one(settings: Settings, effect: str, index: int) -> dict[str, Any]:
         effect, board, and either quantities, seconds, law, attempts, redraws, or error.
     """
     started = time.perf_counter()
-    seeds = np.random.SeedSequence([settings.base_seed, *effect.encode(), index]).spawn(2)
+    seeds = np.random.SeedSequence([settings.base_seed, *name.encode(), index]).spawn(2)
     for_truth, for_draws = (np.random.default_rng(seed) for seed in seeds)
-    record: dict[str, Any] = {"effect": effect, "board": index}
-    design = DESIGNS[CASES[effect].design]
-    with tempfile.TemporaryDirectory() as name:
+    record: dict[str, Any] = {"effect": name, "board": index}
+    design = DESIGNS[CASES[name].design]
+    with tempfile.TemporaryDirectory() as folder:
         try:
             place = _place(design, for_truth)
-            truth = draw_truth(effect, prepared(Path(name), effect, _unread(design), place), place, for_truth)
-            asked = prepared(Path(name), effect, truth.hertz, place)
+            truth = draw_truth(name, prepared(Path(folder), name, unread(design), place), place, for_truth)
+            asked = prepared(Path(folder), name, truth.hertz, place)
             inference, draws, attempts = fitted(pose(asked.board, asked.prior), settings, for_draws)
         except BayesplateError as error:
             return record | {"error": f"{type(error).__name__}: {error}"}

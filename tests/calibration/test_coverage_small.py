@@ -6,9 +6,9 @@ import json
 
 import numpy as np
 import pytest
-from calibration.cases import CASES
+from calibration.cases import CASES, effect_of
 from calibration.coverage import NOMINAL, Count, counts, half_holds, holds, judge, run
-from calibration.planted import Settings, cover_one, drawn, identity, prepared
+from calibration.planted import Settings, cover_one, drawn, identity, prepared, unread
 from calibration.records import read_done
 from generator.designs import DESIGNS, MEDIANS
 from scipy import stats
@@ -69,13 +69,13 @@ def test_an_interrupted_run_goes_on(boards, tmp_path):
 
 def test_truth_and_card_share_their_priors(tmp_path):
     """Every effect with a parameter has a case; its card leaves all of them, nu_xy and the noise uncertain."""
-    assert set(CASES) == set(EFFECTS) - {"outline_profile"}  # which is read, and has no parameter
-    for effect, case in CASES.items():
-        setup = DESIGNS[case.design].setups[0]
-        board = prepared(tmp_path, effect, {setup.label(b): 100.0 for b in setup.beams}, (0.1, 0.1))
-        (declared,) = (EFFECTS[effect].of(board.board, s) for s in board.board.setups)
+    assert set(map(effect_of, CASES)) == set(EFFECTS) - {"outline_profile"}  # which is read, and has no parameter
+    for name, case in CASES.items():
+        board = prepared(tmp_path, name, unread(DESIGNS[case.design]), (0.1, 0.1))
+        declared = EFFECTS[effect_of(name)].of(board.board, board.board.setups[0])
         keys = {parameter.name for parameter in declared.parameters()}
-        assert set(board.board.uncertain_inputs) == keys | {"poisson_xy"}
+        clamped = {f"{other}[{board.board.setups[0].name}]" for other in case.others}
+        assert set(board.board.uncertain_inputs) == keys | {"poisson_xy"} | clamped
         assert {n: (d.median, d.factor) for n, d in board.prior.constants.items()} == {
             n: (pytest.approx(median), pytest.approx(factor)) for n, (median, factor) in MEDIANS.items()
         }

@@ -14,7 +14,7 @@ LEAST_NOISE_CENTS = 0.1
 
 NOTHING: Mapping[str, str] = {}
 ACCELEROMETER = '"accelerometer"'
-_OF_SETUPS = ("noise_percent", "air", "kind", "mass_g")
+_OF_SETUPS = ("noise_percent", "air", "kind", "mass_g", "clamped_x0_mm")
 
 
 def card_text(
@@ -52,8 +52,8 @@ def card_text(
         A prior card; empty: the package's default.
     stated : mapping
         Key of the card -> its value as TOML, in place of what stands there otherwise, or besides: length_y_mm,
-        thickness_mm, poisson_xy, shear_xz_gpa, shear_yz_gpa, effects; of every setup noise_percent, air, and the kind
-        and mass_g of what is attached.
+        thickness_mm, poisson_xy, shear_xz_gpa, shear_yz_gpa, effects; of every setup noise_percent, air, the kind
+        and mass_g of what is attached, and of clamped ones clamped_x0_mm.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def _setup_lines(
         "[[setup]]",
         f'name = "{setup.name}"',
         f"edges = {{ {edges} }}",
-        *([f"clamped_mm = {{ x0 = {_mm(setup.covered)} }}"] if setup.covered else []),
+        *([f"clamped_mm = {{ x0 = {stated.get('clamped_x0_mm', _mm(setup.covered))} }}"] if setup.covered else []),
         f"first_label = [{setup.first_label[0]}, {setup.first_label[1]}]",
         f"noise_percent = {stated['noise_percent']}",
         *([f"resolution_hz = {stated['resolution_hz']}"] if "resolution_hz" in stated else []),
