@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from calibration.cases import CASES, effect_of
 from calibration.coverage import NOMINAL, Count, counts, half_holds, holds, judge, run
-from calibration.planted import Settings, cover_one, drawn, identity, prepared, unread
+from calibration.planted import (
+    Settings,
+    cover_one,
+    draw_truth,
+    drawn,
+    fitted,
+    identity,
+    intervals,
+    prepared,
+    unread,
+)
 from calibration.records import read_done
 from generator.designs import DESIGNS, MEDIANS
 from scipy import stats
 
 from bayesplate.effects import EFFECTS
+from bayesplate.posterior.inference import pose
 from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
 
 SHORT = Settings(n_ensembles=2, n_walkers=12, gate_taus=10.0, ess_min=100.0)
 EFFECT_NAMES = ("membrane_tension", "clamp_rotation")
+FREE_TOO, PLACE = "clamp_rotation, board free too", (0.1, 0.1)
 
 
 @pytest.fixture(scope="module")
@@ -141,3 +155,23 @@ def test_half_the_width_about_the_median():
     interval = {"q05": -1.0, "q50": 0.0, "q95": 3.0}
     assert [holds({**interval, "truth": truth}) for truth in (-1.1, -0.9, 2.9, 3.1)] == [False, True, True, False]
     assert [half_holds({**interval, "truth": t}) for t in (-0.6, -0.4, 1.4, 1.6)] == [False, True, True, False]
+
+
+def test_a_board_held_free_as_well_tells_a_soft_clamp_from_one_that_covers_more(tmp_path):
+    """Either lowers what the clamp reads; of the cantilever alone E_x, the grip and its give stay open together."""
+    rng = np.random.default_rng(1)
+    both = prepared(tmp_path, FREE_TOO, unread(DESIGNS[CASES[FREE_TOO].design]), PLACE)
+    truth = draw_truth(FREE_TOO, both, PLACE, rng)
+    both = prepared(tmp_path, FREE_TOO, truth.hertz, PLACE)
+    card = tmp_path / "planted.toml"
+    card.write_text("[[setup]]".join(card.read_text().split("[[setup]]")[:2]))
+    found = []
+    for asked in (both, prepare(card)):
+        _, draws, _ = fitted(pose(asked.board, asked.prior), replace(SHORT, n_walkers=16), rng)
+        found.append(intervals(asked.board, truth, draws))
+        print({k: (v["q95"] - v["q05"], v.get("narrowing")) for k, v in found[-1].items()})
+    for name in ("clamped_x0[cantilever]", "clamp_rotation.compliance[cantilever]", "E_x"):
+        with_free, alone = ({"width": one[name]["q95"] - one[name]["q05"], **one[name]} for one in found)
+        assert abs(with_free["truth"] - with_free["q50"]) < with_free["width"]  # 3.3 standard deviations
+        assert with_free["width"] < {"E_x": 0.4}.get(name, 0.85) * alone["width"], name
+    assert found[1]["clamped_x0[cantilever]"]["narrowing"] > 0.85  # nothing learned of it
