@@ -169,7 +169,6 @@ def test_a_board_held_free_as_well_tells_a_soft_clamp_from_one_that_covers_more(
     for asked in (both, prepare(card)):
         _, draws, _ = fitted(pose(asked.board, asked.prior), replace(SHORT, n_walkers=16), rng)
         found.append(intervals(asked.board, truth, draws))
-        print({k: (v["q95"] - v["q05"], v.get("narrowing")) for k, v in found[-1].items()})
     for name in ("clamped_x0[cantilever]", "clamp_rotation.compliance[cantilever]", "E_x"):
         with_free, alone = ({"width": one[name]["q95"] - one[name]["q05"], **one[name]} for one in found)
         assert abs(with_free["truth"] - with_free["q50"]) < with_free["width"]  # 3.3 standard deviations
