@@ -1,6 +1,6 @@
 """Closing the loop: from a measured board's residual to an effect, and the error before and after.
 
-Ten boards go through the same steps: fit, find the residual, search for an effect that the plate lacks, add it
+Eleven boards go through the same steps: fit, find the residual, search for an effect that the plate lacks, add it
 where the readings name one, and compare the errors. Two columns of computed frequencies come from a shear-flexible
 finite element model of somebody else; the ideal plate that is fitted to them knows nothing of shear, and the search has
 to find it. The other boards are measured, and what their readings cannot tell is said as plainly as what they can.
@@ -26,6 +26,7 @@ BOARDS = (
     "paper-clamped-fe",
     "finnish-spruce-cantilever",
     "fiemme-spruce-clamped",
+    "nemus-D",
     "spruce-free-2L",
     "spruce-free-2R",
     "spruce-free-3R",

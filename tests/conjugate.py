@@ -50,7 +50,8 @@ class PowerLaw:
         logs = np.log(np.stack([values[name] for name in ("D_x", "D_y", "D_s")], axis=-1))
         return self.constant + logs @ self.slopes.T
 
-    every_log_frequency_of_board = every_log_frequency
+    def discrepancies(self, values):
+        return np.zeros((1, 1))
 
 
 SLOPES = 0.5 * np.array(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,7 @@ def prediction_errors(
     misfit: Misfit,
     starts: NDArray[np.float64],
     bounds: Bounds | None = None,
+    modes: Sequence[Sequence[int]] | None = None,
 ) -> Errors:
     """Errors of the most likely constants, in sample and with each mode left out in turn.
 
@@ -56,13 +58,15 @@ def prediction_errors(
     squares = misfit(predict(starts))[0] ** 2
     inputs = np.sum(starts[:, N_CONSTANTS:] ** 2, axis=1)
 
-    def error(left_out: int | None = None) -> NDArray[np.float64]:
-        used = squares if left_out is None else np.delete(squares, left_out, axis=1)
+    def error(left_out: Sequence[int] = ()) -> NDArray[np.float64]:
+        used = np.delete(squares, left_out, axis=1)
         start = starts[np.nanargmin(used.sum(axis=1) + inputs)]
         fitted = most_likely(predict, misfit, start, bounds, left_out)
         return np.asarray(target - predict(fitted[None, :])[0])
 
     left_out = np.full(target.size, np.nan)
-    if target.size >= _FEWEST:
-        left_out[:] = [error(mode)[mode] for mode in range(target.size)]
+    modes = [(reading,) for reading in range(target.size)] if modes is None else modes
+    if len(modes) >= _FEWEST:
+        for mode in map(list, modes):
+            left_out[mode] = error(mode)[mode]
     return Errors(error(), left_out)

@@ -81,7 +81,7 @@ def deviance_misfit(errors: Sequence[ReadingErrors], noise: Sequence[float] | Fl
 
 
 def most_likely(
-    predict: Predict, misfit: Misfit, start: Floats, bounds: Bounds | None = None, left_out: int | None = None
+    predict: Predict, misfit: Misfit, start: Floats, bounds: Bounds | None = None, left_out: Sequence[int] = ()
 ) -> Floats:
     """Parameters that minimise the squares of a misfit.
 
@@ -94,8 +94,8 @@ def most_likely(
     start : (n_free,) array
         Within the bounds.
     bounds : Bounds, optional
-    left_out : int, optional
-        Reading that is not used.
+    left_out : sequence of int, optional
+        Readings that are not used.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def most_likely(
     from scipy.optimize import least_squares
 
     def without(rows: Floats) -> Floats:
-        return rows if left_out is None else np.delete(rows, left_out, axis=0)
+        return np.delete(rows, left_out, axis=0) if left_out else rows
 
     def residuals(x: Floats) -> Floats:
         return np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[N_CONSTANTS:]])

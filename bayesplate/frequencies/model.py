@@ -102,10 +102,6 @@ class SetupModel:
         """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         return log_frequency(self.law(law).squared(self.system.weights(values)))
 
-    def every_log_frequency_of_board(self, values: Values, law: LawName) -> NDArray[np.float64]:
-        """The same with the discrepancies of the board from its plate that sessions share: (n_draws, n_every) array."""
-        return self.every_log_frequency(values, law) + self.discrepancies(values)
-
     def discrepancies(self, values: Values) -> NDArray[np.float64]:
         """ln f of the board less that of its plate, of all modes.
 
@@ -253,6 +249,33 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
     if by_mode is not None:
         residues = np.array([np.nan if i is None else by_mode[i] for i in [*labelled, *rest]])
     return replace(model, linear=linear, exact=None, others=others, residues=residues)
+
+
+def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[NDArray[np.float64]]:
+    """ln f of all modes of each setup, with the discrepancies of the board from its plate that sessions share.
+
+    Setups that are one plate at these values, as most sessions are, are solved once.
+
+    Returns
+    -------
+    list of (n_draws, n_every) array
+    """
+    plates: list[NDArray[np.float64]] = []
+    for i, model in enumerate(models):
+        twin = next((j for j in range(i) if law == "exact" and _are_solved_alike(models[j], model, values)), None)
+        plates.append(model.every_log_frequency(values, law) if twin is None else plates[twin])
+    return [plate + model.discrepancies(values) for plate, model in zip(plates, models, strict=True)]
+
+
+def _are_solved_alike(one: SetupModel, other: SetupModel, values: Values) -> bool:
+    """Whether two setups have the same exact law, for the same modes, and weigh its terms alike."""
+    if not (isinstance(one.exact, ExactLaw) and isinstance(other.exact, ExactLaw)):
+        return False
+    blocks = zip(one.exact.reduced.blocks, other.exact.reduced.blocks, strict=False)
+    if one.exact.reduced.places != other.exact.reduced.places or not all(a is b for a, b in blocks):
+        return False
+    weights = zip(one.system.weights(values), other.system.weights(values), strict=True)
+    return all(np.array_equal(a, b) for a, b in weights)
 
 
 def with_exact(

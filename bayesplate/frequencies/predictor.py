@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import LawName
-from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.plate.board import Values
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Predictor:
     def __call__(self, x: Floats) -> Floats:
         """From (n, n_free) parameters to (n, n_modes) ln f."""
         values = self.values(x)
-        every = np.concatenate([one.every_log_frequency_of_board(values, self.law) for one in self.models], axis=1)
+        every = np.concatenate(log_frequencies_of_board(self.models, values, self.law), axis=1)
         return every if self.rows is None else every[:, self.rows]
 
     def of(self, rows: NDArray[np.intp]) -> Predictor:

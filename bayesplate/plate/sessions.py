@@ -105,6 +105,21 @@ def shared_share(setup: Setup) -> float:
     return float(shared / (shared + setup.noise.median**2))
 
 
+def same_modes(board: Board) -> tuple[tuple[int, ...], ...]:
+    """Which readings are of one mode in sessions of one setup, each reading in one of the groups, in their order.
+
+    A reading tells what the same mode is in another session, whatever the model: who asks how well a model predicts a
+    mode leaves all its readings out.
+    """
+    found: dict[tuple[Owner | int, Label], list[int]] = {}
+    reading = 0
+    for place, setup in enumerate(board.setups):
+        for label in setup.labels:
+            found.setdefault((place if setup.group is None else setup.group, label), []).append(reading)
+            reading += 1
+    return tuple(map(tuple, found.values()))
+
+
 def discrepancy_names(setup: Setup, label: Label) -> tuple[str, str] | None:
     """Names of the parameters whose product shifts ln f of a mode of a setup; None where it shares nothing."""
     if setup.group is None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import Errors, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
+from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.laplace import predictor
@@ -25,7 +26,7 @@ def mode_errors(inference: Inference, draws: Draws) -> Errors:
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
     misfit = deviance_misfit(problem.posterior.readings, median_noise(draws))
     starts, bounds = _starts(problem, draws), problem.parameters.fitted_bounds
-    return prediction_errors(predict, log_measured(problem.board), misfit, starts, bounds)
+    return prediction_errors(predict, log_measured(problem.board), misfit, starts, bounds, same_modes(problem.board))
 
 
 def median_noise(draws: Draws) -> NDArray[np.float64]:

@@ -176,8 +176,7 @@ class SlipSearch:
         """Residuals of the most likely constants where a slip is mended."""
         target = slip.mended(self.target)
         scales = reading_sd(self.board.setups, self._medians * np.exp(self.log_widening))
-        left_out = slip.left_out[0] if slip.left_out else None
-        x = most_likely(self._predict, normal_misfit(target, scales), self._start, self._bounds, left_out)
+        x = most_likely(self._predict, normal_misfit(target, scales), self._start, self._bounds, slip.left_out)
         return self._at(x, target)
 
     def _at(self, x: Floats, target: Floats) -> _Fit:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
@@ -140,7 +140,7 @@ class Posterior:
     def every_log_frequency(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
         values = self.parameters.values(theta)
-        return [model.every_log_frequency_of_board(values, self.law) for model in self.models]
+        return log_frequencies_of_board(self.models, values, self.law)
 
     def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """ln f of the labelled modes: one (n_draws, n_modes) array per setup."""

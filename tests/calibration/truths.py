@@ -18,7 +18,7 @@ from bayesplate.effects import declare
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.refit import design as sensitivities
 from bayesplate.estimates.refit import refit
-from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
 from bayesplate.plate.sessions import with_discrepancies
@@ -192,7 +192,7 @@ def _frequencies(design: Design, values: Mapping[str, float]) -> tuple[Hertz, tu
 
 def of_board(model: SetupModel, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """ln f of the modes that are read, by the linear law: (n_modes,) array."""
-    return model.every_log_frequency_of_board(values, "linear")[0, : len(model.places)]
+    return log_frequencies_of_board([model], values, "linear")[0][0, : len(model.places)]
 
 
 def ranks_in_class(models: Sequence[SetupModel]) -> tuple[int, ...]:

@@ -16,10 +16,13 @@ from bayesplate.diagnosis.shifts import baseline as home
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.effects import declare
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.modes.naming import Place
 from bayesplate.modes.plate import Parity
-from bayesplate.plate.board import Board
+from bayesplate.modes.reduced import ReducedOrderModel
+from bayesplate.plate.board import Board, made_board
+from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.sessions import discrepancy_names, sessions, with_discrepancies
 from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem
 from bayesplate.posterior.inference import PosedProblem, pose
@@ -167,3 +170,24 @@ def test_a_scale_that_has_followed_the_residual_does_not_excuse_it(judge, rough,
     of_plate = baseline.log_frequency - baseline.every.discrepancy
     assert judge == "fit" or baseline.middle == pytest.approx(of_plate, abs=1e-9)
     assert (found.p_value(0) < 0.01) == (judge == "prior"), found.p_value(0)
+
+
+@pytest.mark.parametrize(("effects", "n_solved"), [((), 1), (("clamp_rotation",), 3)])
+def test_sessions_that_are_one_plate_are_solved_once_and_others_each(effects, n_solved, monkeypatch):
+    """A clamp that gives way differently on each day makes them different plates."""
+    days = board(3, None)
+    sizes = {q.name: q.prior for q in days.parameters if q.owner == BOARD}
+    made = declare(made_board("made", sizes, [replace(one, group=None) for one in days.setups], effects=effects))
+    problem = pose(made, load_prior("weakly-informative"), law="exact")
+    theta = np.random.default_rng(4).multivariate_normal(problem.centre, problem.covariance, 20)
+    values = problem.parameters.values(theta)
+    expected = [
+        one.every_log_frequency(values, "exact") + one.discrepancies(values) for one in problem.posterior.models
+    ]
+    solved, solve = [], ReducedOrderModel.eigenvalues
+    monkeypatch.setattr(ReducedOrderModel, "eigenvalues", lambda self, w: solved.append(1) or solve(self, w))
+    found = problem.posterior.every_log_frequency(theta)
+    assert len(solved) == n_solved
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert (np.abs(found[0] - found[1]).max() > 1e-4) == bool(effects)  # what the days share is all without a clamp

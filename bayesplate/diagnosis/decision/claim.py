@@ -98,7 +98,7 @@ def nested_of(found: Found, control: NullControl) -> Nested | None:
 
 
 def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
-    """Sum of paired differences over readings, and its standard error."""
+    """Sum of paired differences over modes, and its standard error."""
     values = np.asarray(gains, dtype=np.float64)
     return float(values.sum()), float(np.sqrt(values.size) * values.std(ddof=1))
 

@@ -257,7 +257,7 @@ def answer_words(found: Found, answer: Answer) -> str:
 
 def p_words(p_value: float) -> str:
     """A p-value with three decimals, or as smaller than they show."""
-    return f"p = {p_value:.3f}" if p_value >= 0.0005 else "p < 0.001"
+    return f"p = {p_value:.3f}" if p_value >= 0.001 else "p < 0.001"
 
 
 def alternatives(found: Found, ranked: Sequence[Answer]) -> tuple[Answer, ...]:

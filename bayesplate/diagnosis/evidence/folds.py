@@ -1,4 +1,7 @@
-"""Leave one reading out, choose again, predict it: what a chosen effect is worth where it has not been fitted."""
+"""Leave one mode out, choose again, predict it: what a chosen effect is worth where it has not been fitted.
+
+A mode is one reading; of several sessions of one setup it is its readings in all of them, for each tells of the others.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none, probabilities
 from bayesplate.diagnosis.evidence.search import Ground
 from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.modes.threads import in_threads
 
 Floats = NDArray[np.float64]
@@ -21,7 +25,7 @@ CERTAINLY_NEEDED = float(np.log((1.0 - NEEDED) / NEEDED))
 ALWAYS = -np.inf
 """Odds from which on an effect is chosen by whoever is made to choose one."""
 FEWEST = 5
-"""Readings without which a fold has no direction left to choose by."""
+"""Modes without which a fold has no direction left to choose by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +39,7 @@ class Nested:
     after : (n_sets, n_modes) array
         With the effect that the remaining readings choose, or none; not a number where the reading is no mode then.
     chosen : (n_sets, n_modes) array of int
-        Index of the hypothesis that each fold chose.
+        Index of the hypothesis that the fold of each reading chose.
     """
 
     before: Floats
@@ -51,7 +55,7 @@ class Nested:
 
 
 def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> Nested | None:
-    """Leave each reading out in turn, search again without it, and predict it by what was chosen.
+    """Leave each mode out in turn, search again without it, and predict its readings by what was chosen.
 
     Parameters
     ----------
@@ -65,14 +69,16 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
     Nested or None
         None if there are too few readings.
     """
-    n_modes = ground.baseline.n_modes
-    if n_modes < FEWEST:
+    modes = ground.baseline.same_modes
+    if len(modes) < FEWEST:
         return None
     none = ground.hypotheses[0]
 
-    def folded(mode: int) -> tuple[Floats, Floats, NDArray[np.intp]]:
-        fold = Fold(ground.baseline, mode)
-        chosen = choices(ground, fold, residuals, needed_from)
+    def folded(mode: tuple[int, ...]) -> NDArray[np.float64]:
+        chosen = choices(ground, _without(ground.baseline, mode[0], mode), residuals, needed_from)
+        return np.stack([predicted(_without(ground.baseline, reading, mode), chosen) for reading in mode])
+
+    def predicted(fold: Fold, chosen: NDArray[np.intp]) -> Floats:
         before = none.seen(ground.baseline, residuals) @ none.terms(fold).fold.misses
         after = before.copy()
         for index in np.unique(chosen[chosen > 0]):
@@ -80,10 +86,16 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
             hypothesis = ground.hypotheses[index]
             seen = hypothesis.seen(ground.baseline, residuals[sets])
             after[sets] = hypothesis.terms(fold).left_out_errors(seen)
-        return before, after, chosen
+        return np.stack([before, after, chosen])
 
-    before, after, chosen = zip(*in_threads(folded, range(n_modes)), strict=True)
-    return Nested(*(np.stack(each, axis=1) for each in (before, after, chosen)))
+    found = np.concatenate(in_threads(folded, modes))[np.argsort(np.concatenate(modes))]
+    before, after, chosen = np.moveaxis(found, 0, 2)
+    return Nested(before, after, chosen.astype(np.intp))
+
+
+def _without(baseline: Baseline, reading: int, mode: tuple[int, ...]) -> Fold:
+    """The fold in which a reading is to be predicted, every reading of its mode left out."""
+    return Fold(baseline, reading, tuple(other for other in mode if other != reading))
 
 
 def choices(ground: Ground, fold: Fold, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> NDArray[np.intp]:
@@ -96,49 +108,52 @@ def choices(ground: Ground, fold: Fold, residuals: Floats, needed_from: float = 
 
 
 def left_out(ground: Ground, index: int, residual: Floats) -> Floats:
-    """Errors of predicting each reading from the others under one hypothesis: (n_modes,) array, ln f."""
+    """Errors of predicting each reading from the other modes under one hypothesis: (n_modes,) array, ln f."""
     hypothesis = ground.hypotheses[index]
     seen = hypothesis.seen(ground.baseline, residual[None, :])
-    return np.array(
-        [
-            hypothesis.terms(Fold(ground.baseline, mode)).left_out_errors(seen)[0]
-            for mode in range(ground.baseline.n_modes)
-        ]
-    )
+    errors = np.zeros(len(residual))
+    for mode in ground.baseline.same_modes:
+        for reading in mode:
+            terms = hypothesis.terms(_without(ground.baseline, reading, mode))
+            errors[reading] = terms.left_out_errors(seen)[0]
+    return errors
 
 
 def log_score(ground: Ground, index: int, residual: Floats) -> float:
-    """Sum over the readings of the log density of each given the others, under one hypothesis.
+    """Sum over the modes of the log density of the readings of each given the others, under one hypothesis.
 
     A ratio of two restricted densities each, noise and sizes averaged.
     """
-    return float(sum(_log_score_of(ground, index, residual, mode) for mode in range(ground.baseline.n_modes)))
+    return float(sum(_log_score_of(ground, index, residual, mode) for mode in ground.baseline.same_modes))
 
 
 def log_score_gains(ground: Ground, residual: Floats, chosen: NDArray[np.intp]) -> Floats:
-    """What each fold's choice adds to the log density of the reading that it left out: (n_modes,) array.
+    """What each fold's choice adds to the log density of the readings that it left out: one per mode, in their order.
 
     Parameters
     ----------
     ground : Ground
     residual : (n_modes,) array
     chosen : (n_modes,) array of int
-        Index of the hypothesis that each fold chose.
+        Index of the hypothesis that the fold of each reading chose.
     """
-    gains = np.zeros(len(residual))
-    for mode in np.flatnonzero(chosen):
-        one, none = (_log_score_of(ground, int(index), residual, int(mode)) for index in (chosen[mode], 0))
-        gains[mode] = one - none
+    gains = np.zeros(len(ground.baseline.same_modes))
+    for place, mode in enumerate(ground.baseline.same_modes):
+        index = int(chosen[mode[0]])
+        if index:
+            one, none = (_log_score_of(ground, each, residual, mode) for each in (index, 0))
+            gains[place] = one - none
     return gains
 
 
-def _log_score_of(ground: Ground, index: int, residual: Floats, mode: int) -> float:
-    """Log density of one reading given the others, under one hypothesis."""
+def _log_score_of(ground: Ground, index: int, residual: Floats, mode: tuple[int, ...]) -> float:
+    """Log density of the readings of a mode given the others, under one hypothesis."""
     hypothesis = ground.hypotheses[index]
     seen = hypothesis.seen(ground.baseline, residual[None, :])
     own = ground.baseline if hypothesis.own is None else hypothesis.own
-    if not own.is_mode[mode]:
-        return own.log_alone(mode)
-    fold = Fold(ground.baseline, mode)
+    alone = sum(own.log_alone(reading) for reading in mode if not own.is_mode[reading])
+    if not any(own.is_mode[reading] for reading in mode):
+        return float(alone)
+    fold = _without(ground.baseline, mode[0], mode)
     whole, without = (hypothesis.terms(one).log_evidence(seen)[0] for one in (ground.whole, fold))
-    return float(whole - without)
+    return float(alone + whole - without)

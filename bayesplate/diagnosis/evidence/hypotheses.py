@@ -46,9 +46,12 @@ class Swap:
         return f"{labels[self.first]} and {labels[self.second]}{where}"
 
     def in_fold(self, fold: Fold) -> Fold:
-        """The fold that leaves out the same reading where the two are exchanged: it stands under the other label."""
+        """The fold that leaves out the same readings where the two are exchanged: they stand under the other label."""
+        if fold.left_out is None:
+            return fold
         exchanged = {self.first: self.second, self.second: self.first}
-        return fold if fold.left_out not in exchanged else Fold(fold.baseline, exchanged[fold.left_out])
+        left_out, *others = (exchanged.get(one, one) for one in (fold.left_out, *fold.others))
+        return Fold(fold.baseline, left_out, tuple(others))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,7 @@ class Hypothesis:
     def terms(self, fold: Fold) -> Terms:
         """Normal terms in a fold, which names the reading that is left out by its place on the card."""
         if self.own is not None:
-            fold = Fold(self.own, fold.left_out)
+            fold = replace(fold, baseline=self.own)
         return Terms(self.table, fold if self.swap is None else self.swap.in_fold(fold), self.noise)
 
     def seen(self, baseline: Baseline, residuals: Floats) -> Floats:

@@ -25,6 +25,7 @@ from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
+from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
@@ -165,7 +166,10 @@ def known_fit(
     kept = np.flatnonzero(before >= 0)
     target, scales = target[kept], scales[kept]
     labelled = before[kept]
-    errors = prediction_errors(law.of(labelled), target, normal_misfit(target, scales), fitted[None, :])
+    modes = [np.flatnonzero(np.isin(kept, mode)).tolist() for mode in same_modes(problem.board)]
+    modes = [mode for mode in modes if mode]
+    misfit = normal_misfit(target, scales)
+    errors = prediction_errors(law.of(labelled), target, misfit, fitted[None, :], modes=modes)
     D_x, D_y, D_s = np.exp(fitted)
     constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
     return KnownFit(tuple(effects), tuple(without), fitted, constants, errors)

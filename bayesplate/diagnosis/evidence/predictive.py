@@ -12,8 +12,8 @@ from bayesplate.diagnosis.shifts.baseline import Baseline
 Floats = NDArray[np.float64]
 
 PASSES = 0.05
-_LEAST, _MOST = 2000, 20_000
-"""Simulated sets of readings: make the standard error of a p-value of 0.05 a tenth, or a thirtieth, of it."""
+_LEAST, _MOST = 1000, 20_000
+"""Simulated sets of readings: make the standard error of a p-value of 0.05 a seventh, or a thirtieth, of it."""
 _MOST_TERMS = 2_000_000
 """Normal densities up to which more sets are simulated than the least."""
 
@@ -35,7 +35,7 @@ def predictive_p_value(hypothesis: Hypothesis, fold: Fold, residuals: Floats) ->
     Returns
     -------
     (n_sets,) array
-        At least 1 / 2001, and 1 / 20,001 where nothing is lacking.
+        At least 1 / 1001, and 1 / 20,001 where nothing is lacking.
 
     References
     ----------

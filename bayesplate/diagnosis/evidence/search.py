@@ -141,7 +141,15 @@ class Found:
 
     def p_value(self, index: int) -> float:
         """The prior predictive p-value of a hypothesis."""
-        return float(predictive_p_value(self.ground.hypotheses[index], self.ground.whole, self.residual[None, :])[0])
+        if index not in self._p_values:
+            found = predictive_p_value(self.ground.hypotheses[index], self.ground.whole, self.residual[None, :])
+            self._p_values[index] = float(found[0])
+        return self._p_values[index]
+
+    @cached_property
+    def _p_values(self) -> dict[int, float]:
+        """Those that were asked for: each takes thousands of simulated readings."""
+        return {}
 
 
 def prepare_search(

@@ -29,24 +29,27 @@ _LOG_TWO_PI = float(np.log(2.0 * np.pi))
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """The readings that are used: all, or all but one.
+    """The readings that are used: all, or all but one, or but those of one mode.
 
     Attributes
     ----------
     baseline : Baseline
     left_out : int or None
         Index of the reading that is left out.
+    others : tuple of int
+        Those that are left out with it.
     """
 
     baseline: Baseline
     left_out: int | None = None
+    others: tuple[int, ...] = ()
 
     @cached_property
     def used(self) -> NDArray[np.intp]:
         """Indices of the readings that are used: those that are modes."""
         kept = self.baseline.is_mode.copy()
         if self.left_out is not None:
-            kept[self.left_out] = False
+            kept[[self.left_out, *self.others]] = False
         return np.flatnonzero(kept)
 
     @cached_property

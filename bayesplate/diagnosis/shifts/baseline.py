@@ -27,7 +27,7 @@ from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import under_prior_scales
+from bayesplate.plate.sessions import same_modes, under_prior_scales
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
@@ -148,6 +148,11 @@ class Baseline:
     def setup_index(self) -> NDArray[np.intp]:
         """Which setup each reading belongs to: (n_modes,) array."""
         return np.repeat(np.arange(len(self.board.setups)), [len(s.readings) for s in self.board.setups])
+
+    @cached_property
+    def same_modes(self) -> tuple[tuple[int, ...], ...]:
+        """Readings that are of one mode, in sessions of one setup; most are alone."""
+        return same_modes(self.board)
 
     @cached_property
     def own_variance(self) -> Floats:

@@ -54,7 +54,7 @@ def test_where_several_readings_may_be_the_wrong_one_none_is_named():
 
 
 def test_of_two_the_one_that_is_clearly_less_expected_is_named():
-    found = found_of(0.04 * np.eye(6)[3], n_modes=6)
+    found = found_of(0.045 * np.eye(6)[3], n_modes=6)
     assert [one.index for one in suspects(found)] == [3, 0]
     assert wrong_reading(found).startswith("Read (3,0) again")
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 from made_boards import setup_of
 from made_searches import FREE, NOISE, bare, baseline, ground_of, one_level, table
+from scipy.stats import multivariate_normal
 
-from bayesplate.diagnosis.evidence.folds import left_out, log_score, nested
+from bayesplate.diagnosis.evidence.folds import left_out, log_score, log_score_gains, nested
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
 from bayesplate.diagnosis.evidence.terms import Fold, Terms
 from bayesplate.plate.board import made_board
+from bayesplate.plate.parameter import Owner
 from bayesplate.quantities import Quantity
 
 _REACH, _STEP = 6.0, 1.0
@@ -156,7 +159,7 @@ def test_the_noise_levels_stand_for_the_log_normal_prior(n_setups, few, allowed)
 def refitted_without(base, mode, residual, cell, sd):
     """Error of predicting one reading by the least-squares fit of constants and place in the cell to the others."""
     shift, slopes = cell
-    used = np.delete(np.arange(base.n_modes), mode)
+    used = np.delete(np.arange(base.n_modes), mode)  # or those of one mode
     columns = np.hstack([base.slopes, slopes])
     rows = np.vstack([columns[used] / sd, np.eye(columns.shape[1])[3:]])
     target = np.r_[(residual - shift)[used] / sd, np.zeros(columns.shape[1] - 3)]
@@ -242,3 +245,49 @@ def test_the_log_score_is_the_sum_of_the_conditional_densities(n_inputs):
 
     assert log_score(ground, 0, residual) == pytest.approx(direct, abs=1e-4)
     assert abs(log_score(ground, 0, residual + 0.003 * np.eye(6)[0]) - direct) > 1e-2
+
+
+@pytest.fixture(scope="module")
+def days():
+    """Six modes read on two days, one of them off on both as by something that the plate lacks."""
+    rng = np.random.default_rng(8)
+    base = baseline(rng, 12, noise=(NOISE, NOISE))
+    first = base.board.setups[0]
+    setups = tuple(replace(first, name=day, group=Owner("group", "days")) for day in ("monday", "friday"))
+    slopes, frequency = np.tile(base.slopes[:6], (2, 1)), np.tile(base.log_frequency[:6], 2)
+    base = replace(base, board=replace(base.board, setups=setups), slopes=slopes, log_frequency=frequency)
+    return base, 0.02 * np.tile(np.eye(6)[2], 2) + 0.001 * rng.standard_normal(12)
+
+
+def test_of_several_sessions_a_mode_is_left_out_with_all_its_readings(days):
+    """Its reading on the other day would foretell it, whatever the model."""
+    base, residual = days
+    ground = ground_of(base, bare(base, one_level(base)))
+    assert base.same_modes == tuple((i, i + 6) for i in range(6))
+    found = left_out(ground, 0, residual)
+    nothing_added = np.zeros(12), np.zeros((12, 0))
+    for i in range(12):
+        mode = [i, (i + 6) % 12]
+        without = refitted_without(base, mode, residual, nothing_added, NOISE)
+        assert found[i] == pytest.approx(without[0], abs=1e-12)
+    assert nested(ground, residual[None, :]).before[0] == pytest.approx(found, abs=1e-12)
+    alone = refitted_without(base, 2, residual, nothing_added, NOISE)
+    assert abs(found[2]) > abs(alone) + 1e-3
+
+
+def test_the_log_score_of_several_sessions_is_one_term_per_mode(days):
+    """What both days say of a mode is one piece of evidence: as two, it would halve the variance of a gain."""
+    base, residual = days
+    cells = table(np.random.default_rng(9), 12, n_cells=1, n_tangents=1)
+    ground = ground_of(base, bare(base, one_level(base)), Hypothesis(("first",), 0.5, cells, one_level(base)))
+    scores, wide = np.zeros((2, 6)), 10.0  # sd of the constants; the flat prior is its limit
+    for k, (shift, slopes) in enumerate([(np.zeros(12), np.zeros((12, 1))), (cells.shift[0], cells.slopes[0])]):
+        precision = np.linalg.inv(NOISE**2 * np.eye(12) + slopes @ slopes.T + wide**2 * base.slopes @ base.slopes.T)
+        for i in range(6):
+            mode = [i, i + 6]
+            covariance = np.linalg.inv(precision[np.ix_(mode, mode)])
+            error = covariance @ (precision @ (residual - shift))[mode]
+            scores[k, i] = multivariate_normal(np.zeros(2), covariance).logpdf(error)
+    gains = log_score_gains(ground, residual, np.ones(12, dtype=int))
+    assert gains == pytest.approx(scores[1] - scores[0], abs=1e-3)
+    assert log_score(ground, 1, residual) == pytest.approx(scores[1].sum(), abs=1e-3)
