@@ -118,10 +118,13 @@ def _ratios(joint: Joint, some: Sequence[Reading]) -> tuple[Floats, Floats, floa
 
 
 def _of_board(joint: Joint, place: int, costs: Costs, goal: str | None) -> Iterator[Reading]:
-    """Further modes of one board, its modes again, and readings of its sizes."""
+    """Further modes of one board, its modes again, the board held another way, and readings of its sizes."""
     one = joint.boards[place]
     name = one.board.name
-    for i in range(len(one.laws)):
+    for i, law in enumerate(one.laws):
+        if law.station.is_new:
+            yield _elsewhere(joint, place, i, costs)
+            continue
         read = one.was_read(i)
         best: list[int] = []
         for _ in range(min(BEST, int((~read).sum()))):
@@ -155,6 +158,18 @@ def _further(joint: Joint, place: int, setup: int, chosen: Sequence[int], costs:
     sentence = f"Measure modes {labels} of board {one.board.name} as well"
     found = _of_modes(joint, place, setup, chosen, ("modes", sentence, len(chosen) * costs.reading))
     return replace(found, further=ToFind(place, setup, tuple(chosen)))
+
+
+def _elsewhere(joint: Joint, place: int, setup: int, costs: Costs) -> Reading:
+    """The lowest modes of a board in a way in which it was never held."""
+    one = joint.boards[place]
+    station = one.laws[setup].station
+    chosen = tuple(range(len(station.setup.readings)))
+    labels = ", ".join(map(str, station.setup.labels))
+    sentence = f"Measure board {one.board.name} {station.held}, modes {labels}"
+    cost = costs.clamping + len(chosen) * costs.reading
+    found = _of_modes(joint, place, setup, chosen, ("edges", sentence, cost))
+    return replace(found, setup=station.setup.name, further=ToFind(place, setup, chosen))
 
 
 def _of_modes(joint: Joint, place: int, setup: int, chosen: Sequence[int], told: tuple[str, str, float]) -> Reading:
@@ -294,4 +309,4 @@ def _bench(joint: Joint, reading: Reading, wanted: ToFind) -> Bench:
     law = one.laws[wanted.setup]
     spread = np.einsum("nu,uv,nv->n", reading.rows, joint.covariance, reading.rows) + reading.variance
     ends = law.solved[0, list(wanted.modes), None] + np.sqrt(spread)[:, None] * ndtri(np.array(BAND))
-    return bench_of(one.board, law, wanted.modes, ends, one.values, KNOWN_NOW, goes_on=True)
+    return bench_of(one.board, law, wanted.modes, ends, one.values, KNOWN_NOW, goes_on=not law.station.is_new)

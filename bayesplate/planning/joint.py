@@ -39,7 +39,7 @@ class BoardInJoint:
     values : dict of float
         At its estimate.
     laws : tuple of BareLaw
-        One per setup.
+        One per setup, then one per way in which the board was never held.
     own : tuple of (n_modes, n_own) array
         Slopes of the modes of each law by ln D and by the standard coordinates of its own inputs.
     shared : tuple of (n_modes, n_shared) array
@@ -48,7 +48,7 @@ class BoardInJoint:
         Slopes of ln E_x, E_y, G_xy.
     names : tuple of str
         Of the columns of `own`.
-    noise : (n_setups,) array
+    noise : (n_laws,) array
         Relative.
     """
 
@@ -64,6 +64,8 @@ class BoardInJoint:
     def was_read(self, setup: int) -> NDArray[np.bool_]:
         """Which modes of a law were read: those with a label, and those that a peak stands by."""
         law = self.laws[setup]
+        if law.station.is_new:
+            return np.zeros(len(law.station.setup.readings), dtype=np.bool_)
         found = np.arange(len(law.station.setup.readings)) < law.station.n_old
         peaks = np.log(np.array([one.frequency.mean for one in law.station.base.peaks]))
         for i in np.flatnonzero(~found):
@@ -129,7 +131,7 @@ def board_in_joint(
     noise = np.array([setup.noise.median for setup in board.setups])
     if estimate is not None:
         noise = noise * noise_widenings(board, estimate)
-    laws = tuple(bare_law(board, one, at) for one in stations(board, at, prior, is_elsewhere=False))
+    laws = tuple(bare_law(board, one, at) for one in stations(board, at, prior, is_elsewhere=values is None))
     parameters = Parameters(board)
     given = GivenShared(Posterior(board, prior, (), "exact", False), tuple(shared))
     theta = parameters.theta(at, noise)
@@ -145,7 +147,7 @@ def board_in_joint(
         shared=tuple(one[:, free.size :] for one in slopes),
         moduli=to_moduli[:, : free.size],
         names=tuple(parameters.names[i] for i in free),
-        noise=noise,
+        noise=np.r_[noise, [law.station.setup.noise.median for law in laws if law.station.is_new]],
     )
 
 

@@ -298,8 +298,7 @@ class _Sentences:
 
     def elsewhere(self, rows: Sequence[int]) -> str:
         """The board held another way."""
-        held = "with all edges free" if self.station.setup.is_free else "clamped along x0 alone"
-        return f"Measure the same board {held}, {self._modes(rows)}"
+        return f"Measure the same board {self.station.held}, {self._modes(rows)}"
 
 
 def sequences(

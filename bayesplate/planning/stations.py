@@ -64,6 +64,11 @@ class Station:
         """Whether the board was never held so."""
         return self.setup.name != self.base.name
 
+    @property
+    def held(self) -> str:
+        """How the board is held where it was never held so, in words."""
+        return "with all edges free" if self.setup.is_free else "clamped along x0 alone"
+
     def goes_on(self, board: Board) -> bool:
         """Whether something more can be read in it: of several sessions of one setup, in the last."""
         if self.is_new or self.base.group is None:

@@ -62,12 +62,35 @@ def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(campaign
 
     assert len(found) == 2
     for bench in found:
-        (wanted,) = [one.labels for one in listed if one.further and one.board == bench.board]
-        assert {mode.label for mode in bench.modes} == set(wanted)
+        (asked,) = [one for one in listed if one.further and (one.board, one.setup) == (bench.board, bench.setup)]
+        assert {mode.label for mode in bench.modes} == set(asked.labels)
         assert all(mode.low_hz < mode.hz < mode.high_hz for mode in bench.modes)
+        if asked.what == "edges":
+            continue
         board = next(one.prepared.board for one in campaign.problems if one.prepared.board.name == bench.board)
         ((x, y),) = board.setups[0].attached[0].places
         assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=25)  # the grid of places
+
+
+def test_every_board_may_be_held_another_way_which_tells_what_its_modes_do_there(joint, listed):
+    """What it leaves of the shared parameter, by a normal update by hand."""
+    other = [one for one in listed if one.what == "edges"]
+    assert {one.board for one in other} == {one.board.name for one in joint.boards}
+    for one in other:
+        assert one.sentence.startswith(f"Measure board {one.board} ")
+        assert one.cost == Costs().clamping + len(one.labels) * Costs().reading
+        place = [each.board.name for each in joint.boards].index(one.board)
+        law = joint.boards[place].laws[one.further.setup]
+        assert law.station.is_new
+        assert not joint.boards[place].was_read(one.further.setup).any()
+        noise = law.station.setup.noise.median
+        assert one.variance == pytest.approx(np.full(len(one.labels), noise**2))
+    one = other[0]
+    known = np.linalg.inv(joint.covariance) + one.rows.T @ (one.rows / one.variance[:, None])
+    before, after = (np.diagonal(joint.wanted @ c @ joint.wanted.T) for c in (joint.covariance, np.linalg.inv(known)))
+    of_shared, _, _ = joint.ratios(one.rows, one.variance)
+    assert of_shared == pytest.approx(np.sqrt(after / before)[: joint.n_shared])
+    assert of_shared[0] < 1.0
 
 
 def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, listed, tmp_path, monkeypatch):

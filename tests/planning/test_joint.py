@@ -20,7 +20,7 @@ def member(own, shared, setup=None):
     own, shared = np.asarray(own, dtype=float), np.asarray(shared, dtype=float)
     base = SimpleNamespace(peaks=(), name="setup", group=None, noise=Quantity.from_median(SD, 1.6))
     readings = (None,) * len(own)
-    station = SimpleNamespace(setup=SimpleNamespace(readings=readings), n_old=len(own), base=base)
+    station = SimpleNamespace(setup=SimpleNamespace(readings=readings), n_old=len(own), base=base, is_new=False)
     one = BoardInJoint(
         board=None, values={}, laws=(SimpleNamespace(station=station),), own=(own,), shared=(shared,),
         moduli=np.eye(3), names=("a", "b", "c"), noise=np.array([SD]),
