@@ -13,7 +13,7 @@ from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
 from bayesplate.planning.assembled import BAND, KNOWN_NOW, MOST_BENCHES, Bench, bench_of
 from bayesplate.planning.inputs_read import measurements
-from bayesplate.planning.joint import BoardInJoint, Joint, board_in_joint
+from bayesplate.planning.joint import BoardInJoint, Joint, board_in_joint, held_elsewhere
 from bayesplate.planning.plan import GainEntry, ProposalEntry, SequenceEntry
 from bayesplate.planning.proposals import CONSTANTS, FAINT, Costs
 from bayesplate.plate.board import Board
@@ -30,6 +30,8 @@ _WEIGHED_TO = 1e-5
 _WITHOUT = ("thickness_profile", "outline_profile")
 _CUT = 2
 """Boards of which a shorter one is looked at."""
+_HELD_ELSEWHERE = 2
+"""Boards that are looked at held another way: those that tell most of what is shared."""
 
 
 class ToFind(NamedTuple):
@@ -89,6 +91,9 @@ def joint_of(
         made.append(board_in_joint(board, prior, shared))
         if tell is not None:
             tell(len(made) / len(boards))
+    order = sorted(range(len(made)), key=lambda i: -float(np.trace(made[i].of_shared)))
+    for i in order[:_HELD_ELSEWHERE]:
+        made[i] = held_elsewhere(made[i], priors[i], shared)
     return Joint(tuple(made), len(shared))
 
 

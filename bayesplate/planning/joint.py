@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -131,12 +131,10 @@ def board_in_joint(
     noise = np.array([setup.noise.median for setup in board.setups])
     if estimate is not None:
         noise = noise * noise_widenings(board, estimate)
-    laws = tuple(bare_law(board, one, at) for one in stations(board, at, prior, is_elsewhere=values is None))
+    laws = tuple(bare_law(board, one, at) for one in stations(board, at, prior, is_elsewhere=False))
     parameters = Parameters(board)
-    given = GivenShared(Posterior(board, prior, (), "exact", False), tuple(shared))
+    free, turned = _columns(board, prior, shared, at, noise)
     theta = parameters.theta(at, noise)
-    free = np.array([i for i in given.own_columns if i in parameters.fitted_columns], dtype=np.intp)
-    turned = _turned(given, theta, free, len(shared))
     to_moduli = moduli_at(board, theta[:N_RIGIDITIES], parameters.fitted_columns.size)[1] @ turned
     slopes = [law.slopes @ turned for law in laws]
     return BoardInJoint(
@@ -147,8 +145,33 @@ def board_in_joint(
         shared=tuple(one[:, free.size :] for one in slopes),
         moduli=to_moduli[:, : free.size],
         names=tuple(parameters.names[i] for i in free),
-        noise=np.r_[noise, [law.station.setup.noise.median for law in laws if law.station.is_new]],
+        noise=noise,
     )
+
+
+def held_elsewhere(one: BoardInJoint, prior: PriorCard, shared: Sequence[Shared]) -> BoardInJoint:
+    """The same board with the modes that it has where it is held as it never was: a solution for each way."""
+    ways = [way for way in stations(one.board, one.values, prior) if way.is_new]
+    laws = tuple(bare_law(one.board, way, one.values) for way in ways)
+    free, turned = _columns(one.board, prior, shared, one.values, one.noise)
+    slopes = [law.slopes @ turned for law in laws]
+    return replace(
+        one,
+        laws=(*one.laws, *laws),
+        own=(*one.own, *(each[:, : free.size] for each in slopes)),
+        shared=(*one.shared, *(each[:, free.size :] for each in slopes)),
+        noise=np.r_[one.noise, [way.setup.noise.median for way in ways]],
+    )
+
+
+def _columns(
+    board: Board, prior: PriorCard, shared: Sequence[Shared], values: Values, noise: Floats
+) -> tuple[NDArray[np.intp], Floats]:
+    """Columns that are a board's own, and what each of them and of the shared parameters does: see `_turned`."""
+    given = GivenShared(Posterior(board, prior, (), "exact", False), tuple(shared))
+    parameters = Parameters(board)
+    free = np.array([i for i in given.own_columns if i in parameters.fitted_columns], dtype=np.intp)
+    return free, _turned(given, parameters.theta(values, noise), free, len(shared))
 
 
 def _turned(given: GivenShared, theta: Floats, free: NDArray[np.intp], n_shared: int) -> Floats:

@@ -72,10 +72,11 @@ def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(campaign
         assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=25)  # the grid of places
 
 
-def test_every_board_may_be_held_another_way_which_tells_what_its_modes_do_there(joint, listed):
+def test_boards_that_tell_most_may_be_held_another_way(joint, listed):
     """What it leaves of the shared parameter, by a normal update by hand."""
     other = [one for one in listed if one.what == "edges"]
-    assert {one.board for one in other} == {one.board.name for one in joint.boards}
+    order = sorted(joint.boards, key=lambda one: -np.trace(one.of_shared))
+    assert {one.board for one in other} == {one.board.name for one in order[:2]}
     for one in other:
         assert one.sentence.startswith(f"Measure board {one.board} ")
         assert one.cost == Costs().clamping + len(one.labels) * Costs().reading
