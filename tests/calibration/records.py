@@ -80,5 +80,5 @@ def publish(folder: Path, name: str, title: str, command: str, lines: Sequence[s
         As they were printed.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    text = [f"# {title}", "", f"Written by `{command}`; do not edit.", "", "```", *lines, "```", ""]
+    text = [f"# {title}", "", f"Written by `{command}`; do not edit.", "", "```text", *lines, "```", ""]
     (folder / f"{name}.md").write_text("\n".join(text), encoding="utf-8")

@@ -204,7 +204,11 @@ def page(found: dict[str, list[str]]) -> str:
     """What was found as a page of the documentation; a part that was not run says so and nothing else."""
     lines = [f"# {TITLE}", "", "Written by `make calibration`; do not edit.", ""]
     for name, (title, what) in SECTIONS.items():
-        told = ["```", *"\n".join(found[name]).splitlines(), "```"] if name in found else ["Not run with this version."]
+        told = (
+            ["```text", *"\n".join(found[name]).splitlines(), "```"]
+            if name in found
+            else ["Not run with this version."]
+        )
         lines += [f"## {title}", "", what, "", *told, ""]
     return "\n".join(lines)
 

@@ -83,7 +83,7 @@ def told(records: Sequence[Record]) -> list[str]:
     for words, some in kinds.items():
         if not some:
             continue
-        lines.append(f"{words}, {len(some)} boards{'':20s}  settled  wrongly  min")
+        lines.append(f"{f'{words}, {len(some)} boards':36s}  settled  wrongly  min")
         for way in WAYS:
             n, false = sum(settled(one, way) for one in some), sum(wrongly(one, way) for one in some)
             minutes = sum(one[way]["cost"] for one in some) / len(some)
