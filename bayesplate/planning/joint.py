@@ -14,7 +14,7 @@ from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.planning.beliefs import moduli_at
-from bayesplate.planning.stations import BareLaw, bare_law, stations
+from bayesplate.planning.stations import BareLaw, bare_law, new_stations, stations
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share
@@ -151,7 +151,7 @@ def board_in_joint(
 
 def held_elsewhere(one: BoardInJoint, prior: PriorCard, shared: Sequence[Shared]) -> BoardInJoint:
     """The same board with the modes that it has where it is held as it never was: a solution for each way."""
-    ways = [way for way in stations(one.board, one.values, prior) if way.is_new]
+    ways = new_stations(one.board, one.values, prior)
     laws = tuple(bare_law(one.board, way, one.values) for way in ways)
     free, turned = _columns(one.board, prior, shared, one.values, one.noise)
     slopes = [law.slopes @ turned for law in laws]

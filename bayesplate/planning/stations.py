@@ -151,8 +151,15 @@ def stations(
         empty = replace(setup, readings=(), peaks=(), published_coefficients=None)
         more = _next_modes(board, Station(empty, setup), values, FURTHER, {one.label for one in read})
         found.append(Station(replace(empty, readings=(*read, *more)), setup, len(read)))
+    found += new_stations(board, values, prior) if is_elsewhere else ()
+    return tuple(one for one in found if one.setup.readings)
+
+
+def new_stations(board: Board, values: Values, prior: PriorCard | None = None) -> tuple[Station, ...]:
+    """The ways to hold the board in which it was never held: free, and as a cantilever."""
     ways: tuple[tuple[str, Ends], ...] = (("free", ("free", "free")), ("cantilever", ("clamped", "free")))
-    for name, ends_x in ways if is_elsewhere else ():
+    found: list[Station] = []
+    for name, ends_x in ways:
         other = _elsewhere(board, name, ends_x, prior)
         if other is not None:
             more = _next_modes(board, Station(other, board.setups[0]), values, ELSEWHERE, set())

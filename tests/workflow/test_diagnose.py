@@ -105,6 +105,10 @@ def test_diagnosis_json_keeps_its_contract(which, request):
     ]  # fmt: skip
     assert all(set(one["change_percent"]) == MODULI and one["without"] == [] for one in found["known"])
     assert 0.0 <= found["gain_null_percentile"] <= 100.0
+    # simulated boards are made to choose where an effect is added, and nowhere else
+    is_added = found["verdict"] in ("named", "indistinguishable group")
+    assert is_added == (which == "with_shear")
+    assert (found["null_control"]["nested_ratio_to_beat"] is not None) == is_added
     assert found["recommendation"] == "" or found["recommendation"].endswith(".")
 
 

@@ -11,7 +11,7 @@ from scipy.stats import chi2, kstest, kstwobign
 
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.predictive import PASSES, noise_of_board, predictive_p_value
+from bayesplate.diagnosis.evidence.predictive import PASSES, predictive_p_value
 from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.quantities import Quantity
 
@@ -30,8 +30,18 @@ def uniformity(p_values, n_simulated=N_SIMULATED["bare"]):
 
 
 def noisy(base, rng, factor=1.0):
-    """Readings of the board, of any constants: a factor of their noise, whose level is drawn from its prior."""
-    return factor * noise_of_board(base, rng, N_SETS) + rng.standard_normal((N_SETS, 3)) @ base.slopes.T
+    """Readings whose noise is drawn from the log-normal prior of each setup itself, not by the code under test."""
+    levels = [
+        factor * one.noise.median * np.exp(one.noise.log_sd * rng.standard_normal((N_SETS, 1)))
+        for one in base.board.setups
+    ]
+    level = np.concatenate(
+        [np.tile(a, len(b.readings)) for a, b in zip(levels, base.board.setups, strict=True)], axis=1
+    )
+    rounding = np.sqrt(base.own_variance) * rng.standard_normal((N_SETS, base.n_modes))
+    inputs = rng.standard_normal((N_SETS, base.input_slopes.shape[1])) @ base.input_slopes.T
+    constants = rng.standard_normal((N_SETS, 3)) @ base.slopes.T
+    return level * rng.standard_normal((N_SETS, base.n_modes)) + rounding + inputs + constants
 
 
 @pytest.mark.parametrize("noise", SETUPS)
