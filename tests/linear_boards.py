@@ -92,12 +92,14 @@ def standard_shared(n):
     return tuple(Shared("effect", f"z{i}", Quantity(0.0, 1.0, "normal"), "1") for i in range(n))
 
 
+def pull_of(board):
+    """The normal likelihood of a linear board, exactly."""
+    inverse = np.linalg.inv(board.covariance)
+    return Pull(board.shared.T @ inverse @ board.shared, board.shared.T @ inverse @ board.readings)
+
+
 def exactly_together(boards):
     """Linear boards with their closed forms."""
     n = boards[0].shared.shape[1]
-    pulls = []
-    for one in boards:
-        inverse = np.linalg.inv(one.covariance)
-        pulls.append(Pull(one.shared.T @ inverse @ one.shared, one.shared.T @ inverse @ one.readings))
     names = [f"board {i}" for i in range(len(boards))]
-    return Together.of(standard_shared(n), names, boards, pulls)
+    return Together.of(standard_shared(n), names, boards, [pull_of(one) for one in boards])

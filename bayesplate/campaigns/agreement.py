@@ -62,7 +62,7 @@ def p_value(together: Together, board: int, without: Collection[int] = ()) -> fl
     """Of one board against the others, or those of them that are not left out: the score test of its likelihood.
 
     The board's own posterior, its prior divided out, amounts to a normal likelihood exp(h'z - z'Pz / 2). If the board
-    shares the parameters of the others, whose posterior has the mean m and the covariance C, its slope h - P m there is
+    is one of the others' kind, who teach its numbers with the mean m and the covariance C, its slope h - P m there is
     normal about zero with the covariance P + P C P; directions of which the board says nothing add nothing.
 
     References
@@ -72,7 +72,7 @@ def p_value(together: Together, board: int, without: Collection[int] = ()) -> fl
     """
     from scipy.stats import chi2
 
-    mean, covariance = together.moments((board, *without))
+    mean, covariance = together.taught((board, *without))
     pull = together.pulls[board]
     slope = pull.lean - pull.precision @ mean
     spread = pull.precision + pull.precision @ covariance @ pull.precision

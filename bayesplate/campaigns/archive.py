@@ -18,7 +18,7 @@ def archive_name(name: str) -> str:
 
 
 def shared_archive(learnt: Learnt, attributes: Mapping[str, str]) -> Archive:
-    """The draws of the shared numbers, SI, each board's log likelihood of them, and the sampler's health.
+    """Draws of the shared numbers and their scatters, SI, each board's log likelihood of them, the sampler's health.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def shared_archive(learnt: Learnt, attributes: Mapping[str, str]) -> Archive:
     ]
     z, log_posterior = thinned
     likelihood = together.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
-    values = values_of(together.shared, z)
+    values = values_of(together.coordinates, z)
     return Archive(
         groups={
             "posterior": {archive_name(name): np.asarray(each) for name, each in values.items()},
@@ -51,7 +51,7 @@ def shared_archive(learnt: Learnt, attributes: Mapping[str, str]) -> Archive:
         },
         coords={
             "name": list(together.names),
-            "parameter": [archive_name(one.name) for one in together.shared],
+            "parameter": [archive_name(one.name) for one in together.coordinates],
         },
         dims={"board": ["name"], "tau": ["parameter"], "rhat": ["parameter"], "ess": ["parameter"]},
         attributes=attributes,

@@ -104,7 +104,7 @@ def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> di
         rng = np.random.default_rng([seed, _LINE, i])
         without = before[one.name]
         _, draws, _ = learnt.board(i, rng, seed, is_left_out=True)
-        taught = values_of(together.shared, together.draws(rng, _N_DRAWS, (i,)))
+        taught = values_of(together.shared, together.taught_draws(rng, _N_DRAWS, (i,)))
         found[one.name] = TaughtBoard(
             log_score_gain=one.log_score - without.alone.log_evidence,
             before_rms_cents=rms_cents(without.inference, without.draws),

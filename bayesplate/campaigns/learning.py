@@ -35,7 +35,7 @@ class Learnt:
         Of each board, where what all boards teach is among them.
     together : Together
     chains : Chains
-        Of the standard coordinates of the shared parameters.
+        Of the standard coordinates of what is learned: `Together.coordinates`.
     convergence : Convergence
     """
 
@@ -77,11 +77,12 @@ class Learnt:
         together, member, drawn = self.together, self.members[index], self.samples[index]
         own = together.likelihoods[index]
 
-        def log_reference(z: Floats) -> Floats:
-            others = together.log_density(z, (index,))
-            return np.asarray(others - own.at(z) if is_left_out else others)
+        log_taught = together.log_taught((index,))
 
-        aim = together.moments((index,) if is_left_out else ())
+        def log_reference(z: Floats) -> Floats:
+            return np.asarray(log_taught(z) - own.at(z)) if is_left_out else log_taught(z)
+
+        aim = together.taught((index,)) if is_left_out else together.under_all(index)
         drawn = _drawn(member, drawn, log_reference, aim, seed)
         weights = drawn.weights_under(log_reference)
         return *member.posterior_of(drawn, weights, rng, seed), drawn.effective(weights)
@@ -113,8 +114,8 @@ def learn(
     together = Together.of(members[0].shared, names, found, pulls)
     for _ in range(_ROUNDS):
         for i, member in enumerate(members):
-            near = _halfway(together, i)
-            drawn = _drawn(member, samples[i], near, together.moments(), settings.seed)
+            near = _halfway(member, together, i)
+            drawn = _drawn(member, samples[i], near, together.under_all(i), settings.seed)
             if drawn.effective(drawn.weights_under(near)) >= FEWEST_WEIGHTED_DRAWS:
                 samples[i], found[i] = drawn, member.likelihood(drawn, near)
         together = Together.of(together.shared, names, found, pulls)
@@ -134,9 +135,10 @@ def _drawn(member: Member, before: Sample, log_reference: LogDensity, aim: tuple
     return anew if anew.effective(anew.weights) > effective else before
 
 
-def _halfway(together: Together, board: int) -> LogDensity:
+def _halfway(member: Member, together: Together, board: int) -> LogDensity:
     """ln of a density between the prior and what all boards but one teach of the shared parameters."""
-    return lambda z: 0.5 * (together.log_prior(z) + together.log_density(z, (board,)))
+    log_taught = together.log_taught((board,))
+    return lambda z: 0.5 * (member.log_prior(z) + log_taught(z))
 
 
 def _astray(together: Together, board: int, drawn: Sample) -> float:
@@ -145,8 +147,8 @@ def _astray(together: Together, board: int, drawn: Sample) -> float:
     The two are the same but for the polynomial that stands for the board's likelihood: the largest difference of a
     mean, in standard deviations, less two of its standard errors.
     """
-    mean, covariance = together.moments()
-    weights = drawn.weights_under(lambda z: together.log_density(z, (board,)))
+    mean, covariance = together.under_all(board)
+    weights = drawn.weights_under(together.log_taught((board,)))
     own, _ = moments(drawn.z, weights)
     off = np.abs(own - mean) / np.sqrt(np.diagonal(covariance))
     return float(off.max() - 2.0 * drawn.effective(weights) ** -0.5)

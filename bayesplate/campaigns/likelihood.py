@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,15 @@ from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 Floats = NDArray[np.float64]
 LogDensity = Callable[[Floats], Floats]
 """From (n, n_shared) standard coordinates to (n,) logarithms of a density."""
+
+
+class Likelihood(Protocol):
+    """A board's likelihood of what is shared."""
+
+    def at(self, z: Floats, /) -> Floats:
+        """ln L at standard coordinates: (n,) array from (n, n_shared)."""
+        ...
+
 
 _HIGHEST = 4
 _DRAWS_PER_TERM = 20

@@ -46,6 +46,17 @@ class Pull:
         told = (directions * np.maximum(gained, 0.0)) @ directions.T
         return cls(told, (directions * (gained > 0.0)) @ directions.T @ after @ mean)
 
+    def scattered(self, width: Floats) -> Pull:
+        """What it says of the middle about which the boards' own numbers scatter.
+
+        Parameters
+        ----------
+        width : (n_shared,) array
+            Standard deviation of the scatter, zero where there is none.
+        """
+        weaker = np.linalg.inv(np.eye(width.size) + self.precision * width**2)
+        return Pull(np.asarray(weaker @ self.precision), np.asarray(weaker @ self.lean))
+
 
 def normal_posterior(pulls: Sequence[Pull]) -> tuple[Floats, Floats]:
     """Mean and covariance of z from several boards, its prior being standard normal."""

@@ -25,7 +25,7 @@ MOST_PARAMETERS = 3
 
 @dataclass(frozen=True)
 class Shared:
-    """One number that all boards of a campaign have in common.
+    """One number that all boards of a campaign have in common, or about which their own scatter.
 
     Attributes
     ----------
@@ -39,6 +39,9 @@ class Shared:
         Where the prior comes from; empty if a card states it.
     to : str
         The modulus that it is a ratio to; empty for a value.
+    scatter : float
+        Scale of the half-normal prior of how much the boards' own differ from it, as the standard deviation of the
+        logarithm; 0 where all boards have the same.
     """
 
     effect: str
@@ -47,6 +50,7 @@ class Shared:
     unit: str
     source: str = ""
     to: str = ""
+    scatter: float = 0.0
 
     @property
     def name(self) -> str:
@@ -138,11 +142,15 @@ def _of_effect(section: SharedSection, boards: Sequence[Board], place: str) -> l
 def _shared(
     section: SharedSection, key: str, ratio: Ratio | None, of_boards: Sequence[Sequence[Parameter]], place: str
 ) -> Shared:
+    scatter = 0.01 * section.scatter_percent
     if section.way == "ratio" and ratio is not None:
-        return Shared(section.effect, key, ratio.prior, "1", ratio.source, ratio.to)
+        return Shared(section.effect, key, ratio.prior, "1", ratio.source, ratio.to, scatter)
     same = [one for every in of_boards for one in every if one.key == key]
     first = same[0]
     if any(one.prior != first.prior for one in same):
         got = f"{len({repr(one.prior) for one in same})} different ones of {key}"
         raise InputError(Fault(place, "one prior, because it is one number", got, "state the same on every board"))
-    return Shared(section.effect, key, first.prior, first.unit, first.source)
+    if scatter and first.prior.kind != "log-normal":
+        wanted = "a positive number, which boards differ in by a percentage"
+        raise InputError(Fault(f"{place} scatter_percent", wanted, f"{key}, whose prior is {first.prior.kind}"))
+    return Shared(section.effect, key, first.prior, first.unit, first.source, scatter=scatter)

@@ -12,6 +12,7 @@ from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.common import CommonResidual
 from bayesplate.campaigns.learning import ASTRAY, Learnt
 from bayesplate.campaigns.population import Population
+from bayesplate.campaigns.scatter import scatters_of
 from bayesplate.campaigns.together import FEWEST_POINTS, values_of
 from bayesplate.effects.words import joined
 from bayesplate.plate.material import MODULI
@@ -26,21 +27,24 @@ _N_DRAWS = 4000
 
 @dataclass(frozen=True)
 class SharedNumber:
-    """A number that all boards have in common.
+    """A number that all boards have in common, or about which their own scatter.
 
     Attributes
     ----------
     all_boards : Spread, SI
-        Under what all boards teach.
+        Under what all boards teach; where their own scatter, the median of such boards.
+    scatter : Spread or None
+        Standard deviation of the logarithm of the boards' own; None where all have the same.
     own : dict of Spread
         By board: from that board alone.
     others : dict of Spread
-        By board: from all boards but that one.
+        By board: what all boards but that one say of its own.
     prior_source : str
         Where the prior comes from; empty if the boards' cards state it.
     """
 
     all_boards: Spread
+    scatter: Spread | None
     own: Mapping[str, Spread]
     others: Mapping[str, Spread]
     prior_source: str
@@ -153,12 +157,16 @@ def shared_numbers(learnt: Learnt, seed: int) -> dict[str, SharedNumber]:
     """What is shared: from all boards, from each alone, and from all but each."""
     rng = np.random.default_rng([seed, _LINE])
     together, shared = learnt.together, learnt.together.shared
-    every = values_of(shared, learnt.chains.kept)
+    every = values_of(together.coordinates, learnt.chains.kept)
+    scatters = {one.of.name: Spread.of(every[one.name], one.unit) for one in scatters_of(shared)}
     own = {one.name: _own(one, rng) for one in learnt.members}
-    others = {name: values_of(shared, together.draws(rng, _N_DRAWS, (i,))) for i, name in enumerate(together.names)}
+    others = {
+        name: values_of(shared, together.taught_draws(rng, _N_DRAWS, (i,))) for i, name in enumerate(together.names)
+    }
     return {
         one.name: SharedNumber(
             all_boards=Spread.of(every[one.name], one.unit),
+            scatter=scatters.get(one.name),
             own={board: Spread.of(values[one.name], one.unit) for board, values in own.items()},
             others={board: Spread.of(values[one.name], one.unit) for board, values in others.items()},
             prior_source=one.source,
@@ -213,9 +221,10 @@ def learning_warnings(learnt: Learnt, effective: Mapping[str, float]) -> tuple[s
     refused = refusing(learnt.together)
     if refused:
         boards = "board" if len(refused) == 1 else "boards"
+        same = "so little scatter" if scatters_of(learnt.together.shared) else "one value for all"
         told.append(
             f"{boards} {joined(refused)} {'does' if len(refused) == 1 else 'do'} not want what the others teach: "
-            "one value for all is not what these boards say"
+            f"{same} is not what these boards say"
         )
     if learnt.together.fewest_points < FEWEST_POINTS:
         told.append(

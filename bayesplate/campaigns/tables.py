@@ -98,6 +98,8 @@ def shared_table(shared: Mapping[str, SharedNumber]) -> Table:
     for name, one in shared.items():
         factor = unit_of_people(one.all_boards.unit)[0]
         rows.append((shared_name(name, one), plus_minus(one.all_boards, factor), interval(one.all_boards, factor)))
+        if one.scatter is not None:
+            rows.append(("its scatter between boards, %", plus_minus(one.scatter, 100.0), interval(one.scatter, 100.0)))
     return Table("Shared by all boards", ("number", "mean ± sd", "90 % interval"), tuple(rows))
 
 

@@ -9,39 +9,46 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.campaigns.likelihood import SharedLikelihood, moments, spread_points
+from bayesplate.campaigns.likelihood import Likelihood, LogDensity, moments, spread_points
 from bayesplate.campaigns.pulls import Pull, normal_posterior
+from bayesplate.campaigns.scatter import Scatter, ScatteredLikelihood, expected_width, scatters_of, widths
 from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.posterior.convergence import Convergence
+from bayesplate.posterior.proposals import Proposal
 from bayesplate.posterior.reweighting import effective_draws
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 
 Floats = NDArray[np.float64]
 
+_LINE = 21
 FEWEST_POINTS = 500
 """Points of equal weight that what all boards, or all but one, find likely has to rest on."""
-_N_POINTS = {1: 2**12, 2: 2**14, 3: 2**15}
+_N_POINTS = {1: 2**12, 2: 2**14}
+_MOST_POINTS = 2**15
 _WIDER = 1.6
 """Than the posteriors from all boards and from all but each: the points at which densities are summed."""
 _ROUNDS = 12
 _HALVINGS = 30
+_N_FITTED = 4096
+_HALF_NORMAL = (float(np.sqrt(2.0 / np.pi)), 1.0 - 2.0 / np.pi)
+"""Mean and variance of the standard coordinate of a scatter before any board."""
 
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Boards that are independent given the shared parameters.
+    """Boards that are independent given the shared parameters: the numbers, then the scatters of those that have one.
 
     Attributes
     ----------
     shared : tuple of Shared
     names : tuple of str
         Of the boards.
-    likelihoods : tuple of SharedLikelihood
-        One per board.
+    likelihoods : tuple of Likelihood
+        One per board, of its own numbers.
     pulls : tuple of Pull
-        What each board says by itself, as a normal likelihood.
-    points : (n_points, n_shared) array
+        What each board says by itself, as a normal likelihood of its own numbers.
+    points : (n_points, n_coordinates) array
         Standard coordinates at which densities are summed.
     log_spread : (n_points,) array
         ln of the density of these points.
@@ -49,7 +56,7 @@ class Together:
 
     shared: tuple[Shared, ...]
     names: tuple[str, ...]
-    likelihoods: tuple[SharedLikelihood, ...]
+    likelihoods: tuple[Likelihood, ...]
     pulls: tuple[Pull, ...]
     points: Floats
     log_spread: Floats
@@ -59,11 +66,15 @@ class Together:
         cls,
         shared: Sequence[Shared],
         names: Sequence[str],
-        likelihoods: Sequence[SharedLikelihood],
+        likelihoods: Sequence[Likelihood],
         pulls: Sequence[Pull],
     ) -> Together:
         """Boards together, their points around all that they, or all but one of them, find likely."""
-        spread = _around([normal_posterior([pulls[i] for i in kept]) for kept in _leaving_one(len(pulls))])
+        weaker = [one.scattered(expected_width(shared)) for one in pulls]
+        n = len(scatters_of(shared))
+        spread = _around(
+            [_beside(*normal_posterior([weaker[i] for i in kept]), n) for kept in _leaving_one(len(pulls))]
+        )
         found = cls(tuple(shared), tuple(names), tuple(likelihoods), tuple(pulls), *spread)
         for _ in range(_ROUNDS):
             if found.fewest_points >= FEWEST_POINTS:
@@ -73,21 +84,34 @@ class Together:
         return found
 
     @property
+    def coordinates(self) -> tuple[Shared | Scatter, ...]:
+        """What is learned: the shared numbers, then their scatters."""
+        return (*self.shared, *scatters_of(self.shared))
+
+    @cached_property
+    def _seen(self) -> tuple[Likelihood, ...]:
+        """Each board's likelihood of the coordinates."""
+        if len(self.coordinates) == len(self.shared):
+            return self.likelihoods
+        both = zip(self.likelihoods, self.pulls, strict=True)
+        return tuple(ScatteredLikelihood(self.shared, own, pull) for own, pull in both)
+
+    @property
     def left_out(self) -> list[tuple[int, ...]]:
         """No board, then each of them."""
         return [(), *((i,) for i in range(len(self.names)))]
 
     def log_likelihoods(self, z: Floats) -> Floats:
         """ln of each board's likelihood at standard coordinates: (n_boards, n) array."""
-        return np.stack([one.at(z) for one in self.likelihoods])
+        return np.stack([one.at(z) for one in self._seen])
 
     def log_prior(self, z: Floats) -> Floats:
         """ln of the prior density of the standard coordinates: (n,) array."""
-        return np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(self.shared)], axis=0)
+        return np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(self.coordinates)], axis=0)
 
     def log_density(self, z: Floats, without: Collection[int] = ()) -> Floats:
         """ln of the posterior density from all boards but some, not normalised: (n,) array."""
-        kept = [one for i, one in enumerate(self.likelihoods) if i not in without]
+        kept = [one for i, one in enumerate(self._seen) if i not in without]
         return np.asarray(self.log_prior(z) + np.sum([one.at(z) for one in kept], axis=0))
 
     def log_evidence(self, without: Collection[int] = ()) -> float:
@@ -108,8 +132,38 @@ class Together:
         return min(effective_draws(self.weights(without)) for without in self.left_out)
 
     def draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
-        """Standard coordinates drawn from the posterior of all boards but some: (n, n_shared) array."""
+        """Standard coordinates drawn from the posterior of all boards but some: (n, n_coordinates) array."""
         return self.points[rng.choice(len(self.points), size=n, p=self.weights(without))]
+
+    @cached_property
+    def _of_a_board(self) -> Floats:
+        """A board's own numbers at each of the points, drawn anew where they scatter: (n_points, n_shared) array."""
+        n = len(self.shared)
+        scattered = np.random.default_rng(_LINE).standard_normal((len(self.points), n))
+        return np.asarray(self.points[:, :n] + widths(self.shared, self.points) * scattered)
+
+    def taught(self, without: Collection[int] = ()) -> tuple[Floats, Floats]:
+        """Mean and covariance of the own numbers of a board that all boards but some teach, unseen itself."""
+        return moments(self._of_a_board, self.weights(without))
+
+    def taught_draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
+        """Draws of what `taught` gives the moments of: (n, n_shared) array."""
+        return self._of_a_board[rng.choice(len(self.points), size=n, p=self.weights(without))]
+
+    def under_all(self, board: int) -> tuple[Floats, Floats]:
+        """Mean and covariance of a board's own numbers under what the others and its own readings say."""
+        log_weights = self._log_weights((board,)) + self.likelihoods[board].at(self._of_a_board)
+        return moments(self._of_a_board, normalised(log_weights))
+
+    def log_taught(self, without: Collection[int] = ()) -> LogDensity:
+        """ln of the density of a board's own numbers as all boards but some teach them, not normalised.
+
+        Where they scatter, of a mixture of Student distributions that is fitted to draws of them: what is unknown of
+        the scatter gives it tails.
+        """
+        if len(self.coordinates) == len(self.shared):
+            return lambda z: self.log_density(z, without)
+        return Proposal.fitted(self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without)).log_density
 
     @cached_property
     def _at_points(self) -> tuple[Floats, Floats]:
@@ -142,16 +196,16 @@ def walk(
     Returns
     -------
     chains : Chains
-        Of standard coordinates.
+        Of standard coordinates: the shared numbers, then their scatters.
     convergence : Convergence
     """
-    names = [one.name for one in together.shared]
+    names = [one.name for one in together.coordinates]
     return sample(together.log_density, *together.moments(), settings, names=names, progress=progress)
 
 
-def values_of(shared: Sequence[Shared], z: Floats) -> dict[str, Floats]:
-    """The shared numbers by name, SI, from (..., n_shared) standard coordinates: (...) arrays."""
-    return {one.name: np.asarray(one.prior.value(z[..., i])) for i, one in enumerate(shared)}
+def values_of(coordinates: Sequence[Shared | Scatter], z: Floats) -> dict[str, Floats]:
+    """What is learned by name, SI, from (..., n_coordinates) standard coordinates: (...) arrays."""
+    return {one.name: np.asarray(one.prior.value(z[..., i])) for i, one in enumerate(coordinates)}
 
 
 def _leaving_one(n: int) -> Iterator[list[int]]:
@@ -159,6 +213,14 @@ def _leaving_one(n: int) -> Iterator[list[int]]:
     yield list(range(n))
     for left in range(n if n > 1 else 0):
         yield [i for i in range(n) if i != left]
+
+
+def _beside(mean: Floats, covariance: Floats, n: int) -> tuple[Floats, Floats]:
+    """Moments of the numbers with those of n scatters beside them, of which no board said anything yet."""
+    from scipy.linalg import block_diag
+
+    middle, variance = _HALF_NORMAL
+    return np.r_[mean, np.full(n, middle)], block_diag(covariance, variance * np.eye(n))
 
 
 def _around(every: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
@@ -173,4 +235,4 @@ def _around(every: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
     widest = np.diagonal(covariances + apart, axis1=1, axis2=2).max(axis=0)
     grow = np.clip(np.sqrt(widest / np.diagonal(spread)), 1.0, 2.0)
     factor = np.asarray(_WIDER * np.linalg.cholesky(spread * np.outer(grow, grow)))
-    return spread_points(middle, factor, _N_POINTS[middle.size])
+    return spread_points(middle, factor, _N_POINTS.get(middle.size, _MOST_POINTS))

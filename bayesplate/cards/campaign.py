@@ -17,6 +17,7 @@ from bayesplate.cards.shelf import card_names, find
 from bayesplate.cards.values import (
     Choice,
     Complaint,
+    Number,
     Refusal,
     read_each,
     read_format,
@@ -51,10 +52,19 @@ def _as_list(value: object) -> list[Any]:
 
 
 class SharedSection(Section):
-    """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli."""
+    """An effect whose parameters all boards have in common: their values, or their ratios to the boards' moduli.
+
+    Attributes
+    ----------
+    effect : str
+    way : "value" or "ratio"
+    scatter_percent : float
+        Scale of what the boards' own are believed to differ by from what they have in common; 0 if by nothing.
+    """
 
     effect: Annotated[str, PlainValidator(Choice(EFFECT_NAMES))] = Field(description="the name of an effect")
     way: Annotated[Way, PlainValidator(Choice(WAYS))] = Field(default="value", alias="as")
+    scatter_percent: Annotated[float, PlainValidator(Number(0.1, 100, "%"))] = 0.0
 
 
 class PopulationSection(Section):

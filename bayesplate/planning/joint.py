@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.campaigns.given import GivenShared
+from bayesplate.campaigns.scatter import expected_width
 from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
 from bayesplate.estimates.least_squares import weighted_least_squares
@@ -133,7 +134,8 @@ def board_in_joint(
         noise = noise * noise_widenings(board, estimate)
     laws = tuple(bare_law(board, one, at) for one in stations(board, at, prior, is_elsewhere=False))
     parameters = Parameters(board)
-    free, turned = _columns(board, prior, shared, at, noise)
+    names, turned = _columns(board, prior, shared, at, noise)
+    n_own = len(names)
     theta = parameters.theta(at, noise)
     to_moduli = moduli_at(board, theta[:N_RIGIDITIES], parameters.fitted_columns.size)[1] @ turned
     slopes = [law.slopes @ turned for law in laws]
@@ -141,10 +143,10 @@ def board_in_joint(
         board=board,
         values=at,
         laws=laws,
-        own=tuple(one[:, : free.size] for one in slopes),
-        shared=tuple(one[:, free.size :] for one in slopes),
-        moduli=to_moduli[:, : free.size],
-        names=tuple(parameters.names[i] for i in free),
+        own=tuple(one[:, :n_own] for one in slopes),
+        shared=tuple(one[:, n_own:] for one in slopes),
+        moduli=to_moduli[:, :n_own],
+        names=names,
         noise=noise,
     )
 
@@ -153,25 +155,34 @@ def held_elsewhere(one: BoardInJoint, prior: PriorCard, shared: Sequence[Shared]
     """The same board with the modes that it has where it is held as it never was: a solution for each way."""
     ways = new_stations(one.board, one.values, prior)
     laws = tuple(bare_law(one.board, way, one.values) for way in ways)
-    free, turned = _columns(one.board, prior, shared, one.values, one.noise)
+    turned = _columns(one.board, prior, shared, one.values, one.noise)[1]
+    n_own = len(one.names)
     slopes = [law.slopes @ turned for law in laws]
     return replace(
         one,
         laws=(*one.laws, *laws),
-        own=(*one.own, *(each[:, : free.size] for each in slopes)),
-        shared=(*one.shared, *(each[:, free.size :] for each in slopes)),
+        own=(*one.own, *(each[:, :n_own] for each in slopes)),
+        shared=(*one.shared, *(each[:, n_own:] for each in slopes)),
         noise=np.r_[one.noise, [way.setup.noise.median for way in ways]],
     )
 
 
 def _columns(
     board: Board, prior: PriorCard, shared: Sequence[Shared], values: Values, noise: Floats
-) -> tuple[NDArray[np.intp], Floats]:
-    """Columns that are a board's own, and what each of them and of the shared parameters does: see `_turned`."""
+) -> tuple[tuple[str, ...], Floats]:
+    """Names of what is a board's own, and what each of them and of the shared parameters does: see `_turned`.
+
+    Where a shared number scatters, how far the board is off it, in what is expected of boards, is one of its own.
+    """
     given = GivenShared(Posterior(board, prior, (), "exact", False), tuple(shared))
     parameters = Parameters(board)
     free = np.array([i for i in given.own_columns if i in parameters.fitted_columns], dtype=np.intp)
-    return free, _turned(given, parameters.theta(values, noise), free, len(shared))
+    turned = _turned(given, parameters.theta(values, noise), free, len(shared))
+    own, of_shared = turned[:, : free.size], turned[:, free.size :]
+    width = expected_width(shared)
+    apart = np.flatnonzero(width)
+    names = (*(parameters.names[i] for i in free), *(f"{shared[int(i)].name} apart" for i in apart))
+    return names, np.column_stack([own, of_shared[:, apart] * width[apart], of_shared])
 
 
 def _turned(given: GivenShared, theta: Floats, free: NDArray[np.intp], n_shared: int) -> Floats:

@@ -84,6 +84,8 @@ def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = No
             f"{shared_name(name, one)}: {plus_minus(one.all_boards, factor)} from {len(summary.boards)} boards, nine "
             f"times in ten {interval(one.all_boards, factor)}."
         )
+        if one.scatter is not None:
+            told.append(f"The boards' own differ from it by {plus_minus(one.scatter, 100.0)} %.")
     told.append(f"The fitted boards miss their labelled modes by {pooled_rms_cents(summary):.1f} cents in all.")
     if diagnosis is not None and diagnosis.recommendation:
         told.append(f"What to do next: {diagnosis.recommendation}.")

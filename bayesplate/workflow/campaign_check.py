@@ -7,6 +7,7 @@ import numpy as np
 from bayesplate.campaigns.checking import CampaignCheck, CheckedShared
 from bayesplate.campaigns.given import GivenShared
 from bayesplate.campaigns.pulls import Pull
+from bayesplate.campaigns.scatter import expected_width
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.workflow.campaign import Campaign
@@ -31,14 +32,14 @@ def check_campaign(campaign: Campaign) -> CampaignCheck:
 def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
     """What normal approximations of the boards' posteriors say of the shared numbers."""
     pulls = {one.board.name: _pull(one.posed, campaign) for one in campaign.problems}
-    n = len(campaign.shared)
+    n, width = len(campaign.shared), expected_width(campaign.shared)
 
     def sds(*some: Pull) -> list[float]:
         total = np.eye(n) + np.sum([one.precision for one in some], axis=0)
         return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(total)))]
 
     alone = {name: sds(pull) for name, pull in pulls.items()}
-    every = sds(*pulls.values())
+    every = sds(*(one.scattered(width) for one in pulls.values()))
     return {
         one.name: CheckedShared(
             unit=one.unit,

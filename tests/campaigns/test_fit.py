@@ -15,6 +15,7 @@ from bayesplate.campaigns import learning
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.claim import judge, taught_boards
 from bayesplate.campaigns.learning import learn
+from bayesplate.campaigns.scatter import scatters_of
 from bayesplate.cards import load_prior
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import SamplerSettings, sample
@@ -46,6 +47,59 @@ def joint_run(members, is_exact=False):
     chains, convergence = sample(log_posterior, centre, covariance, SamplerSettings(seed=2))
     assert convergence.passed
     return chains.pooled, convergence.ess
+
+
+def joint_run_with_scatter(members, shared):
+    """Draws of one shared number, of its scatter and of each board's own: (n, 2 + n_boards) array, effective sizes.
+
+    Each board's own number is the middle and so many widths, these of unit spread.
+    """
+    (scatter,), given = scatters_of(shared), [one._quick for one in members]
+    ends, n = np.cumsum([one.own_columns.size for one in given]), len(members)
+
+    def own_numbers(theta):
+        middle, u = theta[:, -2], theta[:, -1]
+        return middle[:, None] + scatter.width(u)[:, None] * theta[:, ends[-1] : -2]
+
+    def log_posterior(theta):
+        apart, middle, u = theta[:, ends[-1] : -2], theta[:, -2], theta[:, -1]
+        total = shared[0].prior.log_prior(middle) + scatter.prior.log_prior(u) - 0.5 * (apart**2).sum(axis=1)
+        possible = np.isfinite(total)
+        z = own_numbers(theta[possible])
+        blocks = np.split(theta[possible, : ends[-1]], ends[:-1], axis=1)
+        for i, (one, own) in enumerate(zip(given, blocks, strict=True)):
+            total[possible] += one.log_density(own, z[:, i : i + 1])
+        return total
+
+    own = [m.draws.flat[:, g.own_columns] for m, g in zip(members, given, strict=True)]
+    z = np.concatenate([m.alone.z for m in members])
+    centre = np.concatenate([each.mean(axis=0) for each in own] + [np.zeros(n), z.mean(axis=0), [0.8]])
+    blocks = [np.cov(each.T) for each in own] + [np.eye(n), np.atleast_2d(np.cov(z.T)) / n, [[0.3]]]
+    chains, convergence = sample(log_posterior, centre, block_diag(*blocks), SamplerSettings(seed=2))
+    assert convergence.ess_min > 2000  # in so many directions walkers go slowly
+    assert convergence.rhat.max() < 1.01
+    draws = chains.pooled
+    found = np.column_stack([draws[:, -2:], own_numbers(draws)])
+    return found, np.minimum(convergence.ess[-2], convergence.ess[-1])
+
+
+@pytest.mark.slow
+def test_numbers_that_scatter_are_those_of_a_joint_run(fitted_campaign):
+    """Middle, scatter and each board's own; and none of it what it is without scatter."""
+    shared = tuple(replace(one, scatter=0.5) for one in fitted_campaign.learnt.together.shared)
+    members = [replace(one, shared=shared) for one in fitted_campaign.learnt.members]
+    learnt = learn(members, SamplerSettings(seed=1))
+    reference, ess = joint_run_with_scatter(members, shared)
+    both = min(ess, learnt.convergence.ess_min) / 2
+
+    for i in range(2):
+        assert max(in_errors(learnt.chains.pooled[:, i], reference[:, i], both)) < 4.0
+    for i, member in enumerate(members):
+        _, draws, effective = learnt.board(i, np.random.default_rng(0), 1)
+        z = member.given.z_of(draws.flat)[:, 0]
+        assert max(in_errors(z, reference[:, 2 + i], min(effective, both))) < 4.0
+    same = fitted_campaign.learnt.chains.pooled[:, 0]
+    assert max(in_errors(same, reference[:, 0], both)) > 4.0
 
 
 def in_errors(draws, reference, ess):
@@ -191,6 +245,16 @@ def test_faults_of_several_boards_come_at_once(tmp_path):
 def test_a_campaign_takes_nothing_beside_it(campaign):
     with pytest.raises(InputError, match="nothing beside a Campaign"):
         bayesplate.fit(campaign, effects=[])
+
+
+def test_a_number_that_could_be_negative_does_not_scatter(tmp_path):
+    path = write_campaign(tmp_path)
+    text = path.read_text().replace('"attached_mass"', '"attached_mass"\nscatter_percent = 20')
+    path.write_text(text)
+    assert [one.scatter for one in bayesplate.Campaign.from_card(path).shared] == [0.2]
+    path.write_text(text.replace("attached_mass", "density_gradient"))
+    with pytest.raises(InputError, match=r"scatter_percent: wanted a positive number.*got .* whose prior is normal"):
+        bayesplate.Campaign.from_card(path)
 
 
 def test_check_says_what_the_boards_would_share(campaign):

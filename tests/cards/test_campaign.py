@@ -46,6 +46,12 @@ def test_a_campaign_is_read(tmp_path):
     assert card.text == CAMPAIGN
 
 
+def test_boards_may_scatter_about_what_they_share(tmp_path):
+    card = load_campaign(written(tmp_path, CAMPAIGN.replace('"ratio"', '"ratio"\nscatter_percent = 20')))
+
+    assert [one.scatter_percent for one in card.shared] == [0.0, 20.0]
+
+
 def test_nothing_needs_to_be_shared(tmp_path):
     card = load_campaign(written(tmp_path, CAMPAIGN.split("[[shared]]", maxsplit=1)[0]))
 
@@ -61,6 +67,16 @@ def test_nothing_needs_to_be_shared(tmp_path):
         ("./my-board.toml", "spruce-free-2L", "my-campaign.toml boards: wanted each board once"),
         ("./my-board.toml", "my board", "my-campaign.toml boards 2: wanted letters"),
         ('effect = "attached_mass"', 'effect = "attached_mas"', 'my-campaign.toml [[shared]] 1 effect: wanted "transv'),
+        (
+            'as = "ratio"',
+            "scatter_percent = 400",
+            "my-campaign.toml [[shared]] 2 scatter_percent: wanted a number from",
+        ),
+        (
+            'as = "ratio"',
+            'scatter_percent = "a little"',
+            "[[shared]] 2 scatter_percent: wanted a number",
+        ),
         ("transverse_shear", "attached_mass", "my-campaign.toml [[shared]] 2 effect: wanted each effect once"),
         ('as = "ratio"', 'as = "rate"', 'my-campaign.toml [[shared]] 2 as: wanted "value" or "ratio"'),
         ('as = "ratio"', 'like = "ratio"', "my-campaign.toml [[shared]] 2 like: wanted one of effect, as"),
