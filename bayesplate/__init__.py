@@ -24,7 +24,7 @@ rho             density, kg m^-3
 E_x, E_y        Young's moduli along and across the grain, Pa
 G_xy            in-plane shear modulus, Pa
 nu_xy, nu_yx    Poisson ratios, E_x nu_yx = E_y nu_xy
-D_x, D_y, D_s   rigidities, N m: D_x = E_x h^3 / 12 (1 - nu_xy nu_yx), D_y likewise, D_s = G_xy h^3 / 3
+D_x, D_y, D_s   rigidities, N m: D_x = E_x h^3 / (12 (1 - nu_xy nu_yx)), D_y likewise, D_s = G_xy h^3 / 3
 (m,n)           label of a mode: interior nodal lines crossed along x and along y, plus the laboratory's first label
 a, b, c         the paper's modal coefficients: omega^2 = lambda (a D_x + b D_y + c D_s)
 lambda          1 / (rho h L_x^2 L_y^2)

@@ -290,13 +290,18 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
 @main.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path())
 @click.option("--card", metavar="CARD", help="Board card with sizes and edges: labels are computed for it.")
-@click.option("--rate", type=float, metavar="HZ", help="Samples a second, where a file does not say it.")
+@click.option("--rate", type=float, metavar="HZ", help="Samples per second, where a file does not say it.")
 @click.option(
     "--hammer", multiple=True, callback=places, metavar="X,Y", help="Where it was hit, mm; once, or per file."
 )
 @click.option("--sensor", multiple=True, callback=places, metavar="X,Y", help="Where the sensor was, mm; likewise.")
 @click.option("--sensor-mass", callback=mass_kg, metavar="G", help="Of the accelerometer in g, or G,SD.")
-@click.option("--channels", default="force,response", show_default=True, help="Of a file with two channels.")
+@click.option(
+    "--channels",
+    default="force,response",
+    show_default=True,
+    help="Of a file with two channels; also response,force, or response,response for stereo.",
+)
 @click.option("--motion", default="acceleration", show_default=True, help="What a response is; pressure: a microphone.")
 @click.option("--polarity", help="same or opposite, of force and response (default: found by the labels).")
 @click.option("--sweep", metavar="F1,F2,S", help="For recordings of an exponential sweep: its parameters, or its file.")

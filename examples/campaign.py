@@ -64,7 +64,6 @@ def main() -> None:
         parser.error("--resume needs --results, the folder of the run to go on with")
     found = bayesplate.diagnose(
         arguments.card,
-        effects=[],
         out=results,
         resume=arguments.resume,
         force=results is not None and not arguments.resume,

@@ -79,8 +79,8 @@ class GivenShared:
         for column, i in self._set.items():
             shared = self.shared[i]
             prior = self._parameters.uncertain[column - self._parameters.first_input].prior
-            of_board = shared.of_board(np.asarray(shared.prior.value(z[:, i])), values)
-            with np.errstate(invalid="ignore"):
+            with np.errstate(over="ignore", invalid="ignore"):  # far out it is infinite, and has no density
+                of_board = shared.of_board(np.asarray(shared.prior.value(z[:, i])), values)
                 theta[:, column] = prior.standard(of_board)
         return theta
 

@@ -50,7 +50,7 @@ def notes(board: Board) -> tuple[str, ...]:
     """A sentence for each group of sessions."""
     return tuple(
         f"{', '.join(setup.name for setup in group[:-1])} and {group[-1].name} hold the board alike: they are taken "
-        "for sessions of one setup, which share what the board does and its plate does not"
+        "for sessions of one setup, which share how the real board departs from the ideal plate"
         for group in sessions(board)
     )
 

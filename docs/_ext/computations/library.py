@@ -91,7 +91,7 @@ CHECKS = (
     (
         "batch",
         "make batch",
-        "Thousands of simulated boards through `batch`: time and memory by one worker, two, and a Dask cluster.",
+        "Simulated boards through `batch`, hundreds of them: time and memory by one worker, two, and a Dask cluster.",
     ),
     (
         "spectra",
@@ -195,7 +195,8 @@ def exit_codes(folder: Path) -> str:
     for name in ("InputError", "NotIdentifiableError", "NotConvergedError", "CheckpointError", "BatchError"):
         error = getattr(errors, name)
         rows.append((str(error.exit_code), (error.__doc__ or "").splitlines()[0].rstrip(".")))
-    rows += [(str(errors.BayesplateError.exit_code), "internal error"), ("130", "interrupted, after a checkpoint")]
+    rows.append((str(errors.BayesplateError.exit_code), "internal error"))
+    rows.append(("130", "interrupted; the message says whether `--resume` can go on"))
     return words_table(("code", "meaning"), rows)
 
 

@@ -15,6 +15,8 @@ SOURCE = Path(__file__).resolve().parents[2]
 _MOST_WORDS = {
     "summary.json": "every number above and many more, in SI units;",
     "posterior.nc": "all draws, for [ArviZ](https://python.arviz.org) and for your own plots;",
+    "constants.csv": "the constants as a table, and the same for LaTeX in `constants.tex`;",
+    "figures": "the figures of the report, as PNG and SVG;",
     "report.html": "the report: one page with all figures, readable on a phone, that needs nothing else.",
 }
 
