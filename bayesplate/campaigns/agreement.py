@@ -45,7 +45,8 @@ def left_out(together: Together) -> tuple[LeftOut, ...]:
 def refusing(together: Together) -> tuple[str, ...]:
     """Names of the boards that refuse what the others teach, as many as were asked being allowed for.
 
-    The one that refuses most is left out before the others are asked again: it had taught them too.
+    The one that refuses most is left out before the others are asked again: it had taught them too. Where two are left
+    that do not agree, both are named: nothing tells which of them is the odd one.
     """
     out: list[int] = []
     n = len(together.names)
@@ -54,7 +55,7 @@ def refusing(together: Together) -> tuple[str, ...]:
         worst = min(values, key=lambda i: values[i])
         if values[worst] * len(values) >= REFUSED:
             break
-        out.append(worst)
+        out += [worst] if len(values) > 2 else list(values)
     return tuple(together.names[i] for i in sorted(out))
 
 

@@ -141,7 +141,7 @@ class Member:
     @property
     def pull(self) -> Pull:
         """What its likelihood of the shared parameters amounts to as a normal one."""
-        return Pull.of_draws(self.alone.z, self.alone.weights)
+        return Pull.of_draws(self.alone.z, self.alone.weights, [one.prior for one in self.shared])
 
     def likelihood(self, drawn: Sample, log_reference: LogDensity) -> SharedLikelihood:
         """Its likelihood of the shared parameters, from a sample that is weighted to be where r is another density."""

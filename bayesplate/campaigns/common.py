@@ -11,6 +11,8 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
 
+CLEAR = 0.05
+"""What the p-value of a mode, multiplied by the number of modes, has to stay below."""
 FEWEST = 2
 """Boards that must have a reading before it says what they have in common."""
 
@@ -35,6 +37,13 @@ class CommonResidual:
     scatter_cents: float
     boards: Mapping[str, float]
 
+    @property
+    def p_value(self) -> float:
+        """How often a mode that has nothing in common would have a mean as far from zero: Student's, both sides."""
+        from scipy.stats import t
+
+        return float(2.0 * t.sf(abs(self.mean_cents) / self.error_cents, len(self.boards) - 1))
+
 
 def common_residuals(summaries: Mapping[str, Summary]) -> dict[str, CommonResidual]:
     """Every mode that several boards have, in the order in which boards name them first.
@@ -56,6 +65,11 @@ def common_residuals(summaries: Mapping[str, Summary]) -> dict[str, CommonResidu
             noise = float(cents(np.asarray(summary.noise[row.setup].q50)))
             found.setdefault(_key(row, len(setups) > 1), {})[board] = (row.residual_cents, noise)
     return {key: _pooled(each) for key, each in found.items() if len(each) >= FEWEST}
+
+
+def clear_of_zero(common: Mapping[str, CommonResidual]) -> list[str]:
+    """Labels of the modes whose mean is clear of zero, as many modes as were asked being allowed for (Bonferroni)."""
+    return [label for label, one in common.items() if one.p_value * len(common) < CLEAR]
 
 
 def _key(row: ModeRow, has_setups: bool) -> str:

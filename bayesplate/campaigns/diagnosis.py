@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.campaigns.claim import SharedClaim, TaughtBoard
-from bayesplate.campaigns.common import CommonResidual
+from bayesplate.campaigns.common import CommonResidual, clear_of_zero
 from bayesplate.campaigns.search import Explanation
 from bayesplate.effects.words import effect_name, effect_names, joined
 
@@ -165,14 +165,16 @@ def pooled_rms(boards: Mapping[str, float], counts: Mapping[str, int]) -> float:
     return float(np.sqrt(total / sum(counts.values())))
 
 
-def next_step(common: Mapping[str, CommonResidual], conditions: SharedClaim | None) -> str:
+def next_step(common: Mapping[str, CommonResidual], conditions: SharedClaim | None, n_boards: int) -> str:
     """What to do next: ask a board that refuses, or look for the cause of what is left over on all of them."""
     if conditions is not None and conditions.refused_by:
         boards, is_one = joined(conditions.refused_by), len(conditions.refused_by) == 1
+        if len(conditions.refused_by) == n_boards:
+            return f"measure {boards} again: no two of them agree on what they share"
         they, do = ("it", "does") if is_one else ("they", "do")
         out = "it" if is_one else "them"
         return f"measure {boards} again, or take {out} out of the campaign: {they} {do} not want what the others share"
-    clear = [label for label, one in common.items() if abs(one.mean_cents) > 2.0 * one.error_cents]
+    clear = clear_of_zero(common)
     if clear:
         modes = joined(clear[:_MOST_LISTED])
         return f"modes {modes} are off alike on all boards: bayesplate diagnose, for one board, says what moves them so"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.campaigns.likelihood import moments
+from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 
@@ -29,8 +30,8 @@ class Pull:
     lean: Floats
 
     @classmethod
-    def of_draws(cls, z: Floats, weights: Floats) -> Pull:
-        """From draws of the board's own posterior, whose prior of z is standard normal.
+    def of_draws(cls, z: Floats, weights: Floats, priors: Sequence[Quantity] = ()) -> Pull:
+        """From draws of the board's own posterior.
 
         A posterior that is wider than the prior in a direction says nothing there.
 
@@ -39,12 +40,16 @@ class Pull:
         z : (n, n_shared) array
         weights : (n,) array
             They sum to 1.
+        priors : sequence of Quantity
+            Under which they are the posterior's; by default z is standard normal before.
         """
         mean, covariance = moments(z, weights)
+        before = np.array([_of_prior(one) for one in priors] or [(0.0, 1.0)] * mean.size)
         after = np.linalg.inv(covariance)
-        gained, directions = np.linalg.eigh(after - np.eye(mean.size))
+        gained, directions = np.linalg.eigh(after - np.diag(1.0 / before[:, 1]))
         told = (directions * np.maximum(gained, 0.0)) @ directions.T
-        return cls(told, (directions * (gained > 0.0)) @ directions.T @ after @ mean)
+        lean = after @ mean - before[:, 0] / before[:, 1]
+        return cls(told, (directions * (gained > 0.0)) @ directions.T @ lean)
 
     def scattered(self, width: Floats) -> Pull:
         """What it says of the middle about which the boards' own numbers scatter.
@@ -56,6 +61,15 @@ class Pull:
         """
         weaker = np.linalg.inv(np.eye(width.size) + self.precision * width**2)
         return Pull(np.asarray(weaker @ self.precision), np.asarray(weaker @ self.lean))
+
+
+def _of_prior(prior: Quantity) -> tuple[float, float]:
+    """Mean and variance of a standard coordinate before any reading, its bounds kept."""
+    from scipy.stats import truncnorm
+
+    low, high = prior.standard_bounds
+    mean, variance = truncnorm.stats(low, high, moments="mv")
+    return float(mean), float(variance)
 
 
 def normal_posterior(pulls: Sequence[Pull]) -> tuple[Floats, Floats]:

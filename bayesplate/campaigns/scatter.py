@@ -33,6 +33,7 @@ Floats = NDArray[np.float64]
 
 _NODES = {1: 9, 2: 7, 3: 5}
 """Along each direction, by the number of directions."""
+_ROWS_AT_ONCE = 4096
 _MEDIAN = 0.6745
 """Of a half-normal number of unit scale."""
 
@@ -114,6 +115,10 @@ class ScatteredLikelihood:
 
     def at(self, hyper: Floats) -> Floats:
         """ln L at standard coordinates of numbers and scatters: (n,) array from (n, n_shared + n_scatters)."""
+        n_parts = -(-len(hyper) // _ROWS_AT_ONCE)
+        return np.concatenate([self._at(part) for part in np.array_split(hyper, max(n_parts, 1))])
+
+    def _at(self, hyper: Floats) -> Floats:
         middle, width = hyper[:, : len(self.shared)], widths(self.shared, hyper)
         moving = np.flatnonzero([bool(one.scatter) for one in self.shared])
         n, k = len(hyper), moving.size

@@ -1,5 +1,7 @@
 """What boards lack in common: each board's tables of shifts, joined over the cells of one size for all.
 
+Each effect has one size per board here: one that every setup of a board has at a size of its own is not tried.
+
 Each board's search holds, for every effect, cells of its sizes with the likelihood of the board's readings in each.
 Given the size the boards are independent, so that one size for all has the evidence
 
@@ -21,7 +23,6 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import Ground
 from bayesplate.diagnosis.evidence.terms import log_sum
-from bayesplate.effects import EFFECTS
 
 Floats = NDArray[np.float64]
 Way = Literal["none", "shared", "own", "one board"]
@@ -100,20 +101,6 @@ class BoardSearch:
         }
 
 
-def shareable(boards: Sequence[str], tried: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
-    """Effects that all boards may have and that boards of one rig, day or species may have alike.
-
-    Parameters
-    ----------
-    boards : sequence of str
-    tried : dict of sequence of str
-        By board: effects that are not declared and can act.
-    """
-    return tuple(
-        name for name, effect in EFFECTS.items() if effect.is_of_campaign and all(name in tried[one] for one in boards)
-    )
-
-
 def explanations(boards: Sequence[BoardSearch], effects: Sequence[str]) -> tuple[Explanation, ...]:
     """Everything that the boards may have, the most probable first.
 
@@ -152,8 +139,3 @@ def log_evidence_shared(boards: Sequence[BoardSearch], effect: str) -> float:
     likelihood = np.sum([[cells[key][1] for key in keys] for cells in by_board], axis=0)
     prior = np.array([by_board[0][key][0] for key in keys])
     return float(log_sum(prior + likelihood) - log_sum(prior))
-
-
-def inclusion(found: Sequence[Explanation], effect: str, way: Way) -> float:
-    """Probability of an effect in one way."""
-    return sum(one.probability for one in found if (one.effect, one.way) == (effect, way))

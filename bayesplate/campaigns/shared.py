@@ -121,11 +121,12 @@ def _of_effect(section: SharedSection, boards: Sequence[Board], place: str) -> l
         raise InputError(Fault(f"{place} as", "value", "ratio", f"only {able} has ratios to the boards' moduli"))
     faults: list[Fault] = []
     of_boards = [[one for one in board.parameters if one.effect == section.effect] for board in boards]
-    keys = list(dict.fromkeys(one.key for every in of_boards for one in every))
+    uncertain = {one.key for every in of_boards for one in every if not one.prior.is_exact}
+    keys = [one for one in dict.fromkeys(one.key for every in of_boards for one in every) if one in uncertain]
     for board, every in zip(boards, of_boards, strict=True):
         where = f"{place}, board {board.name}"
         missing = [key for key in keys if key not in {one.key for one in every}]
-        known = [one.key for one in every if one.prior.is_exact]
+        known = [one.key for one in every if one.prior.is_exact and (one.key in keys or not keys)]
         alone = [one.key for one in every if one.is_component or not one.is_of_effect]
         if missing or not every:
             faults.append(Fault(where, f"the parameters {', '.join(keys) or 'of the effect'}", "a board without them"))

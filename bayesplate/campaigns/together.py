@@ -163,7 +163,18 @@ class Together:
         """
         if len(self.coordinates) == len(self.shared):
             return lambda z: self.log_density(z, without)
-        return Proposal.fitted(self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without)).log_density
+        draws, bounds = self.taught_draws(np.random.default_rng(_LINE), _N_FITTED, without), self._lower_bounds
+        for i in np.flatnonzero(np.isfinite(bounds)):  # their mirror image beside them, or the density would fall off
+            mirrored = draws.copy()
+            mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
+            draws = np.concatenate([draws, mirrored])
+        mixture = Proposal.fitted(np.random.default_rng(_LINE).permutation(draws))
+        return lambda z: np.where((z >= bounds).all(axis=1), mixture.log_density(z), -np.inf)
+
+    @property
+    def _lower_bounds(self) -> Floats:
+        """Of the standard coordinates of the numbers: (n_shared,) array, minus infinity where there is none."""
+        return np.array([one.prior.standard_bounds[0] for one in self.shared])
 
     @cached_property
     def _at_points(self) -> tuple[Floats, Floats]:

@@ -35,7 +35,6 @@ class PoissonRatio(Effect):
 
     name: ClassVar[str] = "poisson_ratio"
     scope: ClassVar[Scope] = "board"
-    is_of_campaign: ClassVar[bool] = True
     sentence: ClassVar[str] = "This wood narrows under a pull by another share than the table says."
 
     @classmethod

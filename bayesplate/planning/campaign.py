@@ -69,6 +69,11 @@ class Reading:
     variance: Floats
     further: ToFind | None = None
 
+    def excludes(self, other: Reading) -> bool:
+        """Whether both are the same, or two ways to know one size better, each counted from what is known now."""
+        is_size = self.what == other.what == "size"
+        return self is other or (is_size and np.array_equal(self.rows, other.rows))
+
 
 def joint_of(
     boards: Sequence[Board], priors: Sequence[PriorCard], shared: Sequence[Shared],
@@ -289,7 +294,9 @@ def joined(
     """The best two and the best three together, found one by one: each goes with those found before it."""
     chosen, result = list(listed[:1]), []
     while chosen and len(chosen) < min(longest, len(listed)):
-        left = [one for one in listed if one not in chosen]
+        left = [one for one in listed if not any(one.excludes(other) for other in chosen)]
+        if not left:
+            break
         chosen.append(max(left, key=lambda one: worth(joint, (*chosen, one), goal)))
         result.append(tuple(chosen))
     return tuple(result)

@@ -74,8 +74,13 @@ class BoardInJoint:
         return np.asarray(found)
 
     def variance(self, setup: int) -> Floats:
-        """Of a reading of each mode of a law: (n_modes,) array."""
-        return np.asarray(self.noise[setup] ** 2 + ReadingErrors.of(self.laws[setup].station.setup).own_variance)
+        """Of a reading of each mode of a law, of those taken with their own uncertainty: (n_modes,) array."""
+        station = self.laws[setup].station
+        own = ReadingErrors.of(station.setup).own_variance.copy()
+        if not station.is_new:  # readings that were taken come first
+            stated = ReadingErrors.of(station.base).own_variance
+            own[: stated.size] = stated
+        return np.asarray(self.noise[setup] ** 2 + own)
 
     def another_day(self, setup: int) -> tuple[Floats, Floats]:
         """What the first reading of each mode tells of one on another day, and the variance that is left.

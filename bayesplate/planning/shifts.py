@@ -71,7 +71,7 @@ def _nodes(candidate: Candidate, shares: Floats, index: int) -> Nodes:
     form, table = candidate.laws[index].form, candidate.fine
     along = tuple(_along(table, shares, index, j) for j in range(len(form.free)))
     rows = np.flatnonzero(table.form == index)
-    middle = int(along[0][1]) if along else int(rows[np.argmax(shares[rows])])
+    middle = int(along[0][_middle(along[0])]) if along else int(rows[np.argmax(shares[rows])])
     return Nodes(form, index, middle, along)
 
 
@@ -85,7 +85,7 @@ def _shares(found: Found, name: str) -> Floats:
 
 
 def _along(table: Table, shares: Floats, form: int, parameter: int) -> Rows:
-    """Three cells along a parameter, the other ones near the middle of what is likely."""
+    """Three cells along a parameter, or all if fewer, the other ones near the middle of what is likely."""
     rows = np.flatnonzero(table.form == form)
     z, weights = table.z[rows], shares[rows] / shares[rows].sum()
     middle = weights @ z
@@ -102,23 +102,24 @@ def _along(table: Table, shares: Floats, form: int, parameter: int) -> Rows:
     if len(set(chosen)) < 3:  # all in one cell: its neighbours along the parameter
         same = [int(i) for i in rows if np.allclose(np.delete(table.z[i] - table.z[chosen[1]], parameter), 0.0)]
         same.sort(key=lambda i: float(table.z[i, parameter]))
-        at = min(max(same.index(chosen[1]), 1), len(same) - 2)
+        at = max(min(same.index(chosen[1]), len(same) - 2), 1)
         chosen = same[at - 1 : at + 2]
     return np.array(chosen, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
 class FormShift:
-    """What a form does to the modes of a station beside what the constants do: a parabola along each parameter.
+    """What a form does to the modes of a station beside what the constants do: a parabola along each parameter, or what
+    fewer nodes allow.
 
     Everything is kept flat: the modes, then what a known mass at each spot adds to each.
 
     Attributes
     ----------
     nodes : Nodes
-    at : tuple of (3,) array
+    at : tuple of (n_nodes,) array
         Values of each parameter at its nodes, SI.
-    beside : tuple of (3, n) array
+    beside : tuple of (n_nodes, n) array
         ln f there, less ln f without the effect and what the constants' linear law says.
     middle : (n,) array
         The same in the middle cell.
@@ -134,19 +135,20 @@ class FormShift:
         total = np.tile(self.middle, (len(z), 1))
         for j, (at, beside) in enumerate(zip(self.at, self.beside, strict=True)):
             value = np.clip(self.nodes.form.free[j].prior.value(z[:, j]), at.min(), at.max())
-            total = total + _parabola(at, value) @ beside - beside[1]
+            total = total + _lagrange(at, value) @ beside - beside[_middle(at)]
         return np.asarray(total)
 
 
-def _parabola(at: Floats, value: Floats) -> Floats:
-    """Weights of three nodes at values between them: (n, 3) array (Lagrange)."""
-    a, b, c = at
+def _middle(nodes: Rows | Floats) -> int:
+    """Which of one, two or three nodes in a row the others are beside."""
+    return len(nodes) // 2
+
+
+def _lagrange(at: Floats, value: Floats) -> Floats:
+    """Weights of nodes at values between them: (n, n_nodes) array, of the polynomial through all of them."""
+    others = [np.delete(at, i) for i in range(at.size)]
     return np.column_stack(
-        [
-            (value - b) * (value - c) / ((a - b) * (a - c)),
-            (value - a) * (value - c) / ((b - a) * (b - c)),
-            (value - a) * (value - b) / ((c - a) * (c - b)),
-        ]
+        [np.prod((value[:, None] - rest) / (one - rest), axis=1) for one, rest in zip(at, others, strict=True)]
     )
 
 

@@ -129,7 +129,7 @@ def _onsets(response: Floats, rate: float) -> list[int]:
     floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
     level = 10.0 * (np.log10(np.maximum(power, 1e-300)) - np.log10(floor))
     before = np.full(n, 0.0)
-    before[1:] = np.maximum.accumulate(level)[:-1] if n < 2 else level[:-1]
+    before[1:] = level[:-1]
     for back in range(2, _LOOK_BACK + 1):
         before[back:] = np.maximum(before[back:], level[:-back])
     rises = np.flatnonzero((level - before > _RISE) & (level > _ABOVE_FLOOR) & (level > level.max() - _BELOW_LOUDEST))

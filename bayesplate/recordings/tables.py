@@ -22,6 +22,8 @@ KNOWN = (*_TIME, *_FORCE, *_RESPONSE, *_HERTZ, *_REAL, *_IMAGINARY, *_COHERENCE)
 WANTED = "named columns: force if it was measured, acceleration, velocity, displacement or sound, time; or f_hz, re, im"
 _JITTER = 1e-3
 """Share of a step by which the times of samples, or the lines of a spectrum, may be unevenly spaced."""
+_GAP = 1.75
+"""Steps between two times at which a sample is missing; times are rounded, so two steps may look like less."""
 _LATEST = 1e12
 """s, Hz."""
 _LONGEST_HEADER = 10_000
@@ -110,10 +112,8 @@ def _rate_of(times: Floats, shown: str, rate: float | None) -> tuple[float, Faul
     if times.size < 2 or not (np.abs(times) < _LATEST).all() or not (np.diff(times) > 0).all():
         return 1.0, Fault(f"{shown} time", "times in s that rise", "times that do not")
     step = float((times[-1] - times[0]) / (times.size - 1))
-    if (
-        np.abs(times - times[0] - step * np.arange(times.size)).max()
-        > max(_JITTER * step, 1e-6 * float(times[-1])) + step
-    ):
+    away = np.abs(times - times[0] - step * np.arange(times.size)).max()
+    if away > max(_JITTER * step, 1e-6 * float(times[-1])) + step or np.diff(times).max() > _GAP * step:
         return 1.0, Fault(f"{shown} time", "evenly spaced samples", "uneven ones", "record without gaps")
     own = 1.0 / step
     if rate is not None and abs(rate / own - 1.0) > _JITTER:

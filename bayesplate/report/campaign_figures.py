@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayesplate.campaigns.common import CommonResidual
+from bayesplate.campaigns.common import CommonResidual, clear_of_zero
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import shared_name
@@ -116,17 +116,18 @@ def common_picture(common: Mapping[str, CommonResidual]) -> Picture:
     labels = list(common)
     figure, (panel,) = stacked([_ROW * len(labels) + 0.1], left=0.75, bottom=0.95)
     _named_rows(panel, labels)
-    for row, one in enumerate(common.values()):
+    clear = clear_of_zero(common)
+    for row, (label, one) in enumerate(common.items()):
         values = list(one.boards.values())
         panel.plot(values, [row] * len(values), "o", mfc="white", mec="black", mew=0.6, ms=3.5, zorder=4)
-        color = ORANGE if abs(one.mean_cents) > 2.0 * one.error_cents else BLUE
+        color = ORANGE if label in clear else BLUE
         ends = (one.mean_cents - 2.0 * one.error_cents, one.mean_cents + 2.0 * one.error_cents)
         panel.hlines(row, *ends, color=color, lw=3)
         panel.plot(one.mean_cents, row, "D" if color == ORANGE else "o", color=color, mec="black", mew=0.6, ms=7)
     panel.axvline(0, color=DARK, lw=0.8)
     panel.set_xlabel("measured above (+) or below (-) the fit, cents", fontsize=SMALL)
     handles = [_handle(BLUE, "o", "mean ± 2 errors"), _handle("black", "o", "a board", face="white", lw=0.0)]
-    if any(abs(one.mean_cents) > 2.0 * one.error_cents for one in common.values()):
+    if clear:
         handles.append(_handle(ORANGE, "D", "mean, clear of zero"))
     legend_below(figure, handles, 2)
     told = "; ".join(f"{label} {one.mean_cents:+.0f} ± {one.error_cents:.0f}" for label, one in common.items())

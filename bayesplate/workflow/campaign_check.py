@@ -58,4 +58,4 @@ def _pull(posed: PosedProblem, campaign: Campaign) -> Pull:
     given = GivenShared(posed.posterior, campaign.shared)
     z, log_weights = given.z_of(theta), given.log_reweighting(theta)
     kept = np.isfinite(z).all(axis=1) & np.isfinite(log_weights)
-    return Pull.of_draws(z[kept], normalised(log_weights[kept]))
+    return Pull.of_draws(z[kept], normalised(log_weights[kept]), [one.prior for one in campaign.shared])

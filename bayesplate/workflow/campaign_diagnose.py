@@ -21,7 +21,7 @@ from bayesplate.campaigns.diagnosis import (
     next_step,
     pooled_rms,
 )
-from bayesplate.campaigns.search import BoardSearch, Explanation, explanations, shareable
+from bayesplate.campaigns.search import BoardSearch, Explanation, explanations
 from bayesplate.campaigns.shared import shared_by
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.cards import SharedSection
@@ -30,6 +30,7 @@ from bayesplate.diagnosis.evidence.search import prepare_search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
+from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import CampaignPlots
 from bayesplate.results.contract import as_json
@@ -146,6 +147,7 @@ def _diagnosed(
     campaign: Campaign, alone: Campaign, checkpoints: Path | None, seed: int, stages: Stages
 ) -> CampaignDiagnoseResult:
     """The diagnosis of a campaign whose boards can be fitted, nothing written but checkpoints."""
+    could_share = () if campaign.shared else shareable(campaign)
     before = fit_boards(alone, seed, None if checkpoints is None else checkpoints / BEFORE, stages)
     if campaign.shared:
         verdict, reason = "named", "the card names what the boards share"
@@ -153,7 +155,7 @@ def _diagnosed(
         searched: tuple[Explanation, ...] = ()
         with_shared = campaign
     else:
-        searched = _searched(before, stages)
+        searched = _searched(before, could_share, stages)
         verdict, effects, reason = named(searched) if searched else ("none needed", (), "no effect could be shared")
         with_shared = _sharing(campaign, effects[:1] if verdict != "none needed" else ())
     if with_shared.shared:
@@ -196,10 +198,28 @@ def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
     return replace(campaign, problems=problems, shared=shared_by(card, [one.prepared.board for one in problems]))
 
 
-def _searched(before: Mapping[str, Fitted], stages: Stages) -> tuple[Explanation, ...]:
+def shareable(campaign: Campaign) -> tuple[str, ...]:
+    """Effects that all boards may have, of one size each, and that boards of one rig, day or species may have alike."""
+    found = []
+    for name, effect in EFFECTS.items():
+        can_act = effect.is_of_campaign and all(name in forms(one.prepared.board) for one in campaign.problems)
+        if can_act and _has_one_size(campaign, name):
+            found.append(name)
+    return tuple(found)
+
+
+def _has_one_size(campaign: Campaign, effect: str) -> bool:
+    """Whether a fit could share an effect, and no board has one size of it per setup."""
+    try:
+        sharing = _sharing(campaign, (effect,))
+    except InputError:
+        return False
+    boards = [one.prepared.board for one in sharing.problems]
+    return all(len(one.parameters(board)) == 1 for one in sharing.shared for board in boards)
+
+
+def _searched(before: Mapping[str, Fitted], effects: Sequence[str], stages: Stages) -> tuple[Explanation, ...]:
     """What every board's tables say together."""
-    tried = {name: tuple(forms(one.inference.problem.board)) for name, one in before.items()}
-    effects = shareable(tuple(before), tried)
     if not effects:
         return ()
     searches = []
@@ -248,6 +268,6 @@ def _diagnosis(
         after=PooledErrors(pooled_after, left_after),
         common_residual=after.summary.common_residual,
         common_residual_before=common_residuals({name: one.summary for name, one in before.items()}),
-        recommendation=next_step(after.summary.common_residual, claim),
+        recommendation=next_step(after.summary.common_residual, claim, len(before)),
         notes=after.summary.warnings,
     )

@@ -6,6 +6,8 @@ import numpy as np
 from linear_boards import exactly_together, linear_boards, log_evidence
 
 from bayesplate.campaigns.agreement import left_out, p_value, refusing
+from bayesplate.campaigns.pulls import Pull
+from bayesplate.quantities import Quantity
 
 
 def test_p_values_of_boards_that_share_are_uniform():
@@ -29,6 +31,27 @@ def test_a_board_without_what_the_others_share_is_found():
     boards = linear_boards(rng, 5, 2, [2.0, -2.0], without=(2,))
 
     assert refusing(exactly_together(boards)) == ("board 2",)
+
+
+def test_of_two_boards_that_differ_both_are_named():
+    """Which of them is the odd one, nothing tells; of three the odd one alone is named."""
+    for seed in range(3):
+        boards = linear_boards(np.random.default_rng(seed), 3, 1, [3.0], sd=0.2, without=(0,))
+
+        assert refusing(exactly_together(boards[:2])) == ("board 0", "board 1")
+        assert refusing(exactly_together(boards)) == ("board 0",)
+        assert refusing(exactly_together(boards[1:])) == ()
+
+
+def test_a_board_that_says_nothing_of_a_number_that_cannot_be_negative_has_no_pull():
+    prior = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0)
+    z = np.abs(np.random.default_rng(0).standard_normal((200_000, 1)))
+    weights = np.full(len(z), 1.0 / len(z))
+    silent, mistaken = Pull.of_draws(z, weights, [prior]), Pull.of_draws(z, weights)
+
+    assert abs(silent.precision[0, 0]) < 0.05
+    assert abs(silent.lean[0]) < 0.05
+    assert mistaken.precision[0, 0] > 1.5  # the negative control: its prior taken for a normal one
 
 
 def test_the_log_score_is_that_of_the_board_under_what_the_others_teach():

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 import bayesplate
-from bayesplate.planning.campaign import benches, joint_of, readings
+from bayesplate.campaigns.scatter import expected_width
+from bayesplate.planning.campaign import Reading, benches, joint_of, readings
+from bayesplate.planning.joint import board_in_joint
 from bayesplate.planning.proposals import Costs
+from bayesplate.quantities import Quantity
 
 SHARED = "attached_mass.mass"
 
@@ -55,6 +58,42 @@ def joint(campaign):
 def listed(campaign, joint):
     """What could be read next, for the sake of E_y."""
     return readings(joint, [one.prior for one in campaign.problems], campaign.shared, Costs(), "E_y")
+
+
+def test_a_board_whose_number_scatters_says_less_of_the_middle(campaign, joint):
+    """Its precision and the variance of the scatter, joined as of a sum; not where nothing scatters."""
+    problem, alone = campaign.problems[0], joint.boards[0]
+    shared = tuple(replace(one, scatter=0.5) for one in campaign.shared)
+    scattered = board_in_joint(problem.prepared.board, problem.prior, shared)
+    width = expected_width(shared)
+
+    assert scattered.of_shared == pytest.approx(np.linalg.inv(np.linalg.inv(alone.of_shared) + np.diag(width**2)))
+    assert scattered.of_shared[0, 0] < 0.9 * alone.of_shared[0, 0]
+
+
+def test_a_reading_counts_with_the_uncertainty_that_it_was_stated_with(campaign, joint):
+    problem = campaign.problems[0]
+    (setup,) = problem.prepared.board.setups
+    first = setup.readings[0]
+    rough = replace(first, frequency=Quantity.from_mean(first.frequency.mean, 0.03 * first.frequency.mean))
+    board = replace(problem.prepared.board, setups=(replace(setup, readings=(rough, *setup.readings[1:])),))
+    made = board_in_joint(board, problem.prior, campaign.shared)
+
+    assert made.variance(0)[0] - made.variance(0)[1] == pytest.approx(0.03**2, rel=0.01)
+    assert joint.boards[0].variance(0)[0] == joint.boards[0].variance(0)[1]
+
+
+def test_two_ways_to_know_one_size_better_are_not_proposed_together(joint):
+    row = np.ones((1, 3))
+    more, finer, other = (
+        Reading("size", "board-0", "", name, 1.0, (), values, np.ones(1))
+        for name, values in (("more", row), ("finer", row.copy()), ("another", 2.0 * row))
+    )
+
+    assert more.excludes(finer)
+    assert more.excludes(more)
+    assert not more.excludes(other)
+    assert not replace(more, what="modes").excludes(replace(finer, what="modes"))
 
 
 def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(campaign, joint, listed):

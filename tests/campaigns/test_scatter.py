@@ -10,6 +10,7 @@ from linear_boards import LinearBoard, pull_of, standard_shared
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from bayesplate.campaigns import scatter
 from bayesplate.campaigns.agreement import left_out, p_value
 from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.scatter import ScatteredLikelihood
@@ -21,10 +22,10 @@ SCALE = 0.5
 LOG_SD = 0.4
 
 
-def numbers(n, scatter=SCALE):
+def numbers(n, scale=SCALE):
     """Shared numbers of log-normal prior; the first of them scatters, and the last."""
     prior = Quantity.from_median(1.0, np.exp(LOG_SD))
-    return tuple(Shared("effect", f"z{i}", prior, "1", scatter=scatter if i in (0, n - 1) else 0.0) for i in range(n))
+    return tuple(Shared("effect", f"z{i}", prior, "1", scatter=scale if i in (0, n - 1) else 0.0) for i in range(n))
 
 
 def scattered_boards(rng, n_boards, n_shared, width, z_true=0.3, sd=0.5):
@@ -66,6 +67,20 @@ def test_a_normal_board_is_integrated_exactly(n_shared):
         assert value == pytest.approx(closed_form(board, row[:n_shared], width)[0], abs=1e-9)
         if width.any():
             assert value != pytest.approx(closed_form(board, row[:n_shared], 1.05 * width)[0], abs=1e-6)
+
+
+def test_three_numbers_scatter_and_many_rows_are_taken_in_parts(monkeypatch):
+    rng = np.random.default_rng(5)
+    (board,), _ = scattered_boards(rng, 1, 3, 0.5)
+    shared = tuple(replace(one, scatter=SCALE) for one in numbers(3))
+    hyper = np.column_stack([rng.normal(size=(30, 3)), np.abs(rng.normal(size=(30, 3)))])
+    whole = ScatteredLikelihood(shared, board, pull_of(board)).at(hyper)
+    monkeypatch.setattr(scatter, "_ROWS_AT_ONCE", 7)
+    in_parts = ScatteredLikelihood(shared, board, pull_of(board)).at(hyper)
+
+    exact = [closed_form(board, row[:3], row[3:] * SCALE / LOG_SD)[0] for row in hyper]
+    assert whole == pytest.approx(np.array(exact), abs=1e-9)
+    assert in_parts == pytest.approx(whole, abs=1e-12)
 
 
 @dataclass(frozen=True)
@@ -149,9 +164,28 @@ def test_what_is_taught_has_a_density_with_its_moments():
     assert together.moments((1,))[1][0, 0] < 0.8 * covariance[0, 0]  # wider than the middle is known
 
 
+def test_what_is_taught_keeps_the_bounds_of_a_number_that_does_not_scatter():
+    """Close to a bound as everywhere: against the boards' own draws, of which a tenth lie within a tenth of an sd."""
+    scattering, other = numbers(2)
+    bounded = replace(other, scatter=0.0, prior=Quantity.from_mean(0.0, 1.0, "normal", lower=0.0))
+    boards, _ = scattered_boards(np.random.default_rng(2), 4, 2, 0.5, z_true=0.05, sd=2.0)
+    together = together_of(boards, (scattering, bounded))
+    log_taught, rng = together.log_taught(), np.random.default_rng(1)
+    z = np.column_stack([rng.uniform(-6.0, 6.0, 40_000), rng.uniform(-1.0, 4.0, 40_000)])
+    log_density = log_taught(z)
+    inside = np.flatnonzero(z[:, 1] >= 0.0)
+    density = np.exp(log_density[inside])
+    draws = together.taught_draws(rng, 20_000)[:, 1]
+
+    assert (log_density[z[:, 1] < 0.0] == -np.inf).all()
+    for end in (0.2, 0.5, 1.0):
+        share = density[z[inside, 1] < end].sum() / density.sum()
+        assert share == pytest.approx((draws < end).mean(), rel=0.15)
+
+
 def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_out():
     """Scatter drawn from its prior: the p-value of a board against the others."""
-    shared, same = numbers(1), numbers(1, scatter=0.0)
+    shared, same = numbers(1), numbers(1, scale=0.0)
     values, without = [], []
     for seed in range(25):
         rng = np.random.default_rng(seed)
@@ -169,7 +203,7 @@ def test_p_values_are_uniform_where_boards_scatter_and_not_where_that_is_left_ou
 
 def test_boards_that_scatter_are_foretold_better_where_that_is_known():
     boards, _ = scattered_boards(np.random.default_rng(3), 8, 1, 1.5, sd=0.2)
-    scores = [sum(one.log_score for one in left_out(together_of(boards, numbers(1, scatter=s)))) for s in (SCALE, 0.0)]
+    scores = [sum(one.log_score for one in left_out(together_of(boards, numbers(1, scale=s)))) for s in (SCALE, 0.0)]
 
     assert scores[0] > scores[1] + 3.0
 

@@ -69,6 +69,18 @@ def test_two_channels_are_force_and_response_or_what_is_said(tmp_path):
     assert first.force is None
 
 
+def test_a_missing_sample_is_noticed_and_rounded_times_are_not(tmp_path):
+    """Times of a rate of 48 kHz, rounded to 10 us: steps are 20 or 30; without one sample one of them is 40."""
+    times = np.round(np.arange(24_000) / 48000.0, 5)
+    rows = np.column_stack([times, RING[np.arange(24_000) % RING.size]])
+    for name, kept in (("whole", rows), ("gap", np.delete(rows, 12_000, axis=0))):
+        np.savetxt(tmp_path / f"{name}.csv", kept, "%.9g", ",", header="time,acceleration", comments="")
+
+    assert only(tmp_path / "whole.csv").rate == pytest.approx(48000.0, rel=1e-3)
+    with pytest.raises(InputError, match=r"gap\.csv time: wanted evenly spaced samples, got uneven ones"):
+        only(tmp_path / "gap.csv")
+
+
 def test_a_table_names_its_columns_and_may_hold_the_time(tmp_path):
     rows = np.stack([TIMES, RING, np.cos(TIMES)], axis=1)
     np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="time,Force,acceleration", comments="")

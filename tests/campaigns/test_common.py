@@ -1,0 +1,58 @@
+"""What is left over on all boards alike: how often chance is called clear of zero, and what is done next."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesplate.campaigns.claim import SharedClaim
+from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero
+from bayesplate.campaigns.diagnosis import next_step, pooled_rms
+
+N_MODES, N_CAMPAIGNS = 12, 400
+
+
+def noise(rng, n_boards, offset=0.0):
+    """Residuals of every mode of boards that have nothing in common but what is added to the first mode."""
+    scale = rng.uniform(3.0, 8.0, n_boards)
+    common = {}
+    for mode in range(N_MODES):
+        residuals = scale * rng.standard_normal(n_boards) + (offset if mode == 0 else 0.0)
+        common[f"({mode},0)"] = _pooled({f"board {i}": (residuals[i], scale[i]) for i in range(n_boards)})
+    return common
+
+
+@pytest.mark.parametrize("n_boards", [2, 3, 6])
+def test_chance_is_seldom_called_clear_of_zero(n_boards):
+    """In one campaign of twenty at most; two errors for each mode call it so in many: the negative control."""
+    rng = np.random.default_rng(n_boards)
+    campaigns = [noise(rng, n_boards) for _ in range(N_CAMPAIGNS)]
+    found = np.mean([bool(clear_of_zero(one)) for one in campaigns])
+    each = np.mean([any(abs(m.mean_cents) > 2.0 * m.error_cents for m in one.values()) for one in campaigns])
+
+    assert found < CLEAR + 3.0 * np.sqrt(CLEAR / N_CAMPAIGNS)
+    assert each > 0.15
+
+
+def test_what_all_boards_have_is_clear_of_zero():
+    common = noise(np.random.default_rng(1), 6, offset=30.0)
+
+    assert clear_of_zero(common) == ["(0,0)"]
+    assert next_step(common, None, 6).startswith("modes (0,0) are off alike on all boards")
+    assert next_step(noise(np.random.default_rng(1), 6), None, 6) == ""
+
+
+@pytest.mark.parametrize(
+    ("refused", "told"),
+    [
+        (("a",), "measure a again, or take it out of the campaign: it does not want what the others share"),
+        (("a", "b"), "measure a and b again, or take them out of the campaign: they do not want what the others share"),
+        (("a", "b", "c"), "measure a, b and c again: no two of them agree on what they share"),
+    ],
+)
+def test_boards_that_refuse_are_to_be_measured_again(refused, told):
+    assert next_step({}, SharedClaim(1.0, 1.0, refused, 0, holds=False), 3) == told
+
+
+def test_pooled_errors_count_every_mode_once():
+    assert pooled_rms({"a": 3.0, "b": 6.0}, {"a": 3, "b": 1}) == pytest.approx(np.sqrt((27.0 + 36.0) / 4.0))
