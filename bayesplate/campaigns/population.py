@@ -6,6 +6,10 @@ with a mean m and a covariance C once the prior that it was fitted under is divi
 
     m of a board ~ N(mean, C + sd^2),        its constants given the population ~ N((C^-1 + sd^-2)^-1 ..).
 
+What all boards share moves the constants of all of them together, so that more boards do not average it out: m is then
+that given the shared numbers, linear in them, and how far these are off their mean is sampled too. Numbers that scatter
+between boards are taken to be each board's own.
+
 References
 ----------
 A. Gelman, Prior distributions for variance parameters in hierarchical models, Bayesian Analysis 1 (2006). [half-normal]
@@ -14,7 +18,7 @@ A. Gelman, Prior distributions for variance parameters in hierarchical models, B
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,27 +41,46 @@ _CONSTANTS = len(MODULI)
 
 @dataclass(frozen=True, eq=False)
 class BoardConstants:
-    """What one board says of its constants: a normal likelihood of ln E_x, ln E_y, ln G_xy (Pa).
+    """What one board says of its constants: a normal likelihood of ln E_x, ln E_y, ln G_xy (Pa), given what is shared.
 
     Attributes
     ----------
     name : str
     mean : (3,) array
     covariance : (3, 3) array
+        Where the shared numbers are known.
+    slopes : (3, n_shared) array
+        What the mean does with the standard coordinates of the shared numbers that all boards have the same.
     """
 
     name: str
     mean: Floats
     covariance: Floats
+    slopes: Floats = field(default_factory=lambda: np.zeros((_CONSTANTS, 0)))
 
     @classmethod
-    def of(cls, inference: Inference, draws: Draws) -> BoardConstants:
-        """From the posterior of a board, the prior of its constants divided out."""
+    def of(cls, inference: Inference, draws: Draws, shared: Floats | None = None) -> BoardConstants:
+        """From the posterior of a board, the prior of its constants divided out.
+
+        Parameters
+        ----------
+        inference : Inference
+        draws : Draws
+        shared : (n_draws, n_shared) array, optional
+            Standard coordinates of the shared numbers at the draws.
+        """
+        name = inference.problem.board.name
         logs = np.column_stack([np.log(draws.moduli[name]).ravel() for name in MODULI])
         log_prior = inference.problem.posterior.log_prior_constants(draws.flat)
         weights = np.exp(log_prior.min() - log_prior)
         mean = np.average(logs, axis=0, weights=weights)
-        return cls(inference.problem.board.name, mean, np.cov(logs.T, aweights=weights))
+        n = 0 if shared is None else shared.shape[1]
+        if shared is None or not n:
+            return cls(name, mean, np.cov(logs.T, aweights=weights))
+        both = np.cov(np.column_stack([logs, shared]).T, aweights=weights)
+        across, of_shared = both[:_CONSTANTS, _CONSTANTS:], both[_CONSTANTS:, _CONSTANTS:]
+        slopes = np.linalg.solve(of_shared, across.T).T
+        return cls(name, mean, both[:_CONSTANTS, :_CONSTANTS] - slopes @ across.T, slopes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +91,17 @@ class Population:
     ----------
     boards : tuple of BoardConstants
     chains : Chains
-        Of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations.
+        Of mean of ln E_x, ln E_y, ln G_xy, then ln of their standard deviations, then how far the shared numbers are
+        off their mean.
     convergence : Convergence
+    common : (n_shared, n_shared) array
+        Covariance of the standard coordinates of the shared numbers, from all boards.
     """
 
     boards: tuple[BoardConstants, ...]
     chains: Chains
     convergence: Convergence
+    common: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def means(self) -> Floats:
@@ -84,7 +111,7 @@ class Population:
     @property
     def sds(self) -> Floats:
         """Draws of the standard deviation of ln E: (n_draws, 3) array."""
-        return np.exp(self.chains.pooled[:, _CONSTANTS:])
+        return np.exp(self.chains.pooled[:, _CONSTANTS : 2 * _CONSTANTS])
 
     def next_board(self, rng: np.random.Generator) -> Floats:
         """Draws of ln E_x, ln E_y, ln G_xy of a board that was not measured yet: (n_draws, 3) array."""
@@ -95,14 +122,17 @@ class Population:
         one = self.boards[board]
         own = np.linalg.inv(one.covariance)
         precision = own + _diagonal(self.sds**-2.0)
-        lean = own @ one.mean + self.means * self.sds**-2.0
+        mean = one.mean + self.chains.pooled[:, 2 * _CONSTANTS :] @ _factor(self.common).T @ one.slopes.T
+        lean = mean @ own + self.means * self.sds**-2.0
         middle = np.linalg.solve(precision, lean[:, :, None])
         factor = np.swapaxes(np.linalg.cholesky(precision), 1, 2)
         normal = rng.standard_normal((*lean.shape, 1))
         return np.asarray((middle + np.linalg.solve(factor, normal))[:, :, 0])
 
 
-def find_population(boards: Sequence[BoardConstants], prior: PriorCard, settings: SamplerSettings) -> Population:
+def find_population(
+    boards: Sequence[BoardConstants], prior: PriorCard, settings: SamplerSettings, common: Floats | None = None
+) -> Population:
     """Sample mean and standard deviation of the constants of all boards of such a kind.
 
     Parameters
@@ -112,11 +142,17 @@ def find_population(boards: Sequence[BoardConstants], prior: PriorCard, settings
         Of E_x, E_y, G_xy. Its medians and factors are believed of the mean; the standard deviation of ln E is
         half-normal on the scale of the factor.
     settings : SamplerSettings
+    common : (n_shared, n_shared) array, optional
+        Covariance of the standard coordinates of what all boards share, which is off by the same on all of them: the
+        mean of many boards does not average it out.
 
     Returns
     -------
     Population
     """
+    common = np.zeros((0, 0)) if common is None else common
+    away = np.array([one.slopes @ _factor(common) for one in boards])
+    n_shared = len(common)
     middle, width = _believed(prior)
     seen = np.array([one.mean for one in boards])
     covariances = np.array([one.covariance for one in boards])
@@ -124,21 +160,28 @@ def find_population(boards: Sequence[BoardConstants], prior: PriorCard, settings
     spread = np.sqrt(np.maximum(seen.var(axis=0, ddof=1) - own, 0.0) + (0.1 * width) ** 2)
 
     def log_posterior(theta: Floats) -> Floats:
-        means, log_sds = theta[:, :_CONSTANTS], theta[:, _CONSTANTS:]
+        means, log_sds, off = np.split(theta, [_CONSTANTS, 2 * _CONSTANTS], axis=1)
         sds = np.exp(np.clip(log_sds, np.log(_STEADY), None))
         total = -0.5 * (((means - middle) / width) ** 2 + (sds / width) ** 2).sum(axis=1) + log_sds.sum(axis=1)
+        total -= 0.5 * (off**2).sum(axis=1)
+        there = seen[None] + np.einsum("bck,nk->nbc", away, off)
         factors = np.linalg.cholesky(covariances[None] + _diagonal(sds**2)[:, None])
-        left = np.linalg.solve(factors, (seen[None] - means[:, None])[..., None])[..., 0]
+        left = np.linalg.solve(factors, (there - means[:, None])[..., None])[..., 0]
         total -= 0.5 * (left**2).sum(axis=(1, 2))
         total -= np.log(np.diagonal(factors, axis1=2, axis2=3)).sum(axis=(1, 2))
         return np.where((log_sds < np.log(_STEADY)).any(axis=1), -np.inf, total)
 
     n = len(boards)
-    centre = np.concatenate([seen.mean(axis=0), np.log(spread)])
-    variance = np.concatenate([spread**2 / n, np.full(_CONSTANTS, 0.5 / n)])
+    centre = np.concatenate([seen.mean(axis=0), np.log(spread), np.zeros(n_shared)])
+    covariance = np.diag(np.concatenate([spread**2 / n, np.full(_CONSTANTS, 0.5 / n), np.ones(n_shared)]))
+    along = away.mean(axis=0)  # the mean goes with what the shared numbers are off by
+    covariance[:_CONSTANTS, :_CONSTANTS] += along @ along.T
+    covariance[:_CONSTANTS, 2 * _CONSTANTS :] = along
+    covariance[2 * _CONSTANTS :, :_CONSTANTS] = along.T
     names = [f"{what} of ln {name}" for what in ("mean", "ln sd") for name in MODULI]
-    chains, convergence = sample(log_posterior, centre, np.diag(variance), settings, names=names)
-    return Population(tuple(boards), chains, convergence)
+    names += [f"shared number {i}" for i in range(n_shared)]
+    chains, convergence = sample(log_posterior, centre, covariance, settings, names=names)
+    return Population(tuple(boards), chains, convergence, common)
 
 
 def require_moduli(prior: PriorCard, place: str) -> None:
@@ -171,6 +214,11 @@ def _believed(prior: PriorCard) -> tuple[Floats, Floats]:
     constants: Mapping[str, Quantity] = prior.constants
     middle = np.array([np.log(constants[name].median) for name in MODULI])
     return middle, np.array([constants[name].log_sd for name in MODULI])
+
+
+def _factor(covariance: Floats) -> Floats:
+    """Of a covariance that may be of nothing."""
+    return np.asarray(np.linalg.cholesky(covariance)) if len(covariance) else covariance
 
 
 def _diagonal(values: Floats) -> Floats:

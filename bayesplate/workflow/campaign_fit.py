@@ -142,7 +142,7 @@ def summed_up(
     seed: int,
 ) -> CampaignFitResult:
     """The result of boards that are fitted, with the population of their constants where they share one."""
-    population = _population(campaign, boards, seed)
+    population = _population(campaign, boards, learnt, seed)
     summary = _summary(campaign, boards, learnt, population, warnings, seed)
     return CampaignFitResult(None, campaign, summary, boards, alone, learnt, population)
 
@@ -169,11 +169,18 @@ def _together(
     return learnt, boards, learning_warnings(learnt, effective)
 
 
-def _population(campaign: Campaign, boards: Mapping[str, Fitted], seed: int) -> Population | None:
+def _population(
+    campaign: Campaign, boards: Mapping[str, Fitted], learnt: Learnt | None, seed: int
+) -> Population | None:
     if campaign.population is None:
         return None
-    constants = [BoardConstants.of(one.inference, one.draws) for one in boards.values()]
-    population = find_population(constants, campaign.population, SamplerSettings(seed=seed))
+    same = [i for i, one in enumerate(campaign.shared) if not one.scatter]
+    common, z = np.zeros((0, 0)), dict.fromkeys(boards)
+    if learnt is not None and same:
+        common = learnt.together.moments()[1][np.ix_(same, same)]
+        z = {one.name: one.given.z_of(boards[one.name].draws.flat)[:, same] for one in learnt.members}
+    constants = [BoardConstants.of(one.inference, one.draws, z[name]) for name, one in boards.items()]
+    population = find_population(constants, campaign.population, SamplerSettings(seed=seed), common)
     if not population.convergence.passed:
         _refuse("the population of the boards' constants", population.convergence)
     return population

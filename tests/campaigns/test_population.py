@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -55,6 +57,25 @@ def test_means_and_widths_are_covered_at_the_stated_rate():
 
     low, high = binom.ppf([0.0005, 0.9995], len(hits), 0.9)
     assert low <= sum(hits) <= high
+
+
+def test_what_all_boards_are_off_by_alike_does_not_average_out():
+    """90 % intervals of the means of 8 populations whose boards share an error; without it they miss."""
+    slopes, width = np.array([[0.5], [-0.6], [0.4]]), 0.4
+    hits = {"common": [], "own": []}
+    for seed in range(8):
+        rng = np.random.default_rng(300 + seed)
+        off = slopes[:, 0] * width * rng.standard_normal()
+        boards = [one for _, one in boards_of(rng, 12, sd=0.5 * SD)]
+        common = [replace(one, mean=one.mean - off, slopes=slopes) for one in boards]
+        own = [replace(one, slopes=slopes[:, :0]) for one in common]
+        for kind, some, covariance in (("common", common, width**2 * np.eye(1)), ("own", own, None)):
+            found = find_population(some, load_prior("spruce"), SamplerSettings(seed=seed), covariance)
+            low, high = np.quantile(found.means, [0.05, 0.95], axis=0)
+            hits[kind] += list((low <= MEAN) & (high >= MEAN))
+
+    assert sum(hits["common"]) >= binom.ppf(0.0005, 8, 0.9) * 3  # three constants of one population go together
+    assert sum(hits["own"]) < sum(hits["common"]) - 6
 
 
 def test_pooling_draws_a_poorly_measured_board_to_the_others():
