@@ -159,7 +159,7 @@ class Together:
         """ln of the density of a board's own numbers as all boards but some teach them, not normalised.
 
         Where they scatter, of a mixture of Student distributions that is fitted to draws of them: what is unknown of
-        the scatter gives it tails.
+        the scatter gives it tails. Farther out than any of the draws it is zero.
         """
         if len(self.coordinates) == len(self.shared):
             return lambda z: self.log_density(z, without)
@@ -169,7 +169,14 @@ class Together:
             mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
             draws = np.concatenate([draws, mirrored])
         mixture = Proposal.fitted(np.random.default_rng(_LINE).permutation(draws))
-        return lambda z: np.where((z >= bounds).all(axis=1), mixture.log_density(z), -np.inf)
+        (whole,) = Proposal.one_fitted(draws).parts
+        reach = whole.squared_distances(draws).max()
+
+        def log_density(z: Floats) -> Floats:
+            inside = (z >= bounds).all(axis=1) & (whole.squared_distances(z) <= reach)
+            return np.where(inside, mixture.log_density(z), -np.inf)
+
+        return log_density
 
     @property
     def _lower_bounds(self) -> Floats:

@@ -98,6 +98,11 @@ def test_numbers_that_scatter_are_those_of_a_joint_run(fitted_campaign):
         _, draws, effective = learnt.board(i, np.random.default_rng(0), 1)
         z = member.given.z_of(draws.flat)[:, 0]
         assert max(in_errors(z, reference[:, 2 + i], min(effective, both))) < 4.0
+        _, draws, effective = learnt.board(i, np.random.default_rng(0), 1, is_left_out=True)
+        mean, covariance = learnt.together.taught((i,))
+        z = member.given.z_of(draws.flat)[:, 0]
+        assert abs(z.mean() - mean[0]) < 4.0 * np.sqrt(covariance[0, 0] / effective)
+        assert z.std() == pytest.approx(np.sqrt(covariance[0, 0]), rel=4.0 / np.sqrt(effective))
     same = fitted_campaign.learnt.chains.pooled[:, 0]
     assert max(in_errors(same, reference[:, 0], both)) > 4.0
 

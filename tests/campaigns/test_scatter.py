@@ -178,6 +178,7 @@ def test_what_is_taught_keeps_the_bounds_of_a_number_that_does_not_scatter():
     draws = together.taught_draws(rng, 20_000)[:, 1]
 
     assert (log_density[z[:, 1] < 0.0] == -np.inf).all()
+    assert (log_taught(np.array([[50.0, 1.0], [1.0, 50.0]])) == -np.inf).all()  # no draw is as far out
     for end in (0.2, 0.5, 1.0):
         share = density[z[inside, 1] < end].sum() / density.sum()
         assert share == pytest.approx((draws < end).mean(), rel=0.15)
