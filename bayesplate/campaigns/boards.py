@@ -178,6 +178,24 @@ class Member:
         log_evidence = self._log_evidence(log_reference, theta, z, normalised(log_weights), seed)
         return Sample(theta, z, log_weights, n_independent, log_reference, log_evidence, every)
 
+    def moved(self, drawn: Sample, z: Floats, rng: np.random.Generator) -> Sample:
+        """Draws of a sample taken to other shared parameters, its own parameters going along linearly.
+
+        Parameters
+        ----------
+        drawn : Sample
+        z : (n, n_shared) array
+            Standard coordinates to go to.
+        rng : numpy.random.Generator
+        """
+        own = self.given.own_columns
+        _, covariance = moments(np.column_stack([drawn.theta[:, own], drawn.z]), drawn.weights)
+        slopes = covariance[: own.size, own.size :] @ np.linalg.inv(covariance[own.size :, own.size :])
+        picked = resampled(drawn.weights, len(z), rng)
+        theta = self.given.theta(drawn.theta[picked][:, own] + (z - drawn.z[picked]) @ slopes.T, z)
+        every = tuple(self.given.posterior.every_log_frequency(theta))
+        return Sample(theta, z, np.zeros(len(z)), float(len(z)), drawn.log_reference, np.nan, every)
+
     def _log_evidence(self, log_reference: LogDensity, theta: Floats, z: Floats, weights: Floats, seed: int) -> float:
         """ln of the integral of r(z) L(z), from weighted draws of that density."""
         rng = np.random.default_rng([seed, _LINE, 1])

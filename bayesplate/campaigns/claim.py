@@ -103,7 +103,7 @@ def taught_boards(learnt: Learnt, before: Mapping[str, Member], seed: int) -> di
     for i, one in enumerate(left_out(together)):
         rng = np.random.default_rng([seed, _LINE, i])
         without = before[one.name]
-        _, draws, _ = learnt.board(i, rng, seed, is_left_out=True)
+        _, draws = learnt.board_left_out(i, rng, seed)
         taught = values_of(together.shared, together.taught_draws(rng, _N_DRAWS, (i,)))
         found[one.name] = TaughtBoard(
             log_score_gain=one.log_score - without.alone.log_evidence,

@@ -50,10 +50,8 @@ class Learnt:
         """How far each board's draws are off the likelihood that they gave: see `_astray`; (n_boards,) array."""
         return np.array([_astray(self.together, i, one) for i, one in enumerate(self.samples)])
 
-    def board(
-        self, index: int, rng: np.random.Generator, seed: int, *, is_left_out: bool = False
-    ) -> tuple[Inference, Draws, float]:
-        """A board's posterior under what all boards, or all others, teach of the shared parameters.
+    def board(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Inference, Draws, float]:
+        """A board's posterior under what all boards teach of the shared parameters.
 
         Its draws, weighted by what the other boards say of theirs; where too few are left, it is walked anew.
 
@@ -64,8 +62,6 @@ class Learnt:
         rng : numpy.random.Generator
         seed : int
             Of the predictive draws.
-        is_left_out : bool
-            Whether the others alone teach the shared parameters; its constants are its own in any case.
 
         Returns
         -------
@@ -74,18 +70,22 @@ class Learnt:
         effective : float
             How many independent draws the result rests on.
         """
-        together, member, drawn = self.together, self.members[index], self.samples[index]
-        own = together.likelihoods[index]
-
-        log_taught = together.log_taught((index,))
-
-        def log_reference(z: Floats) -> Floats:
-            return np.asarray(log_taught(z) - own.at(z)) if is_left_out else log_taught(z)
-
-        aim = together.taught((index,)) if is_left_out else together.under_all(index)
-        drawn = _drawn(member, drawn, log_reference, aim, seed)
+        together, member = self.together, self.members[index]
+        log_reference = together.log_taught((index,))
+        drawn = _drawn(member, self.samples[index], log_reference, together.under_all(index), seed)
         weights = drawn.weights_under(log_reference)
         return *member.posterior_of(drawn, weights, rng, seed), drawn.effective(weights)
+
+    def board_left_out(self, index: int, rng: np.random.Generator, seed: int) -> tuple[Inference, Draws]:
+        """A board with the shared parameters that the others alone teach, its constants its own; as of `board`.
+
+        Each of its draws goes to a value that the others teach, its own parameters with it as they go with the shared
+        ones over all of its draws.
+        """
+        member, drawn = self.members[index], self.samples[index]
+        taught = self.together.taught_draws(rng, member.draws.flat.shape[0], (index,))
+        moved = member.moved(drawn, taught, rng)
+        return member.posterior_of(moved, moved.weights, rng, seed)
 
 
 def learn(
