@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
 from bayesplate.planning.assembled import BAND, KNOWN_NOW, MOST_BENCHES, Bench, bench_of
-from bayesplate.planning.inputs_read import measurements
+from bayesplate.planning.inputs_read import WEIGHED_TO, measurements
 from bayesplate.planning.joint import BoardInJoint, Joint, board_in_joint, held_elsewhere
 from bayesplate.planning.plan import GainEntry, ProposalEntry, SequenceEntry
 from bayesplate.planning.proposals import CONSTANTS, FAINT, Costs
@@ -25,8 +25,6 @@ Floats = NDArray[np.float64]
 BEST = 3
 SHORT = 0.5
 """Of the length of a board that is cut for the purpose: what bends on a shorter wave gives way more in shear."""
-_WEIGHED_TO = 1e-5
-"""Standard deviation of a small mass on a laboratory's scale, kg."""
 _WITHOUT = ("thickness_profile", "outline_profile")
 _CUT = 2
 """Boards of which a shorter one is looked at."""
@@ -199,7 +197,7 @@ def _of_shared(joint: Joint, shared: Sequence[Shared], costs: Costs) -> Iterator
         if one.effect == "attached_mass" and not one.to:
             row = np.zeros((1, joint.starts[-1] + joint.n_shared))
             row[0, joint.starts[-1] + i] = 1.0
-            sd = _WEIGHED_TO / one.prior.median / max(one.prior.log_sd, 1e-12)
+            sd = WEIGHED_TO / one.prior.median / max(one.prior.log_sd, 1e-12)
             yield Reading("size", "", "", "Weigh what is attached to every board", costs.reading, (), row,
                           np.array([sd**2]))  # fmt: skip
 

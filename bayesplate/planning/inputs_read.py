@@ -26,7 +26,7 @@ GRID = ((0.125, 0.375, 0.625, 0.875), (0.2, 0.5, 0.8))
 FINER = 10.0
 """How many times finer another instrument reads."""
 _READABLE = ("length_x", "length_y", "thickness", "mass", "density")
-_WEIGHED_TO = 1e-5
+WEIGHED_TO = 1e-5
 """Standard deviation of a small mass on a laboratory's scale, kg."""
 
 
@@ -65,7 +65,7 @@ def measurements(board: Board) -> tuple[Measured, ...]:
 def _of(board: Board, parameter: Parameter) -> Iterator[Measured]:
     prior = parameter.prior
     if parameter.effect == "attached_mass" and parameter.is_of_effect:
-        yield Measured(parameter, "Weigh what is attached to the board", 1, _WEIGHED_TO)
+        yield Measured(parameter, "Weigh what is attached to the board", 1, WEIGHED_TO)
     if parameter.name not in _READABLE and not parameter.key.startswith("clamped_"):
         return
     words = _words(parameter)

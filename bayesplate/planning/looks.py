@@ -15,14 +15,12 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.tables import Table
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
-from bayesplate.planning.inputs_read import GRID
+from bayesplate.planning.inputs_read import GRID, WEIGHED_TO
 from bayesplate.plate.board import Board
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-_SCALE = 1e-5
-"""Standard deviation of a small mass on a laboratory's scale, kg."""
 _CALLIPER = 2e-5
 """Of a reading of the thickness at a place, m."""
 _UNEVEN = 0.005
@@ -63,7 +61,7 @@ def _of_taper(board: Board) -> float:
 
 
 LOOKS: dict[str, Look] = {
-    "attached_mass": Look("Weigh what is attached to the board", 1, lambda board: _SCALE, _has_unweighed),
+    "attached_mass": Look("Weigh what is attached to the board", 1, lambda board: WEIGHED_TO, _has_unweighed),
     "thickness_profile": Look(
         f"Read the thickness at {len(GRID[0]) * len(GRID[1])} places all over the board",
         len(GRID[0]) * len(GRID[1]),

@@ -71,6 +71,11 @@ CHECKS = (
         "The same six with transverse shear alone shared.",
     ),
     (
+        "spruce-half-tops-scatter",
+        "python examples/campaign.py spruce-half-tops-scatter --out docs/validation --results results/scatter",
+        "The same, each board's own shear differing from what they share by about 25 %.",
+    ),
+    (
         "campaigns",
         "make campaigns",
         "Simulated campaigns of eight boards with one sensor on all of them, on three, or on none: intervals of its "
