@@ -181,6 +181,8 @@ class Member:
     def moved(self, drawn: Sample, z: Floats, rng: np.random.Generator) -> Sample:
         """Draws of a sample taken to other shared parameters, its own parameters going along linearly.
 
+        Those that end where the model lacks a mode that was read have no weight.
+
         Parameters
         ----------
         drawn : Sample
@@ -193,8 +195,11 @@ class Member:
         slopes = covariance[: own.size, own.size :] @ np.linalg.inv(covariance[own.size :, own.size :])
         picked = resampled(drawn.weights, len(z), rng)
         theta = self.given.theta(drawn.theta[picked][:, own] + (z - drawn.z[picked]) @ slopes.T, z)
-        every = tuple(self.given.posterior.every_log_frequency(theta))
-        return Sample(theta, z, np.zeros(len(z)), float(len(z)), drawn.log_reference, np.nan, every)
+        posterior = self.given.posterior
+        every = tuple(posterior.every_log_frequency(theta))
+        is_possible = np.isfinite(posterior.log_likelihood_of(every, theta)).all(axis=1)
+        log_weights = np.where(is_possible, 0.0, -np.inf)
+        return Sample(theta, z, log_weights, float(len(z)), drawn.log_reference, np.nan, every)
 
     def _log_evidence(self, log_reference: LogDensity, theta: Floats, z: Floats, weights: Floats, seed: int) -> float:
         """ln of the integral of r(z) L(z), from weighted draws of that density."""

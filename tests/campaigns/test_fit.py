@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 import bayesplate
 from bayesplate.campaigns import learning
 from bayesplate.campaigns.boards import Member
-from bayesplate.campaigns.claim import judge, taught_boards
+from bayesplate.campaigns.claim import judge, rms_cents, taught_boards
 from bayesplate.campaigns.learning import learn
 from bayesplate.campaigns.scatter import scatters_of
 from bayesplate.cards import load_prior
@@ -183,6 +183,17 @@ def test_a_board_that_is_left_out_has_what_the_others_teach(fitted_campaign, sca
         slope = np.polyfit(member.given.z_of(member.draws.flat)[:, 0], np.log(alone), 1)[0]
         expected = np.log(alone).mean() + slope * (mean[0] - member.alone.z.mean())
         assert np.log(draws.moduli["E_x"]).mean() == pytest.approx(expected, abs=0.1 * np.log(alone).std())
+
+
+def test_a_draw_that_ends_where_there_is_no_plate_has_no_weight(fitted_campaign):
+    member, drawn = fitted_campaign.learnt.members[0], fitted_campaign.learnt.samples[0]
+    z = np.concatenate([[[100.0]], np.full((199, 1), drawn.z.mean())])
+    moved = member.moved(drawn, z, np.random.default_rng(0))
+    inference, draws = member.posterior_of(moved, moved.weights, np.random.default_rng(0), 1)
+
+    assert moved.weights[0] == 0.0
+    assert moved.weights[1:] == pytest.approx(1.0 / 199)
+    assert np.isfinite(rms_cents(inference, draws))
 
 
 def test_a_board_walked_anew_is_that_of_weights(fitted_campaign, monkeypatch):
