@@ -63,7 +63,8 @@ CHECKS = (
     (
         "spruce-half-tops",
         "python examples/campaign.py --out docs/validation --results results/spruce-half-tops",
-        "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it.",
+        "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it. This "
+        "run took the boards' readings of thickness and width for exact (`--effects none`); the two below do not.",
     ),
     (
         "spruce-half-tops-shear",
