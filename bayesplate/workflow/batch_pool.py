@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
@@ -17,6 +18,8 @@ from bayesplate.errors import Fault, InputError
 _AHEAD = 2
 """Boards that wait for each worker."""
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_STARTING = 0.2
+"""s; for which each new worker is busy, so that the next call starts another."""
 _PATIENCE = "20s"
 _PRELOADED = ("bayesplate.workflow.fit_board", "scipy.stats", "scipy.sparse.linalg", "emcee", "skfem")
 """What every fit imports, loaded once for all workers."""
@@ -65,6 +68,8 @@ def processes(n: int) -> Workers:
         try:
             with ProcessPoolExecutor(n, mp_context=_context(), initializer=_begin) as executor:
                 try:
+                    # All start before any computes: a worker that dies while another starts leaves the pool waiting.
+                    wait([executor.submit(time.sleep, _STARTING) for _ in range(n)])
                     yield executor
                 except BaseException:
                     executor.shutdown(wait=False, cancel_futures=True)
