@@ -178,7 +178,7 @@ class Member:
         log_evidence = self._log_evidence(log_reference, theta, z, normalised(log_weights), seed)
         return Sample(theta, z, log_weights, n_independent, log_reference, log_evidence, every)
 
-    def moved(self, drawn: Sample, z: Floats, rng: np.random.Generator) -> Sample:
+    def moved(self, drawn: Sample, log_density: LogDensity, z: Floats, rng: np.random.Generator) -> Sample:
         """Draws of a sample taken to other shared parameters, its own parameters going along linearly.
 
         Those that end where the model lacks a mode that was read have no weight.
@@ -186,20 +186,22 @@ class Member:
         Parameters
         ----------
         drawn : Sample
+        log_density : callable
+            ln of the density that the others are drawn from.
         z : (n, n_shared) array
             Standard coordinates to go to.
         rng : numpy.random.Generator
         """
         own = self.given.own_columns
         _, covariance = moments(np.column_stack([drawn.theta[:, own], drawn.z]), drawn.weights)
-        slopes = covariance[: own.size, own.size :] @ np.linalg.inv(covariance[own.size :, own.size :])
+        slopes = _slopes(covariance, z.shape[1])[: own.size]
         picked = resampled(drawn.weights, len(z), rng)
         theta = self.given.theta(drawn.theta[picked][:, own] + (z - drawn.z[picked]) @ slopes.T, z)
         posterior = self.given.posterior
         every = tuple(posterior.every_log_frequency(theta))
         is_possible = np.isfinite(posterior.log_likelihood_of(every, theta)).all(axis=1)
         log_weights = np.where(is_possible, 0.0, -np.inf)
-        return Sample(theta, z, log_weights, float(len(z)), drawn.log_reference, np.nan, every)
+        return Sample(theta, z, log_weights, drawn.effective(drawn.weights), log_density, np.nan, every)
 
     def _log_evidence(self, log_reference: LogDensity, theta: Floats, z: Floats, weights: Floats, seed: int) -> float:
         """ln of the integral of r(z) L(z), from weighted draws of that density."""
@@ -252,10 +254,14 @@ def resampled(weights: Floats, n: int, rng: np.random.Generator) -> NDArray[np.i
     return np.asarray(rng.permutation(picked), dtype=np.intp)
 
 
+def _slopes(covariance: Floats, n_last: int) -> Floats:
+    """What every column does with the last ones, linearly: (n_columns, n_last) array."""
+    return np.asarray(covariance[:, -n_last:] @ np.linalg.inv(covariance[-n_last:, -n_last:]))
+
+
 def _moved(x: Floats, weights: Floats, aim: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Mean and covariance of draws whose last columns are brought to others, all being normal."""
     mean, covariance = moments(x, weights)
-    shared = slice(x.shape[1] - aim[0].size, None)
-    slopes = covariance[:, shared] @ np.linalg.inv(covariance[shared, shared])
+    shared, slopes = slice(x.shape[1] - aim[0].size, None), _slopes(covariance, aim[0].size)
     change = aim[1] - covariance[shared, shared]
     return mean + slopes @ (aim[0] - mean[shared]), covariance + slopes @ change @ slopes.T

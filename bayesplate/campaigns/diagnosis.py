@@ -170,7 +170,7 @@ def next_step(common: Mapping[str, CommonResidual], conditions: SharedClaim | No
     if conditions is not None and conditions.refused_by:
         boards, is_one = joined(conditions.refused_by), len(conditions.refused_by) == 1
         if len(conditions.refused_by) == n_boards:
-            return f"measure {boards} again: no two of them agree on what they share"
+            return f"measure {boards} again: they do not agree on what they share"
         they, do = ("it", "does") if is_one else ("they", "do")
         out = "it" if is_one else "them"
         return f"measure {boards} again, or take {out} out of the campaign: {they} {do} not want what the others share"

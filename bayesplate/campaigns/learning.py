@@ -84,7 +84,7 @@ class Learnt:
         """
         member, drawn = self.members[index], self.samples[index]
         taught = self.together.taught_draws(rng, member.draws.flat.shape[0], (index,))
-        moved = member.moved(drawn, taught, rng)
+        moved = member.moved(drawn, self.together.log_taught((index,)), taught, rng)
         return member.posterior_of(moved, moved.weights, rng, seed)
 
 

@@ -74,9 +74,7 @@ class BoardConstants:
         log_prior = inference.problem.posterior.log_prior_constants(draws.flat)
         weights = np.exp(log_prior.min() - log_prior)
         mean = np.average(logs, axis=0, weights=weights)
-        n = 0 if shared is None else shared.shape[1]
-        if shared is None or not n:
-            return cls(name, mean, np.cov(logs.T, aweights=weights))
+        shared = np.empty((len(logs), 0)) if shared is None else shared
         both = np.cov(np.column_stack([logs, shared]).T, aweights=weights)
         across, of_shared = both[:_CONSTANTS, _CONSTANTS:], both[_CONSTANTS:, _CONSTANTS:]
         slopes = np.linalg.solve(of_shared, across.T).T
@@ -122,7 +120,7 @@ class Population:
         one = self.boards[board]
         own = np.linalg.inv(one.covariance)
         precision = own + _diagonal(self.sds**-2.0)
-        mean = one.mean + self.chains.pooled[:, 2 * _CONSTANTS :] @ _factor(self.common).T @ one.slopes.T
+        mean = one.mean + self.chains.pooled[:, 2 * _CONSTANTS :] @ np.linalg.cholesky(self.common).T @ one.slopes.T
         lean = mean @ own + self.means * self.sds**-2.0
         middle = np.linalg.solve(precision, lean[:, :, None])
         factor = np.swapaxes(np.linalg.cholesky(precision), 1, 2)
@@ -151,7 +149,7 @@ def find_population(
     Population
     """
     common = np.zeros((0, 0)) if common is None else common
-    away = np.array([one.slopes @ _factor(common) for one in boards])
+    away = np.array([one.slopes @ np.linalg.cholesky(common) for one in boards])
     n_shared = len(common)
     middle, width = _believed(prior)
     seen = np.array([one.mean for one in boards])
@@ -214,11 +212,6 @@ def _believed(prior: PriorCard) -> tuple[Floats, Floats]:
     constants: Mapping[str, Quantity] = prior.constants
     middle = np.array([np.log(constants[name].median) for name in MODULI])
     return middle, np.array([constants[name].log_sd for name in MODULI])
-
-
-def _factor(covariance: Floats) -> Floats:
-    """Of a covariance that may be of nothing."""
-    return np.asarray(np.linalg.cholesky(covariance)) if len(covariance) else covariance
 
 
 def _diagonal(values: Floats) -> Floats:

@@ -44,7 +44,7 @@ class Pull:
             Under which they are the posterior's; by default z is standard normal before.
         """
         mean, covariance = moments(z, weights)
-        before = np.array([_of_prior(one) for one in priors] or [(0.0, 1.0)] * mean.size)
+        before = np.array([moments_before(one) for one in priors] or [(0.0, 1.0)] * mean.size)
         after = np.linalg.inv(covariance)
         gained, directions = np.linalg.eigh(after - np.diag(1.0 / before[:, 1]))
         told = (directions * np.maximum(gained, 0.0)) @ directions.T
@@ -63,7 +63,7 @@ class Pull:
         return Pull(np.asarray(weaker @ self.precision), np.asarray(weaker @ self.lean))
 
 
-def _of_prior(prior: Quantity) -> tuple[float, float]:
+def moments_before(prior: Quantity) -> tuple[float, float]:
     """Mean and variance of a standard coordinate before any reading, its bounds kept."""
     from scipy.stats import truncnorm
 

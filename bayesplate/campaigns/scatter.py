@@ -34,8 +34,6 @@ Floats = NDArray[np.float64]
 _NODES = {1: 9, 2: 7, 3: 5}
 """Along each direction, by the number of directions."""
 _ROWS_AT_ONCE = 4096
-_MEDIAN = 0.6745
-"""Of a half-normal number of unit scale."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,8 @@ def widths(shared: Sequence[Shared], hyper: Floats) -> Floats:
 
 def expected_width(shared: Sequence[Shared]) -> Floats:
     """What `widths` gives at the median of each scatter before any board: (n_shared,) array."""
-    return np.array([_MEDIAN * one.scatter / one.prior.log_sd if one.scatter else 0.0 for one in shared])
+    medians = np.array([[*np.zeros(len(shared)), *(one.prior.standard_quantile(0.5) for one in scatters_of(shared))]])
+    return np.asarray(widths(shared, medians)[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.campaigns.likelihood import Likelihood, LogDensity, moments, spread_points
-from bayesplate.campaigns.pulls import Pull, normal_posterior
+from bayesplate.campaigns.pulls import Pull, moments_before, normal_posterior
 from bayesplate.campaigns.scatter import Scatter, ScatteredLikelihood, expected_width, scatters_of, widths
 from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
@@ -31,8 +31,6 @@ _WIDER = 1.6
 _ROUNDS = 12
 _HALVINGS = 30
 _N_FITTED = 4096
-_HALF_NORMAL = (float(np.sqrt(2.0 / np.pi)), 1.0 - 2.0 / np.pi)
-"""Mean and variance of the standard coordinate of a scatter before any board."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +69,9 @@ class Together:
     ) -> Together:
         """Boards together, their points around all that they, or all but one of them, find likely."""
         weaker = [one.scattered(expected_width(shared)) for one in pulls]
-        n = len(scatters_of(shared))
+        scatters = scatters_of(shared)
         spread = _around(
-            [_beside(*normal_posterior([weaker[i] for i in kept]), n) for kept in _leaving_one(len(pulls))]
+            [_beside(*normal_posterior([weaker[i] for i in kept]), scatters) for kept in _leaving_one(len(pulls))]
         )
         found = cls(tuple(shared), tuple(names), tuple(likelihoods), tuple(pulls), *spread)
         for _ in range(_ROUNDS):
@@ -130,10 +128,6 @@ class Together:
     def fewest_points(self) -> float:
         """Points of equal weight that the sums rest on, from all boards or all but one."""
         return min(effective_draws(self.weights(without)) for without in self.left_out)
-
-    def draws(self, rng: np.random.Generator, n: int, without: Collection[int] = ()) -> Floats:
-        """Standard coordinates drawn from the posterior of all boards but some: (n, n_coordinates) array."""
-        return self.points[rng.choice(len(self.points), size=n, p=self.weights(without))]
 
     @cached_property
     def _of_a_board(self) -> Floats:
@@ -233,12 +227,12 @@ def _leaving_one(n: int) -> Iterator[list[int]]:
         yield [i for i in range(n) if i != left]
 
 
-def _beside(mean: Floats, covariance: Floats, n: int) -> tuple[Floats, Floats]:
-    """Moments of the numbers with those of n scatters beside them, of which no board said anything yet."""
+def _beside(mean: Floats, covariance: Floats, scatters: Sequence[Scatter]) -> tuple[Floats, Floats]:
+    """Moments of the numbers with those of scatters beside them, of which no board said anything yet."""
     from scipy.linalg import block_diag
 
-    middle, variance = _HALF_NORMAL
-    return np.r_[mean, np.full(n, middle)], block_diag(covariance, variance * np.eye(n))
+    before = [moments_before(one.prior) for one in scatters]
+    return np.r_[mean, [middle for middle, _ in before]], block_diag(covariance, *(variance for _, variance in before))
 
 
 def _around(every: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:

@@ -200,12 +200,9 @@ def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
 
 def shareable(campaign: Campaign) -> tuple[str, ...]:
     """Effects that all boards may have, of one size each, and that boards of one rig, day or species may have alike."""
-    found = []
-    for name, effect in EFFECTS.items():
-        can_act = effect.is_of_campaign and all(name in forms(one.prepared.board) for one in campaign.problems)
-        if can_act and _has_one_size(campaign, name):
-            found.append(name)
-    return tuple(found)
+    can_act = set.intersection(*(set(forms(one.prepared.board)) for one in campaign.problems))
+    able = [name for name, effect in EFFECTS.items() if effect.is_of_campaign and name in can_act]
+    return tuple(name for name in able if _has_one_size(campaign, name))
 
 
 def _has_one_size(campaign: Campaign, effect: str) -> bool:

@@ -47,7 +47,7 @@ def test_what_all_boards_have_is_clear_of_zero():
     [
         (("a",), "measure a again, or take it out of the campaign: it does not want what the others share"),
         (("a", "b"), "measure a and b again, or take them out of the campaign: they do not want what the others share"),
-        (("a", "b", "c"), "measure a, b and c again: no two of them agree on what they share"),
+        (("a", "b", "c"), "measure a, b and c again: they do not agree on what they share"),
     ],
 )
 def test_boards_that_refuse_are_to_be_measured_again(refused, told):

@@ -188,7 +188,7 @@ def test_a_board_that_is_left_out_has_what_the_others_teach(fitted_campaign, sca
 def test_a_draw_that_ends_where_there_is_no_plate_has_no_weight(fitted_campaign):
     member, drawn = fitted_campaign.learnt.members[0], fitted_campaign.learnt.samples[0]
     z = np.concatenate([[[100.0]], np.full((199, 1), drawn.z.mean())])
-    moved = member.moved(drawn, z, np.random.default_rng(0))
+    moved = member.moved(drawn, member.log_prior, z, np.random.default_rng(0))
     inference, draws = member.posterior_of(moved, moved.weights, np.random.default_rng(0), 1)
 
     assert moved.weights[0] == 0.0

@@ -148,6 +148,7 @@ def test_middle_and_scatter_are_those_of_a_fine_grid():
 
 
 def test_what_is_taught_has_a_density_with_its_moments():
+    """Within a tenth of an sd, two errors of a mean of 500 points: the fewest that it may rest on."""
     boards, _ = scattered_boards(np.random.default_rng(9), 6, 2, 0.6)
     one, other = numbers(2)
     together = together_of(boards, (one, replace(other, scatter=0.0)))
@@ -165,7 +166,7 @@ def test_what_is_taught_has_a_density_with_its_moments():
 
 
 def test_what_is_taught_keeps_the_bounds_of_a_number_that_does_not_scatter():
-    """Close to a bound as everywhere: against the boards' own draws, of which a tenth lie within a tenth of an sd."""
+    """Close to a bound as everywhere: shares of the draws, within two errors of those of 500 points."""
     scattering, other = numbers(2)
     bounded = replace(other, scatter=0.0, prior=Quantity.from_mean(0.0, 1.0, "normal", lower=0.0))
     boards, _ = scattered_boards(np.random.default_rng(2), 4, 2, 0.5, z_true=0.05, sd=2.0)

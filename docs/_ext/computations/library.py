@@ -11,6 +11,8 @@ import numpy as np
 
 import bayesplate
 from bayesplate import errors
+from bayesplate.campaigns import diagnosis as of_campaigns
+from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
 from bayesplate.cards.shelf import card_names
 from bayesplate.diagnosis.decision.claim import IMPROBABLE, STANDARD_ERRORS
 from bayesplate.diagnosis.decision.verdict import AT_LIMIT, CLEARLY, WITHIN
@@ -228,6 +230,14 @@ def gate(folder: Path) -> str:
     return words_table(("number", "limit"), rows)
 
 
+_WAYS = {
+    "none": "nothing is lacking",
+    "shared": "an effect alike on all boards",
+    "one board": "an effect on one board",
+    "own": "an effect of another size on each board",
+}
+
+
 def verdict_limits(folder: Path) -> str:
     """The numbers in the rules of the verdict."""
     rows = [
@@ -251,6 +261,16 @@ def verdict_limits(folder: Path) -> str:
         ("a claim: probability of no effect, at its largest, below", f"{IMPROBABLE:g}"),
     ]
     return words_table(("rule", "number"), rows)
+
+
+def campaign_limits(folder: Path) -> str:
+    """The limits of what a search of a campaign says, and what is believed before."""
+    rows = [
+        ("least probability that nothing is lacking, for *none needed*", f"{of_campaigns.IMPROBABLE:g}"),
+        ("how many times as probable as the next, for *named*", f"{of_campaigns.CLEARLY:g}"),
+        *((f"probability before: {words}", f"{WAYS_BEFORE[way]:g}") for way, words in _WAYS.items()),
+    ]
+    return words_table(("limit", "value"), rows)
 
 
 def long_checks(folder: Path) -> str:
