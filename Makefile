@@ -18,10 +18,10 @@ fit: $(VENV)/installed
 test: $(VENV)/tested-with
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 slow: $(VENV)/tested-with
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m slow
 
 docs: $(VENV)/tested-with
 	$(BIN)/python -m sphinx -W --keep-going -n -b html docs docs/_build/html

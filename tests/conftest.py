@@ -8,14 +8,25 @@ import pytest
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy is imported
     os.environ.setdefault(name, "1")
 
-ROOT = Path(__file__).parent
-TOGETHER = ("campaigns",)
+TOGETHER = ("tests/campaigns",)
 """Folders whose files share what takes long to make."""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of one file, or of one folder where files share what takes long, go to one worker."""
-    for item in items:
-        path = item.path.relative_to(ROOT)
-        group = path.parts[0] if path.parts[0] in TOGETHER else str(path)
-        item.add_marker(pytest.mark.xdist_group(group))
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Tests of one file, or of one folder where files share what takes long, go to one worker.
+
+    `--dist loadgroup` with a mark for each test would do, but since pytest 9.2 it ignores the marks (pytest-xdist
+    issue 1386).
+    """
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class ByFileOrFolder(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            folder = Path(file).parent.as_posix()
+            return folder if folder in TOGETHER else file
+
+    return ByFileOrFolder(config, log)
