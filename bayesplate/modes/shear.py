@@ -20,6 +20,8 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.hermite import end_products, even_and_odd, kept_unknowns, products, slopes_as_values
 from bayesplate.modes.line import Line, line
@@ -245,17 +247,19 @@ def _functions(side: Line, parity: int) -> tuple[Any, Any, Any]:
 
 def _energy(fields: Fields, first: Strain, second: Strain, measure: Measure) -> Any:
     """Integral of the product of two strains or motions, on all unknowns of a class."""
-    from scipy.sparse import block_array, coo_array
+    from scipy.sparse import csc_array
 
-    sizes = {field: fields[field][0].along_x.shape[1] * fields[field][0].along_y.shape[1] for field in _UNKNOWNS}
-    parts = {(r, c): coo_array((sizes[r], sizes[c])) for r in _UNKNOWNS for c in _UNKNOWNS}
+    sizes = [fields[field][0].along_x.shape[1] * fields[field][0].along_y.shape[1] for field in _UNKNOWNS]
+    starts = dict(zip(_UNKNOWNS, np.cumsum([0, *sizes]), strict=False))
+    values, rows, columns = [], [], []
     for s in first:
         for t in second:
+            pairs = [(along_x[s.along_x, t.along_x], along_y[s.along_y, t.along_y]) for along_x, along_y in measure]
             for a in fields[s.field]:
                 for b in fields[t.field]:
-                    pairs = [
-                        (along_x[s.along_x, t.along_x], along_y[s.along_y, t.along_y]) for along_x, along_y in measure
-                    ]
-                    whole = sum_of_krons(pairs, (a.along_x, b.along_x), (a.along_y, b.along_y))
-                    parts[a.unknowns, b.unknowns] += s.factor * t.factor * whole
-    return block_array([[parts[r, c] for c in _UNKNOWNS] for r in _UNKNOWNS])
+                    part = sum_of_krons(pairs, (a.along_x, b.along_x), (a.along_y, b.along_y))
+                    values.append(s.factor * t.factor * part.data)
+                    rows.append(starts[a.unknowns] + part.row)
+                    columns.append(starts[b.unknowns] + part.col)
+    at = np.concatenate(rows), np.concatenate(columns)
+    return csc_array((np.concatenate(values), at), shape=(sum(sizes), sum(sizes)))

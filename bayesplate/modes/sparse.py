@@ -41,15 +41,11 @@ def sum_of_krons(pairs: Sequence[tuple[Any, Any]], onto_x: tuple[Any, Any], onto
     Returns
     -------
     sparse array
+        By coordinates, none of them twice.
     """
-    from scipy.sparse import coo_array, kron
+    from scipy.sparse import coo_array
 
-    if len(pairs) == 1:
-        along_x, along_y = (
-            left.T @ matrix @ right for matrix, (left, right) in zip(pairs[0], (onto_x, onto_y), strict=True)
-        )
-        return kron(along_x, along_y)
-    # Many small matrices: with all of one side on one pattern the sum is one product of their stored values.
+    # Small matrices: with all of one side on one pattern the sum is one product of their stored values.
     first, rows_x, columns_x = _stored_together([pair[0] for pair in pairs], *onto_x)
     second, rows_y, columns_y = _stored_together([pair[1] for pair in pairs], *onto_y)
     n_rows, n_columns = (matrix.shape[1] for matrix in onto_y)

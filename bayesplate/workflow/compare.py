@@ -141,7 +141,7 @@ def compare(
         board = prepared[0].board
         for setup in board.setups:
             named_table(board.name, setup)
-    problems = [pose(one.board, one.prior, law="exact", robust=given.robust) for one in prepared]
+    problems = [pose(one.board, one.prior, robust=given.robust).under("exact") for one in prepared]
     systems = [paper_system(problem.board, problem.estimate, coefficients) for problem in problems]
     theories: list[TheoryRow] = []
     sampled: dict[str, tuple[Inference, Draws]] = {}

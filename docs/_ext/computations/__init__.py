@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from computations.keys import keys_of
 from computations.left_out import pareto, pareto_told
 from computations.library import (
+    campaign_limits,
     default_noise,
     effects_listed,
     exit_codes,
@@ -29,6 +31,7 @@ from computations.sight import cosines, designs, leverages, rounding, visible_pa
 
 __all__ = [
     "both_laws",
+    "campaign_limits",
     "convergence",
     "cosines",
     "default_noise",
@@ -38,6 +41,7 @@ __all__ = [
     "exit_codes",
     "files_of",
     "gate",
+    "keys_of",
     "leverages",
     "long_checks",
     "paper_table",
