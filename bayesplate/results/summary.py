@@ -162,12 +162,16 @@ class Summary(Run):
         Parameters of the declared effects by board or setup, effect and name.
     noise : dict of Spread
         Relative, by setup.
-    inputs, derived : dict of Spread
-        Uncertain inputs of the card, and what makers derive from the constants, by name.
+    inputs : dict of Spread
+        Uncertain inputs of the card, by name.
+    derived : dict of Spread
+        What makers derive from the constants, by name.
     joint : Joint
         How the constants and the density vary together.
-    least_squares, weighted_least_squares : PointEstimate
-        The paper's, and that of relative errors.
+    least_squares : PointEstimate
+        The paper's.
+    weighted_least_squares : PointEstimate
+        That of relative errors.
     percentile : Percentile or None
         None where there are too many modes, or no estimate is positive.
     linear_means, exact_means : LawMeans
