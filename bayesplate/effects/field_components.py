@@ -160,7 +160,7 @@ def _weighted_energies(ends: Ends, part: Part, highest: int) -> tuple[Floats, Fl
         factor = legendre(degree, part.on_whole(at))
         integrals = assembled(element_products(side.nodes, at, weights * factor))
         for order in range(3):
-            matrix = integrals[order, order][side.kept][:, side.kept]
+            matrix = integrals[order, order][np.ix_(side.kept, side.kept)]
             found[order, degree] = np.einsum("ib,ib->b", beams, matrix @ beams)
     whole = found[:, 0].copy()
     whole[whole < _HELD] = np.nan

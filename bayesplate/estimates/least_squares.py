@@ -6,7 +6,7 @@ least-squares estimate of the exact frequencies; the sensitivities come with eac
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ _LONGEST_STEP = 0.7
 _CONVERGED = 1e-8
 _SMALL = 1e-5
 """A hundredth of a cent; steps below it that no longer shrink are rounding errors of the eigen-solves."""
+_BACK = 0.05
+"""Of the longest step in between: steps that come back as near to where they were before go round for ever."""
 _PULL = 1e-3
 
 
@@ -90,14 +92,15 @@ def weighted_least_squares(
     Returns
     -------
     Estimate
-        `converged` is False where the steps did not settle, as at a veering whose names swap back and forth. A
-        direction that the readings do not determine keeps its starting value.
+        `converged` is False where the steps did not settle. Where they go round, as at a veering whose names swap back
+        and forth, it is the best of the round. A direction that the readings do not determine keeps its starting value.
     """
     inputs = board.nominal()
     systems = [system_of(board, setup) for setup in board.setups]
     log_next = np.log(starting_rigidities(board) if start is None else start)
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
+    tried: list[Estimate] = []
     for _ in range(most_steps):
         rigidities = np.exp(log_next)
         values = inputs | dict(zip(RIGIDITIES, rigidities, strict=True))
@@ -105,8 +108,11 @@ def weighted_least_squares(
         predicted = np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         sensitivities = np.concatenate([m.sensitivities(values) for m in models])
         residuals = target - predicted
+        tried.append(Estimate(rigidities, values, models, sensitivities, residuals, scales, settled))
         if settled:
             break
+        if of_round := _round(tried):
+            return min(of_round, key=lambda one: float(np.sum((one.residuals / scales) ** 2)))
         step = np.linalg.lstsq(sensitivities / scales[:, None], residuals / scales, rcond=1e-8)[0]
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
         while not _is_material(log_next + step, inputs) and np.abs(step).max() > _CONVERGED:
@@ -114,7 +120,17 @@ def weighted_least_squares(
         log_next = log_next + step
         size = float(np.abs(step).max())
         settled, previous = has_settled(size, previous, accepted), size
-    return Estimate(rigidities, values, models, sensitivities, residuals, scales, settled)
+    return tried[-1]
+
+
+def _round(tried: Sequence[Estimate]) -> Sequence[Estimate]:
+    """The last estimates, if the steps between them have come back to where they began; otherwise none."""
+    log_rigidities = np.log([one.rigidities for one in tried])
+    steps = np.abs(np.diff(log_rigidities, axis=0)).max(axis=1)
+    for first in range(len(tried) - 2):
+        if np.abs(log_rigidities[-1] - log_rigidities[first]).max() < _BACK * steps[first:].max():
+            return tried[first + 1 :]
+    return ()
 
 
 def _is_material(log_rigidities: NDArray[np.float64], inputs: Values) -> bool:

@@ -9,7 +9,8 @@ The unknowns of an element are value and slope at its start, value and slope at 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -18,9 +19,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-Products = Mapping[tuple[int, int], Any]
-"""Integrals of products of derivatives over a line, by the orders (i, j) of the two, from 0 to 2: sparse matrices whose
-row is the function that is differentiated i times, whose column the one that is differentiated j times."""
+Products = Mapping[tuple[int, int], Floats]
+"""Integrals of products of derivatives over a line, by the orders (i, j) of the two, from 0 to 2: matrices whose row is
+the function that is differentiated i times, whose column the one that is differentiated j times."""
 
 ORDERS = tuple((i, j) for i in range(3) for j in range(3))
 
@@ -104,27 +105,51 @@ def uniform_products(lengths: Floats) -> Floats:
     return np.asarray(unit * lengths[:, None, None, None] ** powers)
 
 
-def assembled(local: Floats) -> Products:
-    """Element matrices (n_elements, 9, 4, 4) summed into sparse matrices on the functions of the free line."""
-    from scipy.sparse import csr_array
+@dataclass(frozen=True, eq=False)
+class LineProducts(Products):
+    """Integrals on the functions of the free line, of which the entries within elements are kept.
 
-    columns, starts, stored_at = _line_pattern(len(local))
-    shape = (starts.size - 1, starts.size - 1)
-    return {
-        orders: csr_array((np.bincount(stored_at, local[:, k].ravel()), columns, starts), shape=shape)
-        for k, orders in enumerate(ORDERS)
-    }
+    Attributes
+    ----------
+    n_elements : int
+    stored : (9, n_stored) array
+        By the orders of the two derivatives as in `ORDERS`.
+    """
+
+    n_elements: int
+    stored: Floats
+
+    def __getitem__(self, orders: tuple[int, int]) -> Floats:
+        """The matrix of two orders, (n_unknowns, n_unknowns)."""
+        n = 2 * (self.n_elements + 1)
+        matrix = np.zeros(n * n)
+        matrix[_line_pattern(self.n_elements)[0]] = self.stored[ORDERS.index(orders)]
+        return matrix.reshape(n, n)
+
+    def __iter__(self) -> Iterator[tuple[int, int]]:
+        return iter(ORDERS)
+
+    def __len__(self) -> int:
+        return len(ORDERS)
+
+    def times(self, share: float) -> LineProducts:
+        """So many times as much of each."""
+        return LineProducts(self.n_elements, share * self.stored)
+
+
+def assembled(local: Floats) -> LineProducts:
+    """Element matrices (n_elements, 9, 4, 4) summed on the functions of the free line."""
+    stored_at = _line_pattern(len(local))[1]
+    return LineProducts(len(local), np.stack([np.bincount(stored_at, local[:, k].ravel()) for k in range(len(ORDERS))]))
 
 
 @lru_cache(maxsize=32)
-def _line_pattern(n_elements: int) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.intp]]:
-    """Columns and starts of rows of the matrices of a line, and where each entry of its element matrices is stored."""
+def _line_pattern(n_elements: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places of a line's matrices that hold anything, and which of these each entry of its element matrices has."""
     unknowns = 2 * np.arange(n_elements)[:, None] + np.arange(4)
-    n = 2 * (n_elements + 1)
-    places = (np.repeat(unknowns, 4, axis=1) * n + np.tile(unknowns, 4)).ravel()
+    places = (np.repeat(unknowns, 4, axis=1) * 2 * (n_elements + 1) + np.tile(unknowns, 4)).ravel()
     kept, stored_at = np.unique(places, return_inverse=True)
-    starts = np.searchsorted(kept // n, np.arange(n + 1))
-    return (kept % n).astype(np.int32), starts.astype(np.int32), stored_at
+    return kept, stored_at
 
 
 def function_values(nodes: Floats, points: Floats) -> Any:

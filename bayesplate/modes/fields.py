@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.element import Products, assembled, element_products, gauss_points
+from bayesplate.modes.element import LineProducts, assembled, element_products, gauss_points
 from bayesplate.modes.hermite import products
 from bayesplate.modes.line import Line
 
@@ -49,7 +49,7 @@ class EdgeStrip:
 Group = Literal["along", "bending", "shear", "mass", "rotary"]
 """Terms of a plate that take the same field; "along" is the bending that the modulus along the grain resists."""
 
-Measure = tuple[tuple[Products, Products], ...]
+Measure = tuple[tuple[LineProducts, LineProducts], ...]
 """Integrals along x and along y by orders of derivatives, on the functions of the free lines; summed over the pairs."""
 
 Nodes = tuple[float, ...]
@@ -100,8 +100,8 @@ class Fabric:
             inside = _inside(*nodes, factor, self.outline)
             if not ghost:
                 return inside
-            return (*((_times(1.0 - ghost, along_x), along_y) for along_x, along_y in inside),
-                    (_times(ghost, uniform[0]), uniform[1]))  # fmt: skip
+            rest = uniform[0].times(ghost), uniform[1]
+            return (*((along_x.times(1.0 - ghost), along_y) for along_x, along_y in inside), rest)
         return (uniform,) if factor is None else _over_rectangle(*nodes, factor)
 
     def _strip(self, strip: EdgeStrip, nodes_x: Nodes, nodes_y: Nodes) -> Measure:
@@ -109,7 +109,7 @@ class Fabric:
             raise ValueError("fields: wanted an outline that a strip lies along, got none")
         both = ((1.0, self.outline), (-1.0, strip.inner))
         inside = ((sign, _inside(nodes_x, nodes_y, strip.field, outline)) for sign, outline in both)
-        return tuple((_times(sign, along_x), along_y) for sign, measure in inside for along_x, along_y in measure)
+        return tuple((along_x.times(sign), along_y) for sign, measure in inside for along_x, along_y in measure)
 
 
 UNIFORM = Fabric()
@@ -133,10 +133,6 @@ def layout(groups: Sequence[Group], counts: Mapping[Group, int]) -> list[tuple[i
     """
     most = max(counts[group] for group in groups)
     return [(term, k) for k in range(most) for term, group in enumerate(groups) if k < counts[group]]
-
-
-def _times(share: float, integrals: Products) -> Products:
-    return {orders: share * matrix for orders, matrix in integrals.items()}
 
 
 @lru_cache(maxsize=_N_KEPT)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.element import Products, assembled, uniform_products
+from bayesplate.modes.element import LineProducts, Products, assembled, uniform_products
 from bayesplate.plate.setup import Ends
 
 Hold = Literal["clamped", "supported", "guided", "free"]
@@ -23,7 +23,7 @@ _LAYER = (1 / 4, 1 / 16)
 
 
 @lru_cache(maxsize=64)
-def products(nodes: tuple[float, ...]) -> Products:
+def products(nodes: tuple[float, ...]) -> LineProducts:
     """Integrals of products of derivatives over the free line.
 
     Parameters
@@ -33,8 +33,8 @@ def products(nodes: tuple[float, ...]) -> Products:
 
     Returns
     -------
-    dict of (n_unknowns, n_unknowns) sparse array
-        By the orders of the two derivatives.
+    LineProducts
+        (n_unknowns, n_unknowns) arrays by the orders of the two derivatives.
     """
     return assembled(uniform_products(np.diff(nodes)))
 
@@ -137,15 +137,11 @@ def end_products(n_elements: int, at: tuple[bool, bool]) -> Products:
 
     Returns
     -------
-    dict of (n_unknowns, n_unknowns) sparse array
+    dict of (n_unknowns, n_unknowns) array
         By (i, j).
     """
-    from scipy.sparse import csr_array
-
     nodes = np.array([0, n_elements])[list(at)]
-    shape = (2 * (n_elements + 1),) * 2
-    return {
-        (i, j): csr_array((np.ones(nodes.size), (2 * nodes + i, 2 * nodes + j)), shape=shape)
-        for i in range(2)
-        for j in range(2)
-    }
+    found = {(i, j): np.zeros((2 * (n_elements + 1),) * 2) for i in range(2) for j in range(2)}
+    for (i, j), matrix in found.items():
+        matrix[2 * nodes + i, 2 * nodes + j] = 1.0
+    return found

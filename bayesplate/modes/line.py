@@ -43,7 +43,7 @@ class Line:
         Where the elements meet, from 0 to 1, mirrored about the middle where both ends are alike.
     kept : (n_dof,) array of int
         Which unknowns of the free line these are; see `bayesplate.modes.hermite`.
-    mass, slope, bending, mixed : (n_dof, n_dof) sparse array
+    mass, slope, bending, mixed : (n_dof, n_dof) array
         Integrals of u v, u' v', u'' v'' and of u v'' (row: the second derivative).
     parts : tuple of (n_dof, n_part) sparse array
         Orthonormal bases of the even and the odd functions where both ends are alike, otherwise the identity alone.
@@ -57,10 +57,10 @@ class Line:
     held: Holds
     nodes: NDArray[np.float64]
     kept: NDArray[np.intp]
-    mass: Any
-    slope: Any
-    bending: Any
-    mixed: Any
+    mass: NDArray[np.float64]
+    slope: NDArray[np.float64]
+    bending: NDArray[np.float64]
+    mixed: NDArray[np.float64]
     parts: tuple[Any, ...]
 
     @property
@@ -84,7 +84,7 @@ class Line:
         from scipy.linalg import eigh
 
         bent = np.flatnonzero(np.isin(self.kept, kept_unknowns(self.ends, self.n_elements)))
-        bending, mass = (matrix[bent][:, bent].toarray() for matrix in (self.bending, self.mass))
+        bending, mass = (matrix[np.ix_(bent, bent)] for matrix in (self.bending, self.mass))
         vectors = np.zeros((self.n_dof, min(N_BEAMS, bent.size)))
         vectors[bent] = eigh(bending, mass, subset_by_index=[0, vectors.shape[1] - 1])[1]
         return self._without_rigid_mixing(vectors)
@@ -122,9 +122,9 @@ class Line:
         one = np.tile([1.0, 0.0], self.nodes.size)
         return np.asarray(products(tuple(self.nodes))[0, 0][self.kept] @ one)
 
-    def at_ends(self, at: tuple[bool, bool], order: int) -> Any:
-        """Products of values (order 0) or slopes (1), summed over the ends asked for: (n_dof, n_dof) sparse array."""
-        return end_products(self.n_elements, at)[order, order][self.kept][:, self.kept]
+    def at_ends(self, at: tuple[bool, bool], order: int) -> NDArray[np.float64]:
+        """Products of values (order 0) or slopes (1), summed over the ends asked for: (n_dof, n_dof) array."""
+        return end_products(self.n_elements, at)[order, order][np.ix_(self.kept, self.kept)]
 
 
 def rigid_degrees(ends: Ends) -> tuple[int, ...]:
@@ -171,8 +171,8 @@ def line(
     nodes = graded_nodes(ends, n_elements) if is_sheared else np.linspace(0.0, 1.0, n_elements + 1)
     kept = kept_unknowns(values_held(held) if is_sheared else held, n_elements)
 
-    def integrals(i: int, j: int) -> Any:
-        return products(tuple(nodes))[i, j][kept][:, kept]
+    def integrals(i: int, j: int) -> NDArray[np.float64]:
+        return products(tuple(nodes))[i, j][np.ix_(kept, kept)]
 
     return Line(
         ends=ends,

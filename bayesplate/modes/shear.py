@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bayesplate.modes.element import Products
 from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.hermite import end_products, even_and_odd, kept_unknowns, products, slopes_as_values
 from bayesplate.modes.line import Line, line
@@ -245,7 +246,7 @@ def _functions(side: Line, parity: int) -> tuple[Any, Any, Any]:
     return deflected, strained, value_from_slope @ deflected
 
 
-def _energy(fields: Fields, first: Strain, second: Strain, measure: Measure) -> Any:
+def _energy(fields: Fields, first: Strain, second: Strain, measure: Sequence[tuple[Products, Products]]) -> Any:
     """Integral of the product of two strains or motions, on all unknowns of a class."""
     from scipy.sparse import csc_array
 

@@ -33,8 +33,8 @@ def sum_of_krons(pairs: Sequence[tuple[Any, Any]], onto_x: tuple[Any, Any], onto
 
     Parameters
     ----------
-    pairs : sequence of (sparse array, sparse array)
-        All first ones and all second ones of one shape.
+    pairs : sequence of (array, array)
+        Sparse or not; all first ones and all second ones of one shape.
     onto_x, onto_y : (sparse array, sparse array)
         Functions of the rows and of the columns, as columns: of a pair (A, B) it takes left' A right and the same of B.
 
@@ -59,7 +59,8 @@ def _stored_together(
     matrices: Sequence[Any], left: Any, right: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
     """Values that are not zero in all of left' M right, (n_matrices, n_stored), with the row and column of each."""
-    dense = left.T.toarray() @ np.stack([matrix.toarray() for matrix in matrices]) @ right.toarray()
+    whole = [matrix if isinstance(matrix, np.ndarray) else matrix.toarray() for matrix in matrices]
+    dense = left.T.toarray() @ np.stack(whole) @ right.toarray()
     rows, columns = np.nonzero(dense.any(axis=0))
     return dense[:, rows, columns], rows, columns
 

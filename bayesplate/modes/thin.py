@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 
+import numpy as np
+
 from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.line import Line, line
 from bayesplate.modes.plate import (
@@ -105,10 +107,8 @@ def thin_masses(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ..
 
 def _integral(measure: Measure, x: Line, y: Line, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:
     """Integral of one derivative of the deflection (orders along x and y; rows) times another (columns)."""
-    return tuple(
-        (factor * along_x[a[0], b[0]][x.kept][:, x.kept], along_y[a[1], b[1]][y.kept][:, y.kept])
-        for along_x, along_y in measure
-    )
+    kept_x, kept_y = (np.ix_(side.kept, side.kept) for side in (x, y))
+    return tuple((factor * along_x[a[0], b[0]][kept_x], along_y[a[1], b[1]][kept_y]) for along_x, along_y in measure)
 
 
 def assemble(x: Line, y: Line, stiffness: Sequence[Term], masses: Sequence[KronSum]) -> PlateMatrices:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from bars import meets
 from made_boards import CANTILEVER_LABELS, FREE_LABELS, board_of, models_at, setup_of, with_noise
 from scipy.optimize import least_squares
 
+from bayesplate.estimates import least_squares as estimates
 from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
-from bayesplate.plate.material import moduli
+from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
@@ -114,6 +116,47 @@ def test_an_estimate_is_where_its_models_were_solved_settled_or_not(steps):
     predicted = model.log_frequencies(estimate.values, "linear")[0]
     # solved again at the same point; one step further would be off by a thousandth and more
     assert estimate.residuals == pytest.approx(log_measured(board) - predicted, abs=1e-12)
+
+
+class Jumping:
+    """A law of one step each but for a jump where D_x passes the start, and for one reading that is worse above it."""
+
+    def __init__(self, board, start):
+        self.target, self.start, self.solved = log_measured(board), start, []
+
+    def solve(self, system, values):
+        self.solved.append(np.log([float(values[name]) for name in RIGIDITIES]) - self.start)
+        return self
+
+    def log_frequencies(self, values, law):
+        x = self.solved[-1]
+        off = np.zeros(self.target.size)
+        off[:3] = x + np.array([0.03 if x[0] > 0.0 else -0.02, 0.0, 0.0])
+        off[3] = 0.1 if x[0] > 0.0 else 0.02
+        return self.target + off[None]
+
+    def sensitivities(self, values):
+        return np.eye(self.target.size, 3)
+
+
+def test_steps_that_go_round_end_at_the_best_of_the_round(monkeypatch):
+    board = prepare("finnish-spruce-cantilever").board
+    law = Jumping(board, np.log([200.0, 10.0, 20.0]))
+    monkeypatch.setattr(estimates, "setup_model", law.solve)
+    estimate = weighted_least_squares(board, start=np.exp(law.start))
+
+    assert len(law.solved) < 6
+    assert not estimate.converged
+    assert np.log(estimate.rigidities) - law.start == pytest.approx([-0.03, 0.0, 0.0], abs=1e-12)
+    assert estimate.residuals[3] == pytest.approx(-0.02)
+
+
+@pytest.mark.parametrize(("factor", "goes_round"), [(0.3, False), (-0.5, False), (-0.8, False), (-1.0, True)])
+def test_steps_that_shrink_do_not_go_round(factor, goes_round):
+    places = np.cumsum(0.1 * factor ** np.arange(8.0))
+    tried = [SimpleNamespace(rigidities=np.exp([place, 0.0, 0.0])) for place in places]
+    found = [bool(estimates._round(tried[:n])) for n in range(1, 9)]
+    assert found == [goes_round and n > 2 for n in range(1, 9)]
 
 
 @pytest.mark.slow
