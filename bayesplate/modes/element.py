@@ -81,6 +81,7 @@ def element_products(nodes: Floats, points: Floats, weights: Floats) -> Floats:
     ----------
     nodes : (n_elements + 1,) array
     points, weights : (..., n_elements, n_points) arrays
+        They broadcast: the functions are evaluated once for many weights.
 
     Returns
     -------

@@ -140,14 +140,10 @@ def _over_rectangle(nodes_x: Nodes, nodes_y: Nodes, factor: Field) -> Measure:
     """Integrals of a field: a sum of products, one for each singular value of the field that counts."""
     x, y = np.array(nodes_x), np.array(nodes_y)
     (at_x, ahead), (at_y, across) = (gauss_points(nodes[:-1], np.diff(nodes), _POINTS) for nodes in (x, y))
-    left, values, right = np.linalg.svd(factor(at_x.reshape(-1, 1), at_y.ravel()), full_matrices=False)
-    return tuple(
-        (
-            assembled(element_products(x, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
-            assembled(element_products(y, at_y, across * right[r].reshape(at_y.shape))),
-        )
-        for r in np.flatnonzero(values > _NEGLIGIBLE * values[0])
-    )
+    left, right = _products_of(factor(at_x.reshape(-1, 1), at_y.ravel()))
+    along_x = element_products(x, at_x, ahead * left.reshape(-1, *at_x.shape))
+    along_y = element_products(y, at_y, across * right.reshape(-1, *at_y.shape))
+    return tuple((assembled(one), assembled(other)) for one, other in zip(along_x, along_y, strict=True))
 
 
 @lru_cache(maxsize=_N_KEPT)
@@ -165,11 +161,15 @@ def _inside(nodes_x: Nodes, nodes_y: Nodes, factor: Field | None, outline: Outli
     # Every entry counts alike: what an outline leaves of a small element is small, and must not drown in rounding.
     scales = np.abs(local).max(axis=(0, 1))
     scales[scales == 0.0] = 1.0
-    left, values, right = np.linalg.svd((local / scales).reshape(at_x.size, -1), full_matrices=False)
-    return tuple(
-        (
-            assembled(element_products(x, at_x, ahead * (values[r] * left[:, r]).reshape(at_x.shape))),
-            assembled(scales * right[r].reshape(scales.shape)),
-        )
-        for r in np.flatnonzero(values > _NEGLIGIBLE * values[0])
-    )
+    left, right = _products_of((local / scales).reshape(at_x.size, -1))
+    along_x = element_products(x, at_x, ahead * left.reshape(-1, *at_x.shape))
+    along_y = scales * right.reshape(-1, *scales.shape)
+    return tuple((assembled(one), assembled(other)) for one, other in zip(along_x, along_y, strict=True))
+
+
+def _products_of(matrix: Floats) -> tuple[Floats, Floats]:
+    """A matrix as a sum of products of a column and a row, as many as singular values count: both a row for each."""
+    # The columns are those of the triangle alone, which is small where there are many more points across than along.
+    columns, values, _ = np.linalg.svd(np.asarray(np.linalg.qr(matrix.T, mode="r")).T, full_matrices=False)
+    left = columns[:, values > _NEGLIGIBLE * values[0]].T
+    return left, left @ matrix
