@@ -28,10 +28,11 @@ def quickly() -> None:
     from bayesplate.diagnosis.evidence.joint import full_search
     from bayesplate.posterior.convergence import Gate
     from bayesplate.posterior.sampling import SamplerSettings
-    from bayesplate.workflow import diagnose, fitting
+    from bayesplate.workflow import compare, diagnose, fitting
 
     loose = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
-    fitting.SamplerSettings = partial(SamplerSettings, gate=loose)  # type: ignore[assignment,misc]
+    for workflow in (compare, fitting):
+        workflow.SamplerSettings = partial(SamplerSettings, gate=loose)  # type: ignore[attr-defined]
     diagnose.full_search = partial(full_search, tried=TRIED)  # type: ignore[assignment]
 
 

@@ -22,7 +22,8 @@ from bayesplate.plate.setup import Setup
 
 MOST_STEPS = 40
 _LONGEST_STEP = 0.7
-_CONVERGED = 1e-8
+_CONVERGED = 1e-7
+"""Of ln D: a frequency is then off by less than a ten-thousandth of a cent."""
 _SMALL = 1e-5
 """A hundredth of a cent; steps below it that no longer shrink are rounding errors of the eigen-solves."""
 _BACK = 0.05

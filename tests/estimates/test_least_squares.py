@@ -96,7 +96,7 @@ def test_a_reading_s_own_uncertainty_weighs_it():
         (1e-6, 4e-7, True),
         (1e-6, 1.5e-6, False),  # shrinking slowly
         (1e-6, 1e-3, True),  # a thousandth of it remains
-        (1e-6, 1e-5, False),
+        (2e-6, 1e-5, False),  # a fifth of it remains
         (1e-3, 1e-3, False),  # two solutions that swap
         (1e-6, np.inf, False),
     ],
