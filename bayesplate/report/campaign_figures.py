@@ -81,6 +81,8 @@ def shared_picture(summary: CampaignSummary, name: str) -> Picture:
         "Each board by itself, and below it what all the others say. A board whose bar stands clear of the others' "
         "does not want their value."
     )
+    if one.scatter is not None:
+        caption += " Boards differ here: the grey band is where their median lies, not each of them."
     stem = "".join(letter if letter.isalnum() else "-" for letter in name)
     return Picture(f"shared-{stem}", title, alt, caption, figure)
 

@@ -12,9 +12,12 @@ from read_pages import Read, faults
 import bayesplate
 from bayesplate.campaigns.claim import SharedClaim, TaughtBoard
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, PooledErrors, claim_sentence
+from bayesplate.campaigns.tables import shared_table
 from bayesplate.errors import InputError
 from bayesplate.report import campaign_page as home
+from bayesplate.report.campaign_figures import shared_picture
 from bayesplate.report.campaign_page import write_campaign_report
+from bayesplate.results.contract import Spread
 from bayesplate.workflow.shown import show_diagnosis, show_fit
 
 PLACES = ("diagnosis", "shared", "boards", "common")
@@ -135,3 +138,18 @@ def test_a_campaign_that_shares_nothing_is_boards_side_by_side(card, tmp_path, c
     assert set(found.summary.boards) == {"board-1", "board-2"}
     with pytest.raises(InputError, match="nothing shared"):
         found.to_arviz()
+
+
+def test_where_boards_differ_the_page_says_by_how_much_and_what_the_band_is(fitted_campaign):
+    """And nothing of it where they do not."""
+    summary, name = fitted_campaign.summary, "attached_mass.mass"
+    differing = replace(summary.shared[name], scatter=Spread(0.16, 0.12, 0.01, 0.06, 0.14, 0.23, 0.4, "1"))
+    summaries = {"alike": summary, "differing": replace(summary, shared={name: differing})}
+    captions = {which: shared_picture(one, name).caption for which, one in summaries.items()}
+    tables = {which: str(shared_table(one.shared).rows) for which, one in summaries.items()}
+
+    assert "the grey band is where their median lies" in captions["differing"]
+    assert "median" not in captions["alike"]
+    assert "16 ± 12" in tables["differing"]
+    assert "The boards' own differ from it by 16 ± 12 %." in home.sentences(summaries["differing"])
+    assert "scatter" not in tables["alike"]
