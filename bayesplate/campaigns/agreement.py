@@ -9,8 +9,10 @@ import numpy as np
 
 from bayesplate.campaigns.together import Together
 
-_NOISE = 0.05
-"""Slopes of a log likelihood below that may come from the draws that gave it."""
+_SAYS = 0.25
+"""Precision, in units of the prior's, above which a board says something of a direction: its posterior is then
+narrower by a tenth at least. A likelihood with a slope and no curvature moves a posterior and leaves it as wide; the
+variance of its slope would be taken for zero, and a lean of one standard deviation for a refusal."""
 REFUSED = 0.05
 """p-value, multiplied by the number of boards, below which a board refuses what the others teach."""
 
@@ -64,7 +66,7 @@ def p_value(together: Together, board: int, without: Collection[int] = ()) -> fl
 
     The board's own posterior, its prior divided out, amounts to a normal likelihood exp(h'z - z'Pz / 2). If the board
     is one of the others' kind, who teach its numbers with the mean m and the covariance C, its slope h - P m there is
-    normal about zero with the covariance P + P C P; directions of which the board says nothing add nothing.
+    normal about zero with the covariance P + P C P. Only directions count of which the board says something.
 
     References
     ----------
@@ -75,11 +77,10 @@ def p_value(together: Together, board: int, without: Collection[int] = ()) -> fl
 
     mean, covariance = together.taught((board, *without))
     pull = together.pulls[board]
-    slope = pull.lean - pull.precision @ mean
-    spread = pull.precision + pull.precision @ covariance @ pull.precision
-    sizes, directions = np.linalg.eigh(spread)
-    told = sizes > _NOISE**2 * max(float(sizes.max()), 1.0)
-    if not told.any():
+    sizes, directions = np.linalg.eigh(pull.precision)
+    told = directions[:, sizes > _SAYS]
+    if not told.size:
         return 1.0
-    along = directions[:, told].T @ slope
-    return float(chi2.sf(along @ (along / sizes[told]), int(told.sum())))
+    slope = told.T @ (pull.lean - pull.precision @ mean)
+    spread = told.T @ (pull.precision + pull.precision @ covariance @ pull.precision) @ told
+    return float(chi2.sf(slope @ np.linalg.solve(spread, slope), told.shape[1]))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from linear_boards import exactly_together, linear_boards, log_evidence
 
 from bayesplate.campaigns.agreement import left_out, p_value, refusing
@@ -52,6 +55,25 @@ def test_a_board_that_says_nothing_of_a_number_that_cannot_be_negative_has_no_pu
     assert abs(silent.precision[0, 0]) < 0.05
     assert abs(silent.lean[0]) < 0.05
     assert mistaken.precision[0, 0] > 1.5  # the negative control: its prior taken for a normal one
+
+
+def leaning(size, seed=4, n=4000):
+    """A board whose likelihood rises with the first number without a bend, and tells the second well: its pull."""
+    rng = np.random.default_rng(seed)
+    draws = rng.standard_normal((n, 2)) * np.array([0.98, 0.5]) + np.array([size, 0.2])
+    return Pull.of_draws(draws, np.full(n, 1.0 / n))
+
+
+@pytest.mark.parametrize("size", [-1.0, 0.5, 1.0])
+def test_a_board_that_only_leans_does_not_refuse(size):
+    """Its posterior moves by as much as one of the prior's sds and stays as wide."""
+    pull = leaning(size)
+    others = SimpleNamespace(pulls=[pull], taught=lambda without: (np.zeros(2), 0.1 * np.eye(2)))
+
+    assert np.linalg.eigvalsh(pull.precision)[0] < 0.1  # which its lean would be divided by
+    assert p_value(others, 0) > 0.3
+    others.pulls[0] = Pull(30.0 * np.eye(2), 30.0 * np.array([3.0 * size, 0.2]))  # control: off, and sure of it
+    assert p_value(others, 0) < 0.001
 
 
 def test_the_log_score_is_that_of_the_board_under_what_the_others_teach():
