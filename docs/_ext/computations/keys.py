@@ -52,11 +52,11 @@ def _tables(kind: type, place: str, told: dict[type, str]) -> list[str]:
         if not meaning and len(held) == 1:
             meaning = _sentence(held[0])
         rows.append((f"`{name}`", words + f", {unit}" * bool(unit), meaning))
-        parts += [(part, key) for part in new]
+        parts += [(part, key, _sentence(part) if len(held) > 1 else "") for part in new]
     n_told = 3 if any(meaning for *_, meaning in rows) else 2
     lines = [words_table(("key", "holds", "meaning")[:n_told], [row[:n_told] for row in rows])]
-    for part, key in parts:
-        lines += [f"`{key}`\n", *_tables(part, f"{key}.", told)]
+    for part, key, which in parts:
+        lines += [f"`{key}`{': ' * bool(which)}{which}\n", *_tables(part, f"{key}.", told)]
     return lines
 
 

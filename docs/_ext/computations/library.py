@@ -270,7 +270,7 @@ def campaign_limits(folder: Path) -> str:
     rows = [
         ("least probability that nothing is lacking, for *none needed*", f"{of_campaigns.IMPROBABLE:g}"),
         ("how many times as probable as the next, for *named*", f"{of_campaigns.CLEARLY:g}"),
-        *((f"probability before: {words}", f"{WAYS_BEFORE[way]:g}") for way, words in _WAYS.items()),
+        *((f"probability before: {_WAYS[way]}", f"{before:g}") for way, before in WAYS_BEFORE.items()),
     ]
     return words_table(("limit", "value"), rows)
 
