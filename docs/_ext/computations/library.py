@@ -66,8 +66,8 @@ CHECKS = (
         "spruce-half-tops",
         "python examples/campaign.py --out docs/validation --results results/spruce-half-tops",
         "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it. The "
-        "p-values of this run and the two below are by an older rule, by which a board that only leans to one side of a "
-        "number could look as if it refused what the others teach. Now only directions count of which a board says "
+        "p-values of this run and the two below are by an older rule, by which a board that only leans to one side of "
+        "a number could look as if it refused what the others teach. Now only directions count of which a board says "
         "something; the runs were not made again, so that it is open whether a board refuses.",
     ),
     (
