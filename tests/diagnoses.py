@@ -74,6 +74,7 @@ CONDITIONS = (
     Condition("chance selection", 0.25, 0.75, True),
     Condition("log score", 1.25, 2.5, False),
     Condition("probability of none", 0.03, 0.05, True),
+    Condition("probability of another", 0.02, 0.05, True),
     Condition("prior predictive", 0.5, 0.05, True),
 )
 NEXT = "Weigh a second accelerometer onto the board and measure (1,0) again."

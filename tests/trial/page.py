@@ -184,16 +184,21 @@ def _amplitudes(summary: Mapping[str, Any]) -> Iterable[str]:
 
 def _claims(summary: Mapping[str, Any]) -> Iterable[str]:
     yield from ("", "## How often an effect is claimed to reduce the error, and each condition is met", "")
+    judged = [
+        condition
+        for condition in CONDITIONS
+        if all(condition in one["conditions"] for one in summary["claims"].values())
+    ]
     body = [
         (
             name,
             str(one["claimed"]["n"]),
             _percent(one["claimed"]),
-            *(_percent(one["conditions"][condition]) for condition in CONDITIONS),
+            *(_percent(one["conditions"][condition]) for condition in judged),
         )
         for name, one in summary["claims"].items()
     ]
-    yield from _table(("boards that are", "boards", "claimed", *CONDITIONS), body)
+    yield from _table(("boards that are", "boards", "claimed", *judged), body)
 
 
 def _percent(found: Mapping[str, Any] | None, key: str = "share") -> str:

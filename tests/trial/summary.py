@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from trial.bars import bars
@@ -31,9 +31,11 @@ from trial.counts import (
 )
 from trial.sizes import errors
 
+from bayesplate.diagnosis.decision.claim import ConditionName
+
 COLUMNS = ("named right", "named wrong", "group with it", "group without it", "none needed", "undetectable",
            "unexplained")  # fmt: skip
-CONDITIONS = ("chance selection", "log score", "probability of none", "prior predictive")
+CONDITIONS: tuple[str, ...] = get_args(ConditionName)
 """Of a claim, by the names that the package gives them."""
 MATRICES = ("one cantilever-6 5c 2x", "one cantilever-6-free-6 5c 2x")
 """Cells whose classes are shown one by one in full."""
@@ -149,6 +151,7 @@ def claims(cells: Sequence[Cell], by_cell: Mapping[str, Sequence[Record]]) -> di
             "conditions": {
                 one: share([r for r in records if r["conditions"]], lambda r, one=one: r["conditions"][one]).as_json()
                 for one in CONDITIONS
+                if all(one in record["conditions"] for record in records if record["conditions"])
             },
         }
         for name, records in groups.items()

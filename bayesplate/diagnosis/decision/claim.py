@@ -1,15 +1,15 @@
-"""The claim that an error is reduced: four conditions, each of which must be met."""
+"""The claim that an error is reduced: five conditions, each of which must be met."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.verdict import Verdict
+from bayesplate.diagnosis.decision.verdict import Verdict, answers
 from bayesplate.diagnosis.evidence.folds import Nested, log_score_gains, nested
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.predictive import PASSES
@@ -17,12 +17,14 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, varied
 
 Floats = NDArray[np.float64]
-ConditionName = Literal["chance selection", "log score", "probability of none", "prior predictive"]
+ConditionName = Literal[
+    "chance selection", "log score", "probability of none", "probability of another", "prior predictive"
+]
 
 STANDARD_ERRORS = 2.0
 """By how many of them the nested log score has to rise."""
 IMPROBABLE = 0.05
-"""What the probability of no effect has to stay below."""
+"""What the probability of no effect has to stay below, and that of one that is not told."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,9 @@ class Condition:
     name : str
         "chance selection": nested left-out error after over before, to be below that of 95 % of null simulations made
         to choose. "log score": nested gain, to exceed two standard errors. "probability of none": the largest over the
-        widths of the sizes' priors, to be below 0.05. "prior predictive": p-value with the effect, at least 0.05.
+        widths of the sizes' priors, to be below 0.05. "probability of another": that something else is lacking than
+        what the verdict tells, the largest over the same widths, to be below 0.05. "prior predictive": p-value with
+        the effect, at least 0.05.
     value, limit : float or None
         None where too few readings leave nothing to judge by.
     is_met : bool
@@ -65,7 +69,7 @@ class Claim:
 
 
 def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Nested | None = None) -> Claim:
-    """Judge the four conditions.
+    """Judge the five conditions.
 
     Parameters
     ----------
@@ -82,11 +86,14 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
     if not verdict.index:
         return Claim()
     folded = nested_of(found, control) if folded is None else folded
+    searches = [found, *(varied(found, width=factor) for factor in WIDTHS.values())]
+    told = {one.index for one in verdict.stands_for}
     return Claim(
         (
             _beyond_chance(folded, control),
             _better_score(found, folded),
-            _improbable(found),
+            _below("probability of none", [one.none for one in searches]),
+            _below("probability of another", [_another(one, told) for one in searches]),
             _passes(found.p_value(verdict.index)),
         )
     )
@@ -118,9 +125,14 @@ def _better_score(found: Found, folded: Nested | None) -> Condition:
     return Condition("log score", gain, STANDARD_ERRORS * error, gain > STANDARD_ERRORS * error)
 
 
-def _improbable(found: Found) -> Condition:
-    largest = max(found.none, *(varied(found, width=factor).none for factor in WIDTHS.values()))
-    return Condition("probability of none", largest, IMPROBABLE, largest < IMPROBABLE)
+def _below(name: ConditionName, probabilities: Sequence[float]) -> Condition:
+    largest = max(probabilities)
+    return Condition(name, largest, IMPROBABLE, largest < IMPROBABLE)
+
+
+def _another(found: Found, told: Container[int]) -> float:
+    """Probability of all effects but those of the hypotheses that are told."""
+    return float(sum(one.support for one in answers(found) if one.index not in told))
 
 
 def _passes(p_value: float) -> Condition:

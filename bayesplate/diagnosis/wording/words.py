@@ -133,6 +133,12 @@ CONDITIONS: dict[ConditionName, ConditionWords] = {
         "the probability that nothing is lacking is too large",
         "{:.3f}",
     ),
+    "probability of another": ConditionWords(
+        "probability of what is not named here, at its largest with the sizes' priors halved or doubled",
+        "below {limit}",
+        "the probability of another effect is too large",
+        "{:.3f}",
+    ),
     "prior predictive": ConditionWords(
         "p-value of the misfit that is left", "at least {limit}", "the misfit that is left is too large", "{:.3f}"
     ),

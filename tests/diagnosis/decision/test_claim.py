@@ -1,7 +1,8 @@
-"""The claim that an error is reduced: each of its four conditions, met and not met."""
+"""The claim that an error is reduced: each of its five conditions, met and not met."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from bayesplate.diagnosis.decision.claim import (
     nested_of,
     score_gain,
 )
+from bayesplate.diagnosis.decision.verdict import answers
 from bayesplate.diagnosis.evidence.folds import Nested, log_score, log_score_gains
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
@@ -25,12 +27,15 @@ DIRECTION = 0.05 * np.random.default_rng(2).standard_normal(9)
 CONTROL = NullControl(against=np.linspace(-3.0, 0.0, 101), ratio=np.linspace(0.4, 1.4, 101))
 
 
-def searched(size: float, direction: np.ndarray = DIRECTION, n_modes: int = 9):
-    """A search of one effect on readings that hold it, so many times its nominal size, with a little noise."""
+def searched(size: float, direction: np.ndarray = DIRECTION, n_modes: int = 9, others: Sequence[np.ndarray] = ()):
+    """A search on readings that hold an effect, so many times its nominal size, with a little noise."""
     base = baseline(np.random.default_rng(1), n_modes)
     one = candidate(base, "a", direction[:n_modes])
     levels = noise_grid(base.board)
-    ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.5, one.fine, levels), candidates={"a": one})
+    rivals = {name: candidate(base, name, each) for name, each in zip("bcd", others, strict=False)}
+    effects = {"a": one} | rivals
+    hypotheses = [Hypothesis((name,), 0.5 / len(effects), each.fine, levels) for name, each in effects.items()]
+    ground = ground_of(base, bare(base, levels), *hypotheses, candidates=effects)
     noise = 0.004 * np.random.default_rng(3).standard_normal(n_modes)
     return search(ground, size * one.visible + noise)
 
@@ -53,14 +58,14 @@ def met(claim: Claim) -> dict[str, bool]:
 def test_an_effect_that_is_there_meets_all_of_them(found):
     claim = judge_claim(found, decided(found), CONTROL)
     assert met(claim) == dict.fromkeys(
-        ("chance selection", "log score", "probability of none", "prior predictive"), True
+        ("chance selection", "log score", "probability of none", "probability of another", "prior predictive"), True
     )
     assert claim.holds
 
 
-@pytest.mark.parametrize("missing", range(4))
+@pytest.mark.parametrize("missing", range(5))
 def test_one_that_is_not_met_is_enough(missing):
-    conditions = tuple(Condition("log score", 1.0, 0.5, i != missing) for i in range(4))
+    conditions = tuple(Condition("log score", 1.0, 0.5, i != missing) for i in range(5))
     assert not Claim(conditions).holds
     assert Claim(conditions[:missing] + conditions[missing + 1 :]).holds
     assert not Claim().holds
@@ -117,10 +122,37 @@ def test_doubled_priors_alone_may_refuse_the_claim():
     assert not told.is_met
 
 
+def with_a_rival(size: float, alike: float):
+    """A search of an effect that is there and of one whose shifts are so much like its own (cosine)."""
+    own = 0.05 * np.random.default_rng(4).standard_normal(9)
+    return searched(size, others=(alike * DIRECTION + np.sqrt(1.0 - alike**2) * own,))
+
+
+@pytest.mark.parametrize(("alike", "is_met"), [(0.0, True), (0.95, False)])
+def test_a_name_with_a_rival_is_no_claim_unless_the_rival_is_told_too(alike, is_met):
+    """The rival is three times less probable, as a name asks for, and yet not out of the question."""
+    found = with_a_rival(0.65, alike)
+    verdict = decided(found)
+    assert (verdict.word, verdict.effects) == ("named", ("a",))
+    told = judge_claim(found, verdict, CONTROL).conditions[3]
+    assert (told.name, told.limit, told.is_met) == ("probability of another", 0.05, is_met)
+    assert told.value >= found.probability[2]
+    both = replace(verdict, stands_for=answers(found))
+    assert judge_claim(found, both, CONTROL).conditions[3].value == 0.0
+
+
+def test_another_effect_is_improbable_with_other_priors_too():
+    """The probability of the rival is below one in twenty with the usual priors and above it with others."""
+    found = with_a_rival(0.7, 0.95)
+    told = judge_claim(found, decided(found), CONTROL).conditions[3]
+    assert found.probability[2] < 0.05 < told.value
+    assert not told.is_met
+
+
 def test_the_misfit_that_is_left_passes_its_gate(found):
-    assert judge_claim(found, decided(found), CONTROL).conditions[3].value == pytest.approx(found.p_value(1))
+    assert judge_claim(found, decided(found), CONTROL).conditions[4].value == pytest.approx(found.p_value(1))
     off = replace(found, residual=found.residual + 0.05 * np.random.default_rng(8).standard_normal(9))
-    told = judge_claim(off, replace(decided(found), index=1), CONTROL, folds(found)).conditions[3]
+    told = judge_claim(off, replace(decided(found), index=1), CONTROL, folds(found)).conditions[4]
     assert told.value < 0.05
     assert not told.is_met
 
