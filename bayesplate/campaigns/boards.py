@@ -16,14 +16,16 @@ from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.reweighting import effective_draws
+from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS, effective_draws
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-from bayesplate.posterior.surrogate import with_surrogate
+from bayesplate.posterior.surrogate import Solved, Surrogate, with_surrogate
 
 Floats = NDArray[np.float64]
 
 _N_ANEW = 2048
 """Draws of a walk that are held against the law itself."""
+_MOST_WALKS = 3
+"""On surrogates, each fitted to the law where the one before led."""
 _LINE = 19
 _NOTHING = 1e-300
 
@@ -109,10 +111,8 @@ class Member:
         """Its density given what is shared."""
         return GivenShared(self.inference.problem.posterior, self.shared)
 
-    @cached_property
-    def _quick(self) -> GivenShared:
-        """The same by the surrogate of its law, where it has one."""
-        surrogate = self.inference.surrogate
+    def quick(self, surrogate: Surrogate | None) -> GivenShared:
+        """The same by a surrogate of its law, where it has one."""
         if surrogate is None:
             return self.given
         return replace(self.given, posterior=with_surrogate(self.given.posterior, surrogate))
@@ -152,6 +152,9 @@ class Member:
     def anew(self, log_reference: LogDensity, before: Sample, aim: tuple[Floats, Floats], seed: int) -> Sample:
         """Walk where the shared parameters have another density, and weight the draws by the law itself.
 
+        The surrogate of the board's own fit knows little of where others lead it: while too few draws are left by the
+        weights, one is fitted to the law at the draws, and walked on.
+
         Parameters
         ----------
         log_reference : callable
@@ -162,21 +165,50 @@ class Member:
             Mean and covariance of the shared parameters, nearly.
         seed : int
         """
-        own, quick = self.given.own_columns, self._quick
-        n_own, log_density = own.size, _joint(quick, log_reference)
-        centre, covariance = _moved(np.column_stack([before.theta[:, own], before.z]), before.weights, aim)
-        names = [f"parameter {i}" for i in range(centre.size)]
-        chains, convergence = sample(log_density, centre, covariance, SamplerSettings(seed), names=names)
-        pooled = chains.pooled
-        x = pooled[np.random.default_rng([seed, _LINE]).choice(len(pooled), _N_ANEW)]
-        theta = self.given.theta(x[:, :n_own], x[:, n_own:])
+        own, surrogate = self.given.own_columns, self.inference.surrogate
+        start = _moved(np.column_stack([before.theta[:, own], before.z]), before.weights, aim)
+        found: list[Sample] = []
+        solved: list[Solved] = []
+        for _ in range(1 if surrogate is None else _MOST_WALKS):
+            drawn, points = self._walked(surrogate, log_reference, start, seed)
+            found.append(drawn)
+            solved.append(points)
+            if surrogate is None or drawn.effective(drawn.weights) >= FEWEST_WEIGHTED_DRAWS:
+                break
+            every = Solved(*(np.concatenate(parts) for parts in zip(*solved, strict=True)))
+            surrogate = Surrogate.fitted(every, surrogate.columns, surrogate.degree)
+        best = max(found, key=lambda one: one.effective(one.weights))
+        log_evidence = self._log_evidence(log_reference, best.theta, best.z, best.weights, seed)
+        return replace(best, log_evidence=log_evidence)
+
+    def _walked(
+        self, surrogate: Surrogate | None, log_reference: LogDensity, start: tuple[Floats, Floats], seed: int
+    ) -> tuple[Sample, Solved]:
+        """Draws of a walk on a surrogate, weighted by the law, and what the law gives at them.
+
+        Without a surrogate the walk is on the law itself, and all weights are one.
+        """
+        quick, n_own = self.quick(surrogate), self.given.own_columns.size
+        joint = _joint(quick, log_reference)
+
+        def log_within(x: Floats) -> Floats:
+            if surrogate is None:
+                return np.zeros(len(x))
+            return surrogate.log_within(self.given.theta(x[:, :n_own], x[:, n_own:]))
+
+        names = [f"parameter {i}" for i in range(start[0].size)]
+        chains, convergence = sample(lambda x: joint(x) + log_within(x), *start, SamplerSettings(seed), names=names)
+        pooled, log_prob = chains.pooled, chains.log_prob[:, chains.burn_in :].ravel()
+        picked = np.random.default_rng([seed, _LINE]).choice(len(pooled), _N_ANEW)
+        x = pooled[picked]
+        theta, z = self.given.theta(x[:, :n_own], x[:, n_own:]), x[:, n_own:]
         every = tuple(self.given.posterior.every_log_frequency(theta))
         exact = self.given.posterior.log_likelihood_of(every, theta).sum(axis=1)
-        log_weights = exact - quick.posterior.log_likelihood(theta).sum(axis=1)
+        log_weights = exact - quick.posterior.log_likelihood(theta).sum(axis=1) - log_within(x)
+        log_weights = np.nan_to_num(log_weights, nan=-np.inf)
         n_independent = min(float(convergence.ess_min), float(_N_ANEW))
-        log_weights, z = np.nan_to_num(log_weights, nan=-np.inf), x[:, n_own:]
-        log_evidence = self._log_evidence(log_reference, theta, z, normalised(log_weights), seed)
-        return Sample(theta, z, log_weights, n_independent, log_reference, log_evidence, every)
+        drawn = Sample(theta, z, log_weights, n_independent, log_reference, np.nan, every)
+        return drawn, Solved(theta, np.concatenate(every, axis=1), log_prob[picked] + log_weights)
 
     def moved(self, drawn: Sample, log_density: LogDensity, z: Floats, rng: np.random.Generator) -> Sample:
         """Draws of a sample taken to other shared parameters, its own parameters going along linearly.

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Protocol
 
@@ -113,7 +114,7 @@ class SharedLikelihood:
     def degree(self) -> int:
         """Highest order of its terms."""
         n = self.centre.size
-        return next(d for d in range(2, _HIGHEST + 1) if _orders(n, d).size == self.coefficients.size)
+        return next(d for d in range(2, _HIGHEST + 1) if len(_powers(n, d)) == self.coefficients.size)
 
     def at(self, z: Floats) -> Floats:
         """ln L at standard coordinates: (n,) array from (n, n_shared)."""
@@ -135,7 +136,8 @@ class SharedLikelihood:
 
 def _terms(u: Floats, degree: int) -> Floats:
     """Products of normalised Hermite polynomials by order: (n, n_terms) array."""
-    return np.column_stack([np.prod(_hermite(u, powers), axis=1) for _, powers in _powers(u.shape[1], degree)])
+    polynomials, powers = _hermite(u, degree), _powers(u.shape[1], degree)
+    return np.asarray(np.prod([polynomials[powers[:, i], i] for i in range(u.shape[1])], axis=0).T)
 
 
 def _near(u: Floats) -> Floats:
@@ -200,26 +202,21 @@ def _degree(n_shared: int, n_effective: float) -> int:
     return max(able, default=2)
 
 
-def _powers(n_shared: int, degree: int) -> list[tuple[int, tuple[int, ...]]]:
-    """Order of each term, and the power of each coordinate in it."""
-    found = []
-    for order in range(1, degree + 1):
-        for factors in combinations_with_replacement(range(n_shared), order):
-            found.append((order, tuple(factors.count(i) for i in range(n_shared))))
-    return found
+@lru_cache
+def _powers(n_shared: int, degree: int) -> NDArray[np.intp]:
+    """Power of each coordinate in each term, by order: (n_terms, n_shared) array."""
+    factors = (each for d in range(1, degree + 1) for each in combinations_with_replacement(range(n_shared), d))
+    return np.array([[each.count(i) for i in range(n_shared)] for each in factors], dtype=np.intp)
 
 
 def _orders(n_shared: int, degree: int) -> NDArray[np.intp]:
-    return np.array([order for order, _ in _powers(n_shared, degree)], dtype=np.intp)
+    """Order of each term: (n_terms,) array."""
+    return np.asarray(_powers(n_shared, degree).sum(axis=1))
 
 
-def _hermite(u: Floats, powers: tuple[int, ...]) -> Floats:
-    """Normalised Hermite polynomials, one per coordinate: (n, k) array."""
-    polynomials = (
-        np.ones_like,
-        lambda x: x,
-        lambda x: (x**2 - 1.0) / np.sqrt(2.0),
-        lambda x: (x**3 - 3.0 * x) / np.sqrt(6.0),
-        lambda x: (x**4 - 6.0 * x**2 + 3.0) / np.sqrt(24.0),
-    )
-    return np.column_stack([polynomials[power](u[:, i]) for i, power in enumerate(powers)])
+def _hermite(u: Floats, degree: int) -> Floats:
+    """Normalised Hermite polynomials of each coordinate: (degree + 1, k, n) array from (n, k)."""
+    found = [np.ones_like(u.T), u.T]
+    for m in range(1, degree):
+        found.append((u.T * found[m] - np.sqrt(m) * found[m - 1]) / np.sqrt(m + 1.0))
+    return np.stack(found)

@@ -102,8 +102,19 @@ class Surrogate:
         parts = [self._terms(theta[i : i + _BATCH]) @ self.coefficients for i in range(0, len(theta), _BATCH)]
         return np.concatenate(parts) if parts else np.empty((0, self.coefficients.shape[1]))
 
+    def log_within(self, theta: Floats) -> Floats:
+        """ln of a weight, 1 within reach of the points, that falls beyond as a normal density: (n_draws,) array.
+
+        With it the density of a surrogate ends where it knows nothing, rather than go on level without bound.
+        """
+        beyond = np.maximum(np.abs(self._whitened(theta)) - _REACH, 0.0)
+        return np.asarray(-((_REACH + 0.5 * beyond) * beyond).sum(axis=1))
+
+    def _whitened(self, theta: Floats) -> Floats:
+        return np.asarray((theta[:, self.columns] - self.centre) @ self.whitening)
+
     def _terms(self, theta: Floats) -> Floats:
-        u = np.clip((theta[:, self.columns] - self.centre) @ self.whitening, -_REACH, _REACH).T
+        u = np.clip(self._whitened(theta), -_REACH, _REACH).T
         first, second = np.triu_indices(len(u))
         products = u[first] * u[second]
         groups = [np.ones((1, u.shape[1])), u, products]

@@ -11,10 +11,11 @@ from made_campaigns import MASS, write_campaign
 from scipy.linalg import block_diag
 
 import bayesplate
-from bayesplate.campaigns import learning
-from bayesplate.campaigns.boards import Member
+from bayesplate.campaigns import boards, learning
+from bayesplate.campaigns.boards import Member, _joint
 from bayesplate.campaigns.claim import judge, rms_cents, taught_boards
 from bayesplate.campaigns.learning import learn
+from bayesplate.campaigns.likelihood import moments
 from bayesplate.campaigns.scatter import scatters_of
 from bayesplate.cards import load_prior
 from bayesplate.errors import InputError
@@ -28,7 +29,7 @@ SHARED = "attached_mass.mass"
 
 def joint_run(members, is_exact=False):
     """Draws of every board's own parameters and the shared ones together, and the effective sizes."""
-    given = [one.given if is_exact else one._quick for one in members]
+    given = [one.given if is_exact else one.quick(one.inference.surrogate) for one in members]
     shared = members[0].shared
     sizes = [one.own_columns.size for one in given]
     ends = np.cumsum(sizes)
@@ -54,7 +55,7 @@ def joint_run_with_scatter(members, shared):
 
     Each board's own number is the middle and so many widths, these of unit spread.
     """
-    (scatter,), given = scatters_of(shared), [one._quick for one in members]
+    (scatter,), given = scatters_of(shared), [one.quick(one.inference.surrogate) for one in members]
     ends, n = np.cumsum([one.own_columns.size for one in given]), len(members)
 
     def own_numbers(theta):
@@ -207,6 +208,35 @@ def test_a_board_walked_anew_is_that_of_weights(fitted_campaign, monkeypatch):
         for name, values in usual.moduli.items():
             both = max(in_errors(np.log(anew.moduli[name]).ravel(), np.log(values).ravel(), effective / 2))
             assert both < 5.0, (member.name, name)
+
+
+def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitted_campaign, monkeypatch):
+    """Five standard deviations off, where its own draws end: as a walk on the law itself; one surrogate does not do."""
+    member = fitted_campaign.learnt.members[0]
+    mean, covariance = moments(member.alone.z, member.alone.weights)
+    sd = np.sqrt(covariance[0, 0])
+    middle, width = mean + 5.0 * sd, 0.1 * sd
+
+    def others(z):
+        return -0.5 * ((z[:, 0] - middle[0]) / width) ** 2
+
+    drawn = member.anew(others, member.alone, (middle, width**2 * np.eye(1)), 1)
+    effective = drawn.effective(drawn.weights)
+    assert effective > learning.FEWEST_WEIGHTED_DRAWS
+    own = member.given.own_columns
+    centre, covariance = moments(np.column_stack([drawn.theta[:, own], drawn.z]), drawn.weights)
+    chains, convergence = sample(
+        _joint(member.given, others), centre, covariance, SamplerSettings(seed=2, n_ensembles=2)
+    )
+    assert convergence.passed
+    for i in range(own.size):
+        ours, exact = drawn.theta[:, own[i]], chains.pooled[:, i]
+        mean, spread = drawn.weights @ ours, exact.std()
+        assert abs(mean - exact.mean()) < 5.0 * spread * np.sqrt(1.0 / effective + 1.0 / convergence.ess_min)
+
+    monkeypatch.setattr(boards, "_MOST_WALKS", 1)
+    once = member.anew(others, member.alone, (middle, width**2 * np.eye(1)), 1)
+    assert once.effective(once.weights) < learning.FEWEST_WEIGHTED_DRAWS
 
 
 def test_a_likelihood_that_is_off_its_draws_is_found_again(fitted_campaign):

@@ -94,6 +94,16 @@ def test_points_that_are_no_plate_are_left_out_of_the_fit(problem):
     assert np.array_equal(Surrogate.fitted(holed, columns, 2).coefficients, expected.coefficients)
 
 
+def test_within_reach_its_weight_is_one_and_beyond_it_ends(inference):
+    """A normal density of unit spread has fallen so much from five to six standard deviations, and to seven."""
+    found = inference.surrogate
+    steps = np.zeros((5, found.centre.size))
+    steps[:, 0] = [0.0, -4.9, 4.9, 6.0, -7.0]
+    theta = np.zeros((5, 1 + found.columns.max()))
+    theta[:, found.columns] = found.centre + steps @ np.linalg.inv(found.whitening)
+    assert found.log_within(theta) == pytest.approx([0.0, 0.0, 0.0, -0.5 * (36 - 25), -0.5 * (49 - 25)])
+
+
 def test_ends_without_a_density_are_refused():
     log_ratios = 0.3 * np.random.default_rng(0).standard_normal(400)
     half = np.where(np.arange(400) % 2 == 0, log_ratios, -np.inf)
