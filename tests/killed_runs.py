@@ -28,10 +28,10 @@ def quickly() -> None:
     from bayesplate.diagnosis.evidence.joint import full_search
     from bayesplate.posterior.convergence import Gate
     from bayesplate.posterior.sampling import SamplerSettings
-    from bayesplate.workflow import compare, diagnose, fitting
+    from bayesplate.workflow import campaign_fit, compare, diagnose, fitting
 
     loose = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
-    for workflow in (compare, fitting):
+    for workflow in (compare, fitting, campaign_fit):
         workflow.SamplerSettings = partial(SamplerSettings, gate=loose)  # type: ignore[attr-defined]
     diagnose.full_search = partial(full_search, tried=TRIED)  # type: ignore[assignment]
 

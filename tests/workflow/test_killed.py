@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 from killed_runs import killed, quickly
 from made_batches import write_cards
+from made_campaigns import MASS, write_campaign
 from runs import files_in
 
 from bayesplate.cli import main
@@ -27,13 +28,16 @@ DIAGNOSE = ("diagnose", "paper-cantilever-fe", "--quiet", "--no-report")
 @pytest.fixture
 def arguments(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """A command line without its folder; what runs in this process is as quick as what is killed in another."""
-    for place in ("fitting.SamplerSettings", "diagnose.full_search"):
+    for place in ("fitting.SamplerSettings", "campaign_fit.SamplerSettings", "diagnose.full_search"):
         home, name = place.split(".")
         module = __import__(f"bayesplate.workflow.{home}", fromlist=[name])
         monkeypatch.setattr(module, name, getattr(module, name))  # to be put back at the end
     quickly()
     if request.param == "batch":
         return ("batch", str(write_cards(tmp_path / "cards")), "--workers", "1", "--quiet", "--no-report")
+    if request.param == "campaign":
+        (tmp_path / "cards").mkdir()
+        return ("diagnose", str(write_campaign(tmp_path / "cards", (MASS, MASS))), "--quiet", "--no-report")
     return {"fit": FIT, "fit and report": FIT[:-1], "diagnose": DIAGNOSE}[request.param]
 
 
@@ -72,6 +76,7 @@ def moments(n: int, n_of: int, seed: int) -> list[int]:
         pytest.param("fit and report", 20, marks=pytest.mark.slow),
         pytest.param("diagnose", 20, marks=pytest.mark.slow),
         pytest.param("batch", 20, marks=pytest.mark.slow),
+        pytest.param("campaign", 20, marks=pytest.mark.slow),
     ],
     indirect=["arguments"],
 )
