@@ -189,21 +189,23 @@ def diagnose(
     finals = verdict.stands_for[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals)
     refits: dict[int, Fitted] = {}
-    notes = list(problem.posed.doubts)
+    failures = []
     for answer in finals:
         try:
             name = "-".join((*answer.members, str(answer.index)))
             stage = f"fit with {answer_words(found, answer)}"
             refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
-            notes.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
-    if verdict.index in refits:
+            failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
+    after = refits.get(verdict.index, before)
+    notes = [*after.inference.problem.doubts, *failures]  # what an effect explains is no doubt any more
+    if after is not before:
         with_words = next(answer_words(found, one) for one in finals if one.index == verdict.index)
-        first, last = (one.inference.problem.board for one in (before, refits[verdict.index]))
+        first, last = (one.inference.problem.board for one in (before, after))
         told = relabelled_sentence(first, last, with_words)
         notes += [told] if told else []
     case = _case(found, verdict, control, folded, known, before, refits, tuple(notes))
-    diagnosis, after = diagnosis_of(case), refits.get(verdict.index, before)
+    diagnosis = diagnosis_of(case)
     if folder is not None:
         if after is not before:
             make_folder(folder.path / BEFORE)

@@ -112,6 +112,17 @@ def test_diagnosis_json_keeps_its_contract(which, request):
     assert found["recommendation"] == "" or found["recommendation"].endswith(".")
 
 
+def test_what_an_effect_explains_is_no_doubt_any_more(with_shear):
+    """The plate without shear misses its readings by far, and the fit before says so; with shear it does not."""
+    before, after = (
+        read_json((with_shear.folder / name).read_text()) for name in ("before/summary.json", "summary.json")
+    )
+    (scatter,) = (one for one in before["warnings"] if "scatter about the fitted plate" in one)
+    assert scatter not in after["warnings"]
+    assert told(with_shear)["notes"] == []
+    assert "scatter about the fitted plate" not in with_shear.stderr
+
+
 def test_known_effects_are_computed_before_anything_is_fitted_again(with_shear, calm):
     """Falls and rises are in the file and in what is printed; the board as it stands is the one that `check` shows."""
     stands, shear, air, both = told(with_shear)["known"]
