@@ -35,9 +35,10 @@ _WHOLE = 40
 """Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
 _BEYOND = 10
 """Modes above the wanted ones that are kept from it."""
-_LARGE, _SHARED = 80, 2 / 3
-"""Vectors from which on a step from the modes at the centre pays, and the share of them that is tried before the whole:
-the last ones, which are what the modes have most in common."""
+_LARGE, _LARGE_PENCIL = 80, 60
+"""Vectors from which on a step from the modes at the centre pays, without and with masses."""
+_SHARED = 2 / 3
+"""Share of them that is tried before the whole: the last ones, which are what the modes have most in common."""
 _BATCH, _SMALL_BATCH = 16, 512
 """Draws whose large or small matrices are held at once: those of a whole posterior would not fit any cache."""
 
@@ -306,7 +307,7 @@ def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Itera
     n_condensed, n_stepped = (whole.n_rigid + n for n in (n_modes + _BEYOND, 2 * n_modes))
     if size > max(_WHOLE, 2 * n_condensed):
         yield replace(_on_modes(whole, centre), n_kept=n_condensed, is_condensed=True)
-    if size > _LARGE:
+    if size > (_LARGE_PENCIL if len(whole.masses) else _LARGE):
         last = slice(size - max(round(_SHARED * size), n_condensed), None)
         parts = [replace(whole, stiffness=whole.stiffness[:, last, last], masses=whole.masses[:, last, last]), whole]
         for part in parts if len(whole.masses) else [whole]:
