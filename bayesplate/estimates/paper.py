@@ -36,13 +36,25 @@ class PaperSystem:
     origins: tuple[CoefficientRows, ...] = ()
 
     def solve(self, rows: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.float64]:
-        """Unweighted least squares of some of the modes (all by default): d_x, d_y, d_s in N m, a (3,) array.
+        """Unweighted least squares of some of the modes: d_x, d_y, d_s in N m.
+
+        Parameters
+        ----------
+        rows : (..., n_some) array of int or slice
+            Which modes, of many subsets of one size at once if there are several; all by default.
+
+        Returns
+        -------
+        (..., 3) array
+            The shortest solution where a subset leaves something open.
 
         References
         ----------
         Ducceschi et al., eq. (13).
         """
-        return np.asarray(np.linalg.lstsq(self.coefficients[rows], self.psi[rows], rcond=None)[0])
+        coefficients, psi = self.coefficients[rows], self.psi[rows]
+        cutoff = np.finfo(np.float64).eps * max(coefficients.shape[-2:])
+        return np.asarray((np.linalg.pinv(coefficients, cutoff) @ psi[..., None])[..., 0])
 
     def moduli(self, constants: NDArray[np.float64], nu_yx: float | None = None) -> Moduli:
         """Elastic moduli of (..., 3) rigidities, Pa.

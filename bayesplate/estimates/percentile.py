@@ -66,8 +66,8 @@ def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
     n_modes = system.psi.size
     if n_modes > MOST_MODES:
         return None
-    subsets = [list(rows) for size in range(3, n_modes + 1) for rows in combinations(range(n_modes), size)]
-    constants = np.stack([system.solve(np.array(rows)) for rows in subsets])
+    subsets = (np.array(list(combinations(range(n_modes), size))) for size in range(3, n_modes + 1))
+    constants = np.concatenate([system.solve(rows) for rows in subsets])
     D_x, D_y, _ = system.solve()
     nu_yx = float(system.values["poisson_xy"]) * D_y / D_x
     estimates = np.stack(system.moduli(constants, nu_yx=nu_yx), axis=-1)

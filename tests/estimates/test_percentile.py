@@ -72,6 +72,18 @@ def made_system(psi, coefficients):
     return PaperSystem(np.asarray(psi), np.asarray(coefficients), {"thickness": 3e-3, "poisson_xy": 0.0})
 
 
+def test_subsets_are_solved_at_once_as_one_by_one():
+    """Also one that leaves a direction open: two modes say the same there, and the shortest solution is given."""
+    rng = np.random.default_rng(1)
+    coefficients = rng.uniform(1, 10, (6, 3))
+    coefficients[5] = coefficients[4]
+    system = made_system(rng.uniform(1, 10, 6), coefficients)
+    subsets = np.array([[0, 1, 2], [3, 4, 5], [1, 2, 4]])
+    one_by_one = [np.linalg.lstsq(coefficients[rows], system.psi[rows], rcond=None)[0] for rows in subsets]
+    assert system.solve(subsets) == pytest.approx(np.array(one_by_one), rel=1e-9)
+    assert system.solve() == pytest.approx(np.linalg.lstsq(coefficients, system.psi, rcond=None)[0], rel=1e-9)
+
+
 def test_readings_without_error_have_no_spread():
     coefficients = np.random.default_rng(0).uniform(1, 10, (5, 3))
     truth = np.array([30.0, 2.0, 6.0])
