@@ -15,6 +15,10 @@ export MKL_NUM_THREADS := 1
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
 
+# Compiled modules are kept in the environment, whatever the shell says: tests start the package a hundred times.
+test slow: export PYTHONDONTWRITEBYTECODE :=
+test slow: export PYTHONPYCACHEPREFIX := $(abspath $(VENV))/pycache
+
 test: $(VENV)/tested-with
 	$(BIN)/ruff check .
 	$(BIN)/mypy
