@@ -6,6 +6,7 @@ from computations.keys import keys_of
 from computations.left_out import pareto, pareto_told
 from computations.library import (
     campaign_limits,
+    campaign_references,
     default_noise,
     effects_listed,
     exit_codes,
@@ -32,6 +33,7 @@ from computations.sight import cosines, designs, leverages, rounding, visible_pa
 __all__ = [
     "both_laws",
     "campaign_limits",
+    "campaign_references",
     "convergence",
     "cosines",
     "default_noise",

@@ -12,6 +12,8 @@ import numpy as np
 import bayesplate
 from bayesplate import errors
 from bayesplate.campaigns import diagnosis as of_campaigns
+from bayesplate.campaigns import evidence, likelihood, population, scatter
+from bayesplate.campaigns.agreement import p_value
 from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
 from bayesplate.cards.shelf import card_names
 from bayesplate.diagnosis.decision.claim import IMPROBABLE, STANDARD_ERRORS
@@ -193,6 +195,13 @@ def planning_references(folder: Path) -> str:
     return "\n".join(f"- {_unquoted(entry)}" for entry in (*gains.REFERENCES, *places.REFERENCES)) + "\n"
 
 
+def campaign_references(folder: Path) -> str:
+    """What boards that share something rest on: the references of the functions and files that do it."""
+    documented = (likelihood, evidence, p_value, scatter, population)
+    tails = ((one.__doc__ or "").partition("References\n")[2].partition("\n")[2] for one in documented)
+    return "\n".join(f"- {_unquoted(' '.join(tail.split()))}" for tail in tails) + "\n"
+
+
 def _unquoted(entry: str) -> str:
     """A reference with its DOI as a link and its use in italics."""
     linked = re.sub(r"doi:(10\.\S+?)(?=[.,;]?(?:\s|$))", r"[doi:\1](https://doi.org/\1)", entry)
@@ -260,7 +269,7 @@ def verdict_limits(folder: Path) -> str:
             f"{100 * BY_CHANCE:g} of 100",
         ),
         ("a claim: standard errors by which the nested log score rises, more than", f"{STANDARD_ERRORS:g}"),
-        ("a claim: probability of no effect, at its largest, below", f"{IMPROBABLE:g}"),
+        ("a claim: probability of no effect, and of one that is not told, at their largest, below", f"{IMPROBABLE:g}"),
     ]
     return words_table(("rule", "number"), rows)
 
