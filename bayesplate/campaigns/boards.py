@@ -18,7 +18,7 @@ from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS, effective_draws
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-from bayesplate.posterior.surrogate import Solved, Surrogate, with_surrogate
+from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surrogate
 
 Floats = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ class Sample:
         """ln of another r over this one at the draws: (n,) array."""
         with np.errstate(invalid="ignore"):
             change = log_reference(self.z) - self.log_reference(self.z)
-        return np.nan_to_num(change, nan=-np.inf)
+        return np.nan_to_num(change, nan=-np.inf, neginf=-np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,8 @@ class Member:
         """Walk where the shared parameters have another density, and weight the draws by the law itself.
 
         The surrogate of the board's own fit knows little of where others lead it: while too few draws are left by the
-        weights, one is fitted to the law at the draws, and walked on.
+        weights, one is fitted to the law at the draws, and walked on. Where no draw has a density by the law the sample
+        from before is all there is.
 
         Parameters
         ----------
@@ -171,12 +172,17 @@ class Member:
         solved: list[Solved] = []
         for _ in range(1 if surrogate is None else _MOST_WALKS):
             drawn, points = self._walked(surrogate, log_reference, start, seed)
-            found.append(drawn)
             solved.append(points)
-            if surrogate is None or drawn.effective(drawn.weights) >= FEWEST_WEIGHTED_DRAWS:
-                break
             every = Solved(*(np.concatenate(parts) for parts in zip(*solved, strict=True)))
+            if np.isfinite(drawn.log_weights).any():
+                found.append(drawn)
+            if surrogate is None or (found and found[-1].effective(found[-1].weights) >= FEWEST_WEIGHTED_DRAWS):
+                break
+            if np.isfinite(every.log_density).sum() < n_terms(surrogate.columns.size, surrogate.degree):
+                break
             surrogate = Surrogate.fitted(every, surrogate.columns, surrogate.degree)
+        if not found:
+            return before
         best = max(found, key=lambda one: one.effective(one.weights))
         log_evidence = self._log_evidence(log_reference, best.theta, best.z, best.weights, seed)
         return replace(best, log_evidence=log_evidence)
@@ -205,7 +211,7 @@ class Member:
         every = tuple(self.given.posterior.every_log_frequency(theta))
         exact = self.given.posterior.log_likelihood_of(every, theta).sum(axis=1)
         log_weights = exact - quick.posterior.log_likelihood(theta).sum(axis=1) - log_within(x)
-        log_weights = np.nan_to_num(log_weights, nan=-np.inf)
+        log_weights = np.nan_to_num(log_weights, nan=-np.inf, neginf=-np.inf)
         n_independent = min(float(convergence.ess_min), float(_N_ANEW))
         drawn = Sample(theta, z, log_weights, n_independent, log_reference, np.nan, every)
         return drawn, Solved(theta, np.concatenate(every, axis=1), log_prob[picked] + log_weights)

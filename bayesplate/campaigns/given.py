@@ -92,7 +92,7 @@ class GivenShared:
         total[~inside] = -np.inf
         if inside.any():
             total[inside] += self.posterior.log_likelihood(theta[inside]).sum(axis=1)
-        return np.nan_to_num(total, nan=-np.inf)
+        return np.nan_to_num(total, nan=-np.inf, neginf=-np.inf)
 
     def log_reweighting(self, theta: Floats) -> Floats:
         """ln of the campaign's prior over the board's own prior at draws of the board: (n_draws,) array.
@@ -108,7 +108,7 @@ class GivenShared:
                 with np.errstate(invalid="ignore"):
                     total += shared.prior.log_density_of_log(np.log(ratio))
                     total -= one.prior.log_density_of_log(np.log(values[one.name]))
-        return np.nan_to_num(total, nan=-np.inf)
+        return np.nan_to_num(total, nan=-np.inf, neginf=-np.inf)
 
     def _log_prior_of_own(self, theta: Floats) -> Floats:
         """Log prior density of the own columns: (n_draws,) array."""

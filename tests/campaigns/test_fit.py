@@ -239,6 +239,20 @@ def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitte
     assert once.effective(once.weights) < learning.FEWEST_WEIGHTED_DRAWS
 
 
+def test_where_no_draw_has_a_density_by_the_law_what_was_there_before_stays(fitted_campaign):
+    """A mass of more than all boards that there are: no draw counts as one of many that are equally good."""
+    member = fitted_campaign.learnt.members[0]
+    mean, covariance = moments(member.alone.z, member.alone.weights)
+    sd = np.sqrt(covariance[0, 0])
+    far, width = mean + 80.0 * sd, 0.1 * sd
+
+    def others(z):
+        return -0.5 * ((z[:, 0] - far[0]) / width) ** 2
+
+    found = member.anew(others, member.alone, (far, width**2 * np.eye(1)), 1)
+    assert found is member.alone
+
+
 def test_a_likelihood_that_is_off_its_draws_is_found_again(fitted_campaign):
     """A slope of two standard deviations too much: the board is lost, and learned anew."""
     learnt = fitted_campaign.learnt
