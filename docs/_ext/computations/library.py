@@ -67,15 +67,15 @@ CHECKS = (
     (
         "spruce-half-tops",
         "python examples/campaign.py --out docs/validation --results results/spruce-half-tops",
-        "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it. The "
-        "p-values of this run and the two below are by an older rule, by which a board that only leans to one side of "
-        "a number could look as if it refused what the others teach. Now only directions count of which a board says "
-        "something; the runs were not made again, so that it is open whether a board refuses.",
+        "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it. In "
+        "this run, and in that with scatter, a board that only leans to one side of a number could look as if it "
+        "refused what the others teach, and one that the others lead far off was judged by the few of its own draws "
+        "there. They were not made again since, so that it is open whether a board refuses.",
     ),
     (
         "spruce-half-tops-shear",
         "python examples/campaign.py spruce-half-tops-shear --out docs/validation --results results/shear",
-        "The same six with transverse shear alone shared.",
+        "The same six with transverse shear alone shared, as they are judged now: no board refuses.",
     ),
     (
         "spruce-half-tops-scatter",
