@@ -210,17 +210,19 @@ def test_a_board_walked_anew_is_that_of_weights(fitted_campaign, monkeypatch):
             assert both < 5.0, (member.name, name)
 
 
+def others_at(member, sds):
+    """What others teach so many of a board's own standard deviations off: ln of its density, mean and covariance."""
+    mean, covariance = moments(member.alone.z, member.alone.weights)
+    sd = np.sqrt(covariance[0, 0])
+    middle, width = mean + sds * sd, 0.1 * sd
+    return lambda z: -0.5 * ((z[:, 0] - middle[0]) / width) ** 2, (middle, width**2 * np.eye(1))
+
+
 def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitted_campaign, monkeypatch):
     """Five standard deviations off, where its own draws end: as a walk on the law itself; one surrogate does not do."""
     member = fitted_campaign.learnt.members[0]
-    mean, covariance = moments(member.alone.z, member.alone.weights)
-    sd = np.sqrt(covariance[0, 0])
-    middle, width = mean + 5.0 * sd, 0.1 * sd
-
-    def others(z):
-        return -0.5 * ((z[:, 0] - middle[0]) / width) ** 2
-
-    drawn = member.anew(others, member.alone, (middle, width**2 * np.eye(1)), 1)
+    others, aim = others_at(member, 5.0)
+    drawn = member.anew(others, member.alone, aim, 1)
     effective = drawn.effective(drawn.weights)
     assert effective > learning.FEWEST_WEIGHTED_DRAWS
     own = member.given.own_columns
@@ -235,21 +237,15 @@ def test_a_board_that_others_lead_far_off_is_walked_where_its_law_is_known(fitte
         assert abs(mean - exact.mean()) < 5.0 * spread * np.sqrt(1.0 / effective + 1.0 / convergence.ess_min)
 
     monkeypatch.setattr(boards, "_MOST_WALKS", 1)
-    once = member.anew(others, member.alone, (middle, width**2 * np.eye(1)), 1)
+    once = member.anew(others, member.alone, aim, 1)
     assert once.effective(once.weights) < learning.FEWEST_WEIGHTED_DRAWS
 
 
 def test_where_no_draw_has_a_density_by_the_law_what_was_there_before_stays(fitted_campaign):
     """A mass of more than all boards that there are: no draw counts as one of many that are equally good."""
     member = fitted_campaign.learnt.members[0]
-    mean, covariance = moments(member.alone.z, member.alone.weights)
-    sd = np.sqrt(covariance[0, 0])
-    far, width = mean + 80.0 * sd, 0.1 * sd
-
-    def others(z):
-        return -0.5 * ((z[:, 0] - far[0]) / width) ** 2
-
-    found = member.anew(others, member.alone, (far, width**2 * np.eye(1)), 1)
+    others, aim = others_at(member, 80.0)
+    found = member.anew(others, member.alone, aim, 1)
     assert found is member.alone
 
 
