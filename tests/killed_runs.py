@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +24,20 @@ TRIED = ("transverse_shear", "clamp_rotation")
 """Effects that a diagnosis tries here: two, for the time that a test may take."""
 
 
+SAMPLING = ("compare", "fitting", "campaign_fit")
+"""Modules of the workflow that sample."""
+
+
 def quickly() -> None:
     """A sampler whose first judgement passes, and a search among two candidates: for tests of files."""
     from bayesplate.diagnosis.evidence.joint import full_search
     from bayesplate.posterior.convergence import Gate
     from bayesplate.posterior.sampling import SamplerSettings
-    from bayesplate.workflow import campaign_fit, compare, diagnose, fitting
+    from bayesplate.workflow import diagnose
 
     loose = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
-    for workflow in (compare, fitting, campaign_fit):
+    for name in SAMPLING:
+        workflow = import_module(f"bayesplate.workflow.{name}")
         workflow.SamplerSettings = partial(SamplerSettings, gate=loose)  # type: ignore[attr-defined]
     diagnose.full_search = partial(full_search, tried=TRIED)  # type: ignore[assignment]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from killed_runs import killed, quickly
+from killed_runs import SAMPLING, killed, quickly
 from made_batches import write_cards
 from made_campaigns import MASS, write_campaign
 from runs import files_in
@@ -28,7 +28,7 @@ DIAGNOSE = ("diagnose", "paper-cantilever-fe", "--quiet", "--no-report")
 @pytest.fixture
 def arguments(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """A command line without its folder; what runs in this process is as quick as what is killed in another."""
-    for place in ("fitting.SamplerSettings", "campaign_fit.SamplerSettings", "diagnose.full_search"):
+    for place in (*(f"{name}.SamplerSettings" for name in SAMPLING), "diagnose.full_search"):
         home, name = place.split(".")
         module = __import__(f"bayesplate.workflow.{home}", fromlist=[name])
         monkeypatch.setattr(module, name, getattr(module, name))  # to be put back at the end
