@@ -22,8 +22,8 @@ from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surr
 
 Floats = NDArray[np.float64]
 
-_N_ANEW = 2048
-"""Draws of a walk that are held against the law itself."""
+N_SOLVED = 2048
+"""Draws of a walk, or taken to other shared parameters, at which the law itself is evaluated."""
 _MOST_WALKS = 3
 """On surrogates, each fitted to the law where the one before led."""
 _LINE = 19
@@ -205,14 +205,14 @@ class Member:
         names = [f"parameter {i}" for i in range(start[0].size)]
         chains, convergence = sample(lambda x: joint(x) + log_within(x), *start, SamplerSettings(seed), names=names)
         pooled, log_prob = chains.pooled, chains.log_prob[:, chains.burn_in :].ravel()
-        picked = np.random.default_rng([seed, _LINE]).choice(len(pooled), _N_ANEW)
+        picked = np.random.default_rng([seed, _LINE]).choice(len(pooled), N_SOLVED)
         x = pooled[picked]
         theta, z = self.given.theta(x[:, :n_own], x[:, n_own:]), x[:, n_own:]
         every = tuple(self.given.posterior.every_log_frequency(theta))
         exact = self.given.posterior.log_likelihood_of(every, theta).sum(axis=1)
         log_weights = exact - quick.posterior.log_likelihood(theta).sum(axis=1) - log_within(x)
         log_weights = np.nan_to_num(log_weights, nan=-np.inf, neginf=-np.inf)
-        n_independent = min(float(convergence.ess_min), float(_N_ANEW))
+        n_independent = min(float(convergence.ess_min), float(N_SOLVED))
         drawn = Sample(theta, z, log_weights, n_independent, log_reference, np.nan, every)
         return drawn, Solved(theta, np.concatenate(every, axis=1), log_prob[picked] + log_weights)
 

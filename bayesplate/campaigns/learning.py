@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.campaigns.boards import Member, Sample
+from bayesplate.campaigns.boards import N_SOLVED, Member, Sample
 from bayesplate.campaigns.likelihood import LogDensity, moments
 from bayesplate.campaigns.together import Together, walk
 from bayesplate.posterior.convergence import Convergence
@@ -83,7 +83,7 @@ class Learnt:
         ones over all of its draws.
         """
         member, drawn = self.members[index], self.samples[index]
-        taught = self.together.taught_draws(rng, member.draws.flat.shape[0], (index,))
+        taught = self.together.taught_draws(rng, N_SOLVED, (index,))
         moved = member.moved(drawn, self.together.log_taught((index,)), taught, rng)
         return member.posterior_of(moved, moved.weights, rng, seed)
 

@@ -9,24 +9,31 @@ from calibration.campaigns import CampaignDesign, identity, judge, simulate_one
 from calibration.records import read_done
 
 
-def record(kind, number, claim, q=(1.0, 2.0, 3.0), truth=2.0, **more):
-    ends = dict(zip(("q05", "q50", "q95"), q, strict=True))
-    return {"kind": kind, "campaign": number, "claim": claim, "truth": truth, "refused_by": [], **ends, **more}
+def record(kind, number, claim, shear=2.0, mass=2.0):
+    """Intervals of both from 1 to 3."""
+    shared = {"shear": [1.0, 2.0, 3.0], "mass": [1.0, 2.0, 3.0]}
+    own = {"truth": {"shear": shear, "mass": mass}, "shared": shared, "refused_by": [], "seconds": 1.0}
+    return {"kind": kind, "campaign": number, "claim": claim, **own}
 
 
 def test_campaigns_that_are_right_pass():
-    good = [record("all", i, True, truth=2.0 if i % 10 else 5.0) for i in range(100)]
+    good = [record("all", i, True, 2.0 if i % 10 else 5.0, 2.8 if i % 5 else 0.9) for i in range(100)]
     good += [record("some", i, False) for i in range(100)] + [record("none", i, i < 4) for i in range(100)]
     lines, well = judge(good)
 
     assert well
-    assert lines[0] == "sensor on all boards: 90 % intervals hold 90 of 100 masses, wanted 79 to 98"
+    assert lines[:3] == [
+        "sensor and shear on all boards, 100 campaigns of a median of 1 s: claimed 100 times, refused by a board 0",
+        "  90 % intervals of shear hold 90, wanted 79 to 98; of half the width 90",
+        "  90 % intervals of mass hold 80, wanted 79 to 98; of half the width 0",
+    ]
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        [record("all", i, True, truth=2.0 if i % 3 else 5.0) for i in range(100)],
+        [record("all", i, True, 2.0 if i % 3 else 5.0) for i in range(100)],
+        [record("all", i, True, 2.0, 2.0 if i % 3 else 5.0) for i in range(100)],
         [record("some", i, i < 20) for i in range(100)],
         [record("none", i, i < 20) for i in range(100)],
         [{"kind": "all", "campaign": 0, "error": "it fell over"}],
@@ -49,6 +56,7 @@ def test_a_campaign_of_two_boards_leaves_a_record():
     found = simulate_one(CampaignDesign(n_boards=2), "all", 0)
 
     assert "error" not in found
-    assert found["q05"] < found["q50"] < found["q95"]
+    assert set(found["truth"]) == set(found["shared"])
+    assert all(low < middle < high for low, middle, high in found["shared"].values())
     assert found["with"] == ["board-0", "board-1"]
     assert json.loads(json.dumps(found)) == found

@@ -85,8 +85,8 @@ CHECKS = (
     (
         "campaigns",
         "make campaigns",
-        "Simulated campaigns of eight boards with one sensor on all of them, on three, or on none: intervals of its "
-        "mass, and how often it is claimed.",
+        "Simulated campaigns of eight boards: with one sensor and the shear of one species on all, intervals of "
+        "its mass and of the shear moduli; with a sensor on three boards, or on none, how often it is claimed.",
     ),
     (
         "recordings",
