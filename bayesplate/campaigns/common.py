@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.frequencies.laws import cents
+from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
 
@@ -26,6 +27,8 @@ class CommonResidual:
     mean_cents, error_cents : float
         Their mean, each weighted by its board's noise, and its standard error: of the noise, or of the scatter between
         the boards where that is larger.
+    degrees_of_freedom : int
+        Of that error: those of the boards, and where it is of the noise those of the residuals that tell it.
     scatter_cents : float
         Standard deviation between the boards.
     boards : dict of float
@@ -34,6 +37,7 @@ class CommonResidual:
 
     mean_cents: float
     error_cents: float
+    degrees_of_freedom: int
     scatter_cents: float
     boards: Mapping[str, float]
 
@@ -42,7 +46,7 @@ class CommonResidual:
         """How often a mode that has nothing in common would have a mean as far from zero: Student's, both sides."""
         from scipy.stats import t
 
-        return float(2.0 * t.sf(abs(self.mean_cents) / self.error_cents, len(self.boards) - 1))
+        return float(2.0 * t.sf(abs(self.mean_cents) / self.error_cents, self.degrees_of_freedom))
 
 
 def common_residuals(summaries: Mapping[str, Summary]) -> dict[str, CommonResidual]:
@@ -59,12 +63,15 @@ def common_residuals(summaries: Mapping[str, Summary]) -> dict[str, CommonResidu
         By label; by setup and label where the boards' setups have different names.
     """
     setups = {row.setup for summary in summaries.values() for row in summary.modes}
+    spare = {board: max(len(summary.modes) - N_RIGIDITIES, 0) for board, summary in summaries.items()}
     found: dict[str, dict[str, tuple[float, float]]] = {}
     for board, summary in summaries.items():
         for row in summary.modes:
             noise = float(cents(np.asarray(summary.noise[row.setup].q50)))
             found.setdefault(_key(row, len(setups) > 1), {})[board] = (row.residual_cents, noise)
-    return {key: _pooled(each) for key, each in found.items() if len(each) >= FEWEST}
+    return {
+        key: _pooled(each, sum(spare[board] for board in each)) for key, each in found.items() if len(each) >= FEWEST
+    }
 
 
 def clear_of_zero(common: Mapping[str, CommonResidual]) -> list[str]:
@@ -76,15 +83,18 @@ def _key(row: ModeRow, has_setups: bool) -> str:
     return f"{row.setup} {row.label}" if has_setups else row.label
 
 
-def _pooled(each: Mapping[str, tuple[float, float]]) -> CommonResidual:
+def _pooled(each: Mapping[str, tuple[float, float]], n_spare: int) -> CommonResidual:
+    """From the residual and the noise of each board, cents, and how many residuals to spare tell that noise."""
     residuals, noise = np.array(list(each.values())).T
     weights = noise**-2.0
     total = weights.sum()
     mean = float(weights @ residuals / total)
     scatter = float(weights @ (residuals - mean) ** 2 / total / (len(each) - 1))
+    is_noise = 1.0 / total >= scatter
     return CommonResidual(
         mean_cents=mean,
-        error_cents=float(np.sqrt(max(1.0 / total, scatter))),
+        error_cents=float(np.sqrt(1.0 / total if is_noise else scatter)),
+        degrees_of_freedom=len(each) - 1 + (n_spare if is_noise else 0),
         scatter_cents=float(np.std(residuals, ddof=1)),
         boards={board: residual for board, (residual, _) in each.items()},
     )

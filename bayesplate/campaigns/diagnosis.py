@@ -165,8 +165,13 @@ def pooled_rms(boards: Mapping[str, float], counts: Mapping[str, int]) -> float:
     return float(np.sqrt(total / sum(counts.values())))
 
 
-def next_step(common: Mapping[str, CommonResidual], conditions: SharedClaim | None, n_boards: int) -> str:
-    """What to do next: ask a board that refuses, or look for the cause of what is left over on all of them."""
+def next_step(
+    common: Mapping[str, CommonResidual], conditions: SharedClaim | None, n_boards: int, *, is_declared: bool
+) -> str:
+    """What to do next: ask a board that refuses, or look for the cause of what is left over on all of them.
+
+    Where the card names what is shared, nothing else was searched for.
+    """
     if conditions is not None and conditions.refused_by:
         boards, is_one = joined(conditions.refused_by), len(conditions.refused_by) == 1
         if len(conditions.refused_by) == n_boards:
@@ -177,5 +182,6 @@ def next_step(common: Mapping[str, CommonResidual], conditions: SharedClaim | No
     clear = clear_of_zero(common)
     if clear:
         modes = joined(clear[:_MOST_LISTED])
-        return f"modes {modes} are off alike on all boards: bayesplate diagnose, for one board, says what moves them so"
+        searches = " of a card that names nothing shared searches for" if is_declared else ", for one board, says"
+        return f"modes {modes} are off alike on all boards: bayesplate diagnose{searches} what moves them so"
     return ""

@@ -8,18 +8,28 @@ import pytest
 from bayesplate.campaigns.claim import SharedClaim
 from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero
 from bayesplate.campaigns.diagnosis import next_step, pooled_rms
+from bayesplate.posterior.parameters import N_RIGIDITIES
 
 N_MODES, N_CAMPAIGNS = 12, 400
 
 
-def noise(rng, n_boards, offset=0.0):
-    """Residuals of every mode of boards that have nothing in common but what is added to the first mode."""
+def noise(rng, n_boards, offset=0.0, unlike=0.4):
+    """Residuals of every mode of boards that have nothing in common but what is added to the first mode.
+
+    Some modes are missed more than others by a factor; the noise of a board is what all of them tell.
+    """
     scale = rng.uniform(3.0, 8.0, n_boards)
-    common = {}
-    for mode in range(N_MODES):
-        residuals = scale * rng.standard_normal(n_boards) + (offset if mode == 0 else 0.0)
-        common[f"({mode},0)"] = _pooled({f"board {i}": (residuals[i], scale[i]) for i in range(n_boards)})
-    return common
+    of_modes = np.exp(unlike * rng.standard_normal(N_MODES))
+    residuals = scale[:, None] * of_modes * rng.standard_normal((n_boards, N_MODES))
+    residuals[:, 0] += offset
+    n_spare = N_MODES - N_RIGIDITIES
+    told = np.sqrt((residuals**2).sum(axis=1) / n_spare)
+    return {
+        f"({mode},0)": _pooled(
+            {f"board {i}": (residuals[i, mode], told[i]) for i in range(n_boards)}, n_boards * n_spare
+        )
+        for mode in range(N_MODES)
+    }
 
 
 @pytest.mark.parametrize("n_boards", [2, 3, 6])
@@ -34,12 +44,32 @@ def test_chance_is_seldom_called_clear_of_zero(n_boards):
     assert each > 0.15
 
 
+def test_three_boards_tell_what_they_have_in_common():
+    """Though two degrees of freedom for the scatter between them would never say so."""
+    rng = np.random.default_rng(3)
+    found = np.mean(["(0,0)" in clear_of_zero(noise(rng, 3, offset=30.0, unlike=0.0)) for _ in range(N_CAMPAIGNS)])
+
+    assert found > 0.5
+
+
+def test_an_error_has_the_freedom_of_what_it_is_of():
+    """Alike on both boards, it is of the noise, which all their residuals tell; apart, of the scatter between two."""
+    alike, apart = (_pooled({"a": (10.0, 5.0), "b": (far, 5.0)}, 18) for far in (11.0, 40.0))
+
+    assert alike.error_cents == pytest.approx(5.0 / np.sqrt(2.0))
+    assert (alike.degrees_of_freedom, apart.degrees_of_freedom) == (19, 1)
+    assert apart.error_cents == pytest.approx(15.0)
+
+
 def test_what_all_boards_have_is_clear_of_zero():
     common = noise(np.random.default_rng(1), 6, offset=30.0)
 
     assert clear_of_zero(common) == ["(0,0)"]
-    assert next_step(common, None, 6).startswith("modes (0,0) are off alike on all boards")
-    assert next_step(noise(np.random.default_rng(1), 6), None, 6) == ""
+    assert next_step(noise(np.random.default_rng(1), 6), None, 6, is_declared=True) == ""
+    for is_declared, told in ((True, "of a card that names nothing shared searches for"), (False, ", for one board")):
+        step = next_step(common, None, 6, is_declared=is_declared)
+        assert step.startswith("modes (0,0) are off alike on all boards")
+        assert told in step
 
 
 @pytest.mark.parametrize(
@@ -51,7 +81,7 @@ def test_what_all_boards_have_is_clear_of_zero():
     ],
 )
 def test_boards_that_refuse_are_to_be_measured_again(refused, told):
-    assert next_step({}, SharedClaim(1.0, 1.0, refused, 0, holds=False), 3) == told
+    assert next_step({}, SharedClaim(1.0, 1.0, refused, 0, holds=False), 3, is_declared=True) == told
 
 
 def test_pooled_errors_count_every_mode_once():
