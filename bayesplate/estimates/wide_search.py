@@ -140,7 +140,7 @@ def _density(prior: PriorCard, nominal: Values) -> Callable[[Floats], Floats]:
         by_name = constants | elastic._asdict()
         with np.errstate(invalid="ignore", divide="ignore"):
             parts = [one.log_density_of_log(np.log(by_name[name])) for name, one in prior.constants.items()]
-        return np.nan_to_num(np.sum(parts, axis=0), nan=-np.inf)
+        return np.nan_to_num(np.sum(parts, axis=0), nan=-np.inf, neginf=-np.inf)
 
     return log_prior
 
