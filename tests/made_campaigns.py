@@ -8,9 +8,11 @@ from generator.designs import DESIGNS
 
 MASS = 0.003
 """kg, of the accelerometer."""
+SHEAR = {"G_xz": 0.65e9, "G_yz": 0.03e9}
+"""Pa, of boards that have shear."""
 
 
-def write_campaign(folder, masses=(MASS,) * 3, seed=5, population="spruce", noise_cents=5.0):
+def write_campaign(folder, masses=(MASS,) * 3, seed=5, population="spruce", noise_cents=5.0, has_shear=False):
     """Cards of simulated boards that share an accelerometer, and of their campaign; the path of the latter."""
     rng = np.random.default_rng(seed)
     design = DESIGNS["free-12"]
@@ -18,12 +20,12 @@ def write_campaign(folder, masses=(MASS,) * 3, seed=5, population="spruce", nois
         planted = plant(
             rng,
             design,
-            ["attached_mass"] if mass else [],
+            [*(["attached_mass"] if mass else []), *(["transverse_shear"] if has_shear else [])],
             1.0,
             noise_cents,
             name=f"board-{i}",
             sensor=(0.9 * design.L_x, 0.9 * design.L_y),
-            fixed={"attached_mass": {"mass": mass, "rotary_radius": 0.0}},
+            fixed={"attached_mass": {"mass": mass, "rotary_radius": 0.0}, "transverse_shear": SHEAR},
         )
         (folder / f"board-{i}.toml").write_text(planted.card_text())
     boards = ", ".join(f'"./board-{i}.toml"' for i in range(len(masses)))

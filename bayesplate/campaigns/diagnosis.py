@@ -10,7 +10,7 @@ import numpy as np
 from bayesplate.campaigns.claim import SharedClaim, TaughtBoard
 from bayesplate.campaigns.common import CommonResidual, clear_of_zero
 from bayesplate.campaigns.search import Explanation
-from bayesplate.effects.words import effect_name, effect_names, joined
+from bayesplate.effects.words import effect_names, joined
 
 FORMAT = 1
 CLEARLY = 3.0
@@ -52,7 +52,7 @@ class CampaignDiagnosis:
     claim : bool
         Whether it may be said that the boards share the effects.
     effects : tuple of str
-        Named: these are shared. Group: each is an alternative.
+        Named: these are shared. Group: shared by one of the explanations that may be as probable.
     declared : bool
         Whether the card names them, so that nothing was searched for.
     reason : str
@@ -104,7 +104,7 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
     -------
     verdict : str
     effects : tuple of str
-        Shared ones; each an alternative in a group, the most probable first.
+        Shared ones; in a group those of any alternative, the most probable first.
     reason : str
     """
     none = next(one.probability for one in found if one.way == "none")
@@ -112,7 +112,7 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
         return "none needed", (), f"that the boards lack nothing has the probability {none:.2g}"
     best = found[0]
     near = [one for one in found if CLEARLY * one.probability > best.probability]
-    shared = tuple(one.effect for one in near if one.way == "shared")
+    shared = tuple(dict.fromkeys(effect for one in near if one.way == "shared" for effect in one.effects))
     if best.way != "shared":
         return "unexplained", (), f"{words_of(best)} is the most probable: nothing is shared by all boards"
     if len(near) == 1:
@@ -125,7 +125,7 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
 
 def words_of(one: Explanation) -> str:
     """An explanation as people say it."""
-    effect = effect_name(one.effect)
+    effect = effect_names(one.effects)
     return {
         "none": "no effect",
         "shared": f"{effect} alike on all boards",

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,10 @@ from bayesplate.campaigns.diagnosis import (
     next_step,
     pooled_rms,
 )
-from bayesplate.campaigns.search import BoardSearch, Explanation, explanations
+from bayesplate.campaigns.search import Explanation, explanations, search_board, shown
 from bayesplate.campaigns.shared import shared_by
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.cards import SharedSection
-from bayesplate.diagnosis.evidence.peaks import with_own_labels
-from bayesplate.diagnosis.evidence.search import prepare_search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
@@ -157,7 +156,7 @@ def _diagnosed(
     else:
         searched = _searched(before, could_share, stages)
         verdict, effects, reason = named(searched) if searched else ("none needed", (), "no effect could be shared")
-        with_shared = _sharing(campaign, effects[:1] if verdict != "none needed" else ())
+        with_shared = _sharing(campaign, searched[0].effects if effects else ())
     if with_shared.shared:
         after = fitted_together(with_shared, seed, checkpoints, stages)
     else:
@@ -198,33 +197,40 @@ def _sharing(campaign: Campaign, effects: Sequence[str]) -> Campaign:
     return replace(campaign, problems=problems, shared=shared_by(card, [one.prepared.board for one in problems]))
 
 
-def shareable(campaign: Campaign) -> tuple[str, ...]:
-    """Effects that all boards may have, of one size each, and that boards of one rig, day or species may have alike."""
+def shareable(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
+    """Effects that all boards may have, of one size each, and that boards of one rig, day or species may have alike.
+
+    Single ones, then pairs.
+    """
     can_act = set.intersection(*(set(forms(one.prepared.board)) for one in campaign.problems))
     able = [name for name, effect in EFFECTS.items() if effect.is_of_campaign and name in can_act]
-    return tuple(name for name in able if _has_one_size(campaign, name))
+    single = [name for name in able if _has_one_size(campaign, (name,))]
+    pairs = (pair for pair in combinations(single, 2) if _has_one_size(campaign, pair))
+    return (*((name,) for name in single), *pairs)
 
 
-def _has_one_size(campaign: Campaign, effect: str) -> bool:
-    """Whether a fit could share an effect, and no board has one size of it per setup."""
+def _has_one_size(campaign: Campaign, effects: Sequence[str]) -> bool:
+    """Whether a fit could share these effects, and no board has one size of them per setup."""
     try:
-        sharing = _sharing(campaign, (effect,))
+        sharing = _sharing(campaign, effects)
     except InputError:
         return False
     boards = [one.prepared.board for one in sharing.problems]
     return all(len(one.parameters(board)) == 1 for one in sharing.shared for board in boards)
 
 
-def _searched(before: Mapping[str, Fitted], effects: Sequence[str], stages: Stages) -> tuple[Explanation, ...]:
+def _searched(
+    before: Mapping[str, Fitted], effects: Sequence[tuple[str, ...]], stages: Stages
+) -> tuple[Explanation, ...]:
     """What every board's tables say together."""
     if not effects:
         return ()
+    tried = [name for name, *others in effects if not others]
     searches = []
     for name, one in before.items():
         stages.begin(f"search on board {name}", _SEARCH)
-        ground = prepare_search(baseline_of(one.inference.problem), tried=effects, tell=stages.reached)
-        searches.append(BoardSearch(name, with_own_labels(ground)))
-    return explanations(searches, effects)
+        searches.append(search_board(name, baseline_of(one.inference.problem), tried, stages.reached))
+    return explanations(searches, shown(searches, effects))
 
 
 def _diagnosis(

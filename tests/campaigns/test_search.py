@@ -2,59 +2,87 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_campaigns import write_campaign
+from made_campaigns import MASS, write_campaign
 
 import bayesplate
 from bayesplate.campaigns.diagnosis import named
-from bayesplate.campaigns.search import PRIOR, explanations, log_evidence_shared
+from bayesplate.campaigns.search import (
+    OF_TWO,
+    PRIOR,
+    Explanation,
+    explanations,
+    log_evidence_shared,
+    search_board,
+    shown,
+)
+from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.workflow.campaign_diagnose import _sharing, shareable
 
 
-@dataclass(frozen=True)
-class Tables:
-    """A board's cells of one effect: ln of prior and likelihood of each size, and the evidence of none."""
+class Cells:
+    """A board whose likelihood in each cell of the sizes of effects is given, all as probable beforehand."""
 
-    name: str
-    none: float
-    likelihood: dict
-    prior: float = float(np.log(0.25))
+    def __init__(self, name, none, **effects):
+        self.name, self.none, self.effects = name, none, effects
 
-    def cells(self, effect):
-        return {(0.0, z): (self.prior, value) for z, value in self.likelihood.items()}
+    def cells(self, effects):
+        values = self.effects.get("_".join(effects), {})
+        return {(0.0, z): (-np.log(len(values)), value) for z, value in values.items()}
 
-    def log_evidence(self, effect):
-        if not effect:
-            return self.none
-        return float(np.log(np.sum([np.exp(a + b) for a, b in self.cells(effect).values()])))
+    def log_evidence(self, effects):
+        return float(np.log(np.mean(np.exp(list(self.effects["_".join(effects)].values()))))) if effects else self.none
 
 
 SIZES = (-1.0, 0.0, 1.0, 2.0)
 
 
 def board(name, peak, height=8.0, none=0.0):
-    return Tables(name, none, {z: height - 4.0 * (z - peak) ** 2 for z in SIZES})
+    return Cells(name, none, mass={z: height - 4.0 * (z - peak) ** 2 for z in SIZES})
 
 
 def test_one_size_for_all_is_the_sum_over_sizes_of_the_product_over_boards():
     boards = [board("a", 1.0), board("b", 1.0), board("c", 0.0)]
-    by_hand = np.log(np.sum([0.25 * np.exp(sum(one.likelihood[z] for one in boards)) for z in SIZES]))
+    by_hand = np.log(np.sum([0.25 * np.exp(sum(one.effects["mass"][z] for one in boards)) for z in SIZES]))
 
-    assert log_evidence_shared(boards, "mass") == pytest.approx(by_hand)
-    fewer = [*boards, Tables("d", 0.0, dict.fromkeys(SIZES[1:3], 8.0))]
-    kept = [np.exp(sum(one.likelihood[z] for one in fewer)) for z in SIZES[1:3]]
-    assert log_evidence_shared(fewer, "mass") == pytest.approx(np.log(np.mean(kept)))
+    assert log_evidence_shared(boards, ("mass",)) == pytest.approx(by_hand)
+    fewer = [*boards, Cells("d", 0.0, mass=dict.fromkeys(SIZES[1:3], 8.0))]
+    kept = [np.exp(sum(one.effects["mass"][z] for one in fewer)) for z in SIZES[1:3]]
+    assert log_evidence_shared(fewer, ("mass",)) == pytest.approx(np.log(np.mean(kept)))
+
+
+def test_the_evidence_of_one_size_for_all_is_the_sum_over_cells_of_the_product():
+    one, other = (
+        Cells("one", -1.0, a={0.0: 0.0, 1.0: 2.0}, b={0.0: 1.0}),
+        Cells("other", -2.0, a={0.0: 0.5, 1.0: 1.0}, b={0.0: 0.0}),
+    )
+    found = {
+        (each.way, "".join(each.effects), each.board): each for each in explanations([one, other], [("a",), ("b",)])
+    }
+
+    assert found["shared", "a", ""].log_evidence == pytest.approx(np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(3.0)))
+    assert found["own", "a", ""].log_evidence == pytest.approx(
+        np.log(0.5 + 0.5 * np.exp(2.0)) + np.log(0.5 * np.exp(0.5) + 0.5 * np.exp(1.0))
+    )
+    assert found["one board", "a", "one"].log_evidence == pytest.approx(np.log(0.5 + 0.5 * np.exp(2.0)) - 2.0)
+    assert found["none", "", ""].log_evidence == pytest.approx(-3.0)
+    assert sum(each.probability for each in found.values()) == pytest.approx(1.0)
+    ratio = found["shared", "b", ""].probability / found["none", "", ""].probability
+    assert ratio == pytest.approx(0.5 * PRIOR["shared"] / PRIOR["none"] * np.exp(4.0))
 
 
 def test_boards_that_agree_share_and_boards_that_differ_do_not():
-    agreeing = explanations([board(name, 1.0) for name in "abc"], ["mass"])
-    differing = explanations([board(name, peak) for name, peak in zip("abc", (-1.0, 0.0, 2.0), strict=True)], ["mass"])
-    one = explanations([board("a", 1.0), *(board(name, 0.0, height=-6.0) for name in "bc")], ["mass"])
+    agreeing = explanations([board(name, 1.0) for name in "abc"], [("mass",)])
+    differing = explanations(
+        [board(name, peak) for name, peak in zip("abc", (-1.0, 0.0, 2.0), strict=True)], [("mass",)]
+    )
+    one = explanations([board("a", 1.0), *(board(name, 0.0, height=-6.0) for name in "bc")], [("mass",)])
 
-    assert (agreeing[0].way, agreeing[0].effect) == ("shared", "mass")
+    assert (agreeing[0].way, agreeing[0].effects) == ("shared", ("mass",))
     assert differing[0].way == "own"
     assert (one[0].way, one[0].board) == ("one board", "a")
     for found in (agreeing, differing, one):
@@ -64,18 +92,46 @@ def test_boards_that_agree_share_and_boards_that_differ_do_not():
     assert named(differing)[0] == named(one)[0] == "unexplained"
 
 
-def test_the_probability_is_the_evidence_times_the_stated_prior():
-    boards = [board(name, 1.0, height=0.5) for name in "ab"]
-    found = {(one.way, one.board): one for one in explanations(boards, ["mass", "stiffness"])}
-    ratio = found["shared", ""].probability / found["none", ""].probability
-    evidence = log_evidence_shared(boards, "mass")
+def test_two_effects_alike_take_their_share_of_what_is_shared():
+    """They need a cell in common of both; where a board would not show one of them, there is none."""
+    sizes = {0.0: 3.0, 1.0: 5.0}
+    boards = [Cells(name, 0.0, mass=sizes, stiffness=sizes, mass_stiffness=sizes) for name in "ab"]
+    effects = [("mass",), ("stiffness",), ("mass", "stiffness")]
+    both = {one.effects: one for one in explanations(boards, effects) if one.way == "shared"}
 
-    assert ratio == pytest.approx(np.exp(evidence) * 0.5 * PRIOR["shared"] / PRIOR["none"])
+    assert both["mass", "stiffness"].log_evidence == pytest.approx(np.log(0.5 * np.exp(6.0) + 0.5 * np.exp(10.0)))
+    ratio = both["mass", "stiffness"].probability / both["mass",].probability
+    assert ratio == pytest.approx(OF_TWO / (0.5 * (1.0 - OF_TWO)))
+    one_shows_less = [boards[0], Cells("b", 0.0, mass=sizes, stiffness=sizes)]
+    alone = {one.effects: one for one in explanations(one_shows_less, effects) if one.way == "shared"}
+    assert set(alone) == {("mass",), ("stiffness",)}
 
 
-def searching(folder, twice=""):
+def explanation(way, probability, *effects):
+    return Explanation(way, () if way == "none" else effects or ("attached_mass",), "", 0.0, probability)
+
+
+@pytest.mark.parametrize(
+    ("found", "verdict", "effects"),
+    [
+        ([("shared", 0.9), ("none", 0.01), ("own", 0.09)], "named", ("attached_mass",)),
+        ([("none", 0.9), ("shared", 0.1)], "none needed", ()),
+        ([("shared", 0.5), ("own", 0.45), ("none", 0.04)], "indistinguishable group", ("attached_mass",)),
+        ([("own", 0.9), ("shared", 0.08), ("none", 0.01)], "unexplained", ()),
+        ([("shared", 0.9, "a", "b"), ("shared", 0.05, "a"), ("none", 0.01)], "named", ("a", "b")),
+        ([("shared", 0.5, "a", "b"), ("shared", 0.4, "a"), ("none", 0.01)], "indistinguishable group", ("a", "b")),
+    ],
+)
+def test_what_a_search_allows_to_say(found, verdict, effects):
+    said = named([explanation(*one) for one in found])
+
+    assert said[:2] == (verdict, effects)
+    assert said[2]
+
+
+def searching(folder, twice="", **planted):
     """A campaign that names nothing shared; one board may have its setup a second time."""
-    path = write_campaign(folder)
+    path = write_campaign(folder, **planted)
     path.write_text(path.read_text().replace('[[shared]]\neffect = "attached_mass"\n', ""))
     if twice:
         card = folder / f"{twice}.toml"
@@ -90,11 +146,59 @@ def test_what_a_fit_could_not_share_is_not_searched_for(tmp_path):
     campaign = searching(tmp_path)
     found = shareable(campaign)
 
-    assert set(found) == {"transverse_shear", "attached_mass", "air_loading", "support_stiffness"}
-    for effect in found:
-        assert _sharing(campaign, (effect,)).shared
+    single = {"transverse_shear", "attached_mass", "air_loading", "support_stiffness"}
+    assert {each for each in found if len(each) == 1} == {(name,) for name in single}
+    assert {frozenset(each) for each in found if len(each) == 2} == {frozenset(two) for two in combinations(single, 2)}
+    for effects in found:
+        assert _sharing(campaign, effects).shared
     assert [one.name for one in _sharing(campaign, ("air_loading",)).shared] == ["air_loading.baffle"]
 
 
 def test_an_effect_that_each_setup_has_at_a_size_of_its_own_is_not_searched_for(tmp_path):
-    assert shareable(searching(tmp_path, twice="board-1")) == ("transverse_shear",)
+    assert shareable(searching(tmp_path, twice="board-1")) == (("transverse_shear",),)
+
+
+SHEAR_AND_SENSOR = ("transverse_shear", "attached_mass")
+
+
+@pytest.fixture(scope="module", params=[True, False])
+def found_on_boards(request, tmp_path_factory):
+    """Whether shear is planted besides the sensor, and the tables of both on each board."""
+    campaign = searching(tmp_path_factory.mktemp("boards"), masses=(MASS, MASS), has_shear=request.param)
+    boards = [search_board(one.board.name, baseline_of(one.posed), SHEAR_AND_SENSOR) for one in campaign.problems]
+    return request.param, boards
+
+
+def test_shear_and_a_sensor_that_all_boards_have_are_found_together(found_on_boards):
+    """And the sensor alone where it is alone, though no board by itself would show a sensor beside shear."""
+    has_shear, boards = found_on_boards
+    effects = shown(boards, [*((name,) for name in SHEAR_AND_SENSOR), SHEAR_AND_SENSOR])
+    best = explanations(boards, effects)[0]
+
+    assert not any("attached_mass" in one.ground.paired for one in boards)
+    assert (best.way, best.effects) == ("shared", SHEAR_AND_SENSOR if has_shear else ("attached_mass",))
+    assert best.probability > 0.5
+
+
+def test_the_cells_of_two_effects_are_those_of_each_and_make_up_the_evidence(found_on_boards):
+    one = found_on_boards[1][0]
+    cells = one.cells(SHEAR_AND_SENSOR)
+    tables = [one.ground.candidates[name].coarse for name in SHEAR_AND_SENSOR]
+    hypothesis = one.hypothesis(SHEAR_AND_SENSOR)
+    seen = hypothesis.seen(one.ground.baseline, one.ground.baseline.residual[None, :])
+
+    assert len(cells) == tables[0].n_cells * tables[1].n_cells
+    expected = hypothesis.terms(one.ground.whole).log_evidence(seen)[0] + hypothesis.log_labels
+    assert one.log_evidence(SHEAR_AND_SENSOR) == pytest.approx(expected)
+    for key, (log_prior, _) in cells.items():
+        at = [np.isclose(table.z, z).all(axis=1) for table, z in zip(tables, (key[1:3], key[4:]), strict=True)]
+        assert np.exp(log_prior) == pytest.approx(tables[0].weights[at[0]][0] * tables[1].weights[at[1]][0])
+
+
+def test_a_pair_is_asked_for_where_the_boards_together_would_show_both():
+    def seen(**traces):
+        return SimpleNamespace(ground=SimpleNamespace(trace=traces.get))
+
+    effects = [("mass",), ("shear",), ("mass", "shear")]
+    assert shown([seen(mass=1.5, shear=9.0)], effects) == (("mass",), ("shear",))
+    assert shown([seen(mass=1.5, shear=9.0)] * 2, effects) == tuple(effects)

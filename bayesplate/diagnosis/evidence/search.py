@@ -20,6 +20,9 @@ from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tab
 
 Floats = NDArray[np.float64]
 
+LEAST_TRACE = 2.0
+"""Length of a trace, in units of the readings' uncertainty, from which an effect may be one of two."""
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -89,11 +92,13 @@ class Ground:
     @property
     def paired(self) -> tuple[str, ...]:
         """Effects that may be one of two: those whose trace the search could see."""
-        return tuple(name for name, one in self.candidates.items() if self._is_traceable(one))
+        return tuple(name for name in self.candidates if not self.trace(name) < LEAST_TRACE)
 
-    def _is_traceable(self, one: Candidate) -> bool:
+    def trace(self, name: str) -> float:
+        """Root of the sum of squares of a candidate's traced shift, in units of each reading's uncertainty."""
+        one = self.candidates[name]
         seen = self.baseline.whitened(one.visible if one.traced is None else one.traced)
-        return not np.sqrt(np.sum(seen**2)) < 2.0
+        return float(np.sqrt(np.sum(seen**2)))
 
     def is_below_detection_limit(self, name: str) -> bool:
         """Whether this experiment could not see a candidate even if it were there."""

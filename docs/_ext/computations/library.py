@@ -14,6 +14,7 @@ from bayesplate import errors
 from bayesplate.campaigns import diagnosis as of_campaigns
 from bayesplate.campaigns import evidence, likelihood, population, scatter
 from bayesplate.campaigns.agreement import p_value
+from bayesplate.campaigns.search import OF_TWO
 from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
 from bayesplate.cards.shelf import card_names
 from bayesplate.diagnosis.decision.claim import IMPROBABLE, STANDARD_ERRORS
@@ -243,7 +244,7 @@ def gate(folder: Path) -> str:
 
 _WAYS = {
     "none": "nothing is lacking",
-    "shared": "an effect alike on all boards",
+    "shared": "an effect, or two, alike on all boards",
     "one board": "an effect on one board",
     "own": "an effect of another size on each board",
 }
@@ -280,6 +281,7 @@ def campaign_limits(folder: Path) -> str:
         ("least probability that nothing is lacking, for *none needed*", f"{of_campaigns.IMPROBABLE:g}"),
         ("how many times as probable as the next, for *named*", f"{of_campaigns.CLEARLY:g}"),
         *((f"probability before: {_WAYS[way]}", f"{before:g}") for way, before in WAYS_BEFORE.items()),
+        ("share of what is alike beforehand that is two effects, where the boards can have two", f"{OF_TWO:g}"),
     ]
     return words_table(("limit", "value"), rows)
 
