@@ -91,6 +91,11 @@ class CampaignDiagnosis:
     recommendation: str
     notes: tuple[str, ...]
 
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Effects that the boards were fitted with together: what the card names, or the most probable ones."""
+        return self.explanations[0].effects if self.explanations else self.effects
+
 
 def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
     """What a search over a campaign allows to say: a verdict, effects, and the reason.
@@ -144,7 +149,7 @@ def claim_sentence(diagnosis: CampaignDiagnosis) -> str:
     if one is None:
         return f"Nothing is claimed: {diagnosis.reason}."
     n = len(diagnosis.left_out_boards)
-    effects = effect_names(diagnosis.effects)
+    effects = effect_names(diagnosis.judged)
     scores = (
         f"{one.n_better} of {n} boards that were left out are predicted better by what the others teach, in sum by "
         f"{one.gain:.1f} ± {one.standard_error:.1f} in log score"

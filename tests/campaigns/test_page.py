@@ -12,6 +12,7 @@ from read_pages import Read, faults
 import bayesplate
 from bayesplate.campaigns.claim import SharedClaim, TaughtBoard
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, PooledErrors, claim_sentence
+from bayesplate.campaigns.search import Explanation
 from bayesplate.campaigns.tables import shared_table
 from bayesplate.errors import InputError
 from bayesplate.report import campaign_page as home
@@ -102,6 +103,20 @@ def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):
     assert claim_sentence(refused).startswith("It is not claimed that the boards share attached mass")
     assert "board-1 does not want it" in claim_sentence(refused)
     assert claim_sentence(nothing) == "Nothing is claimed: nothing is lacking."
+
+
+def test_of_a_group_the_sentence_names_what_the_boards_were_fitted_with(diagnosis):
+    both = Explanation("shared", ("transverse_shear", "attached_mass"), "", 0.0, 0.6)
+    other = Explanation("shared", ("transverse_shear", "air_loading"), "", 0.0, 0.4)
+    group = replace(
+        diagnosis,
+        verdict="indistinguishable group",
+        claim=False,
+        effects=("transverse_shear", "attached_mass", "air_loading"),
+        explanations=(both, other),
+    )
+
+    assert "that the boards share transverse shear and attached mass: 2 of 3" in claim_sentence(group)
 
 
 def test_what_the_terminal_shows(fitted_campaign, diagnosis):
