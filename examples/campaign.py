@@ -2,7 +2,8 @@
 
 Six free half-tops were measured on one day with one accelerometer. Each of them alone cannot tell transverse shear from
 the sensor's mass. Together they teach both, and each board is asked whether it wants what the other five teach it. The
-card spruce-half-tops-shear names the same boards and shares transverse shear alone.
+card spruce-half-tops-shear names the same boards and shares transverse shear alone; spruce-half-tops-search names
+nothing as shared, and has it searched for.
 
     python examples/campaign.py --out campaign --results campaign/results
 
@@ -33,19 +34,25 @@ def page(found: bayesplate.CampaignDiagnoseResult) -> str:
     """What a diagnosis of a campaign found, as a page of the documentation."""
     diagnosis, summary = found.diagnosis, found.summary
     tables = [*searched_tables(diagnosis)]
+    errors = f"{diagnosis.before.in_sample_rms_cents:.1f} cents"
+    left_over = {"": diagnosis.common_residual}
     if summary.shared:
         tables += [shared_table(summary.shared), *(taught_table(summary, name) for name in summary.shared)]
+        errors += f" without what is shared, {diagnosis.after.in_sample_rms_cents:.1f} with it"
+        left_over = {
+            ", before what they share": diagnosis.common_residual_before,
+            ", after what they share": diagnosis.common_residual,
+        }
     tables.append(boards_table(summary))
     parts = [
         f"# {found.after.campaign.card.title or summary.name}",
         "Written by `examples/campaign.py`; do not edit.",
         claim_sentence(diagnosis),
-        f"Error of all labelled modes, each board's constants fitted: {diagnosis.before.in_sample_rms_cents:.1f} cents "
-        f"without what is shared, {diagnosis.after.in_sample_rms_cents:.1f} with it.",
+        f"Error of all labelled modes, each board's constants fitted: {errors}.",
         *(markdown(one) for one in tables),
     ]
-    for words, common in (("before", diagnosis.common_residual_before), ("after", diagnosis.common_residual)):
-        parts += [f"## What is left over on all boards alike, {words} what they share", markdown(common_table(common))]
+    for words, common in left_over.items():
+        parts += [f"## What is left over on all boards alike{words}", markdown(common_table(common))]
     parts += [f"- {warning}" for warning in summary.warnings]
     parts += [f"What to do next: {diagnosis.recommendation}."] if diagnosis.recommendation else []
     return "\n\n".join(part.rstrip() for part in parts) + "\n"

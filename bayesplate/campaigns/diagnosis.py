@@ -119,7 +119,7 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
     near = [one for one in found if CLEARLY * one.probability > best.probability]
     shared = tuple(dict.fromkeys(effect for one in near if one.way == "shared" for effect in one.effects))
     if best.way != "shared":
-        return "unexplained", (), f"{words_of(best)} is the most probable: nothing is shared by all boards"
+        return "unexplained", (), f"the most probable is {words_of(best)}, which the boards do not share"
     if len(near) == 1:
         rest = found[1]
         times = best.probability / max(rest.probability, 1e-300)

@@ -84,6 +84,11 @@ CHECKS = (
         "The same, each board's own shear differing from what they share by about 25 %.",
     ),
     (
+        "spruce-half-tops-search",
+        "python examples/campaign.py spruce-half-tops-search --out docs/validation --results results/search",
+        "The same, nothing named as shared: what they have alike is searched for.",
+    ),
+    (
         "campaigns",
         "make campaigns",
         "Simulated campaigns of eight boards: with one sensor and the shear of one species on all, intervals of "
