@@ -7,6 +7,7 @@ import json
 import pytest
 from calibration.campaigns import CampaignDesign, identity, judge, simulate_one
 from calibration.records import read_done
+from calibration.run_campaigns import BEGUN, main
 
 
 def record(kind, number, claim, shear=2.0, mass=2.0):
@@ -49,6 +50,16 @@ def test_a_file_of_another_design_is_refused(tmp_path):
     assert read_done(path, identity(CampaignDesign())) == []
     with pytest.raises(SystemExit, match="made with another design"):
         read_done(path, identity(CampaignDesign(n_boards=3)))
+
+
+@pytest.mark.skipif(not BEGUN.exists(), reason="no run is begun")
+def test_the_run_that_is_begun_is_of_this_design_and_counts_as_not_whole(tmp_path, capsys, monkeypatch):
+    out = tmp_path / "campaigns.jsonl"
+    monkeypatch.setattr("sys.argv", ["run_campaigns.py", "--workers", "0", "--out", str(out)])
+
+    assert main() == 1
+    assert "not whole: " in capsys.readouterr().out
+    assert read_done(out, identity(CampaignDesign()))
 
 
 @pytest.mark.slow

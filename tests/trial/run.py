@@ -11,7 +11,6 @@ missed; 2: usage.
 from __future__ import annotations
 
 import argparse
-import gzip
 import json
 import os
 import sys
@@ -23,7 +22,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one board a core; before numpy 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration.records import add_to, read_done
+from calibration.records import add_to, begin, read_done
 from trial.cells import CELLS, Cell, identity, jobs
 from trial.judge import Record, judge_one
 from trial.page import write
@@ -68,14 +67,6 @@ def run(
     return [by_board[key] for key in keys if key in by_board]
 
 
-def begin(out: Path, begun: Path = BEGUN) -> None:
-    """Begin a file that does not exist with the records of the trial that is not whole yet."""
-    if out.exists() or not begun.exists():
-        return
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_bytes(gzip.decompress(begun.read_bytes()))
-
-
 def _begun(out: Path, cells: Sequence[Cell], base_seed: int, check: bool) -> list[Record]:
     """Records that are there already, if they are of this trial and this search."""
     wanted = identity(cells, base_seed)
@@ -115,7 +106,7 @@ def main() -> int:
     options = parser.parse_args()
     started = time.perf_counter()
     if options.base_seed == BASE_SEED:
-        begin(options.out)
+        begin(options.out, BEGUN)
     records = run(
         CELLS,
         options.out,

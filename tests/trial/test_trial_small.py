@@ -12,13 +12,14 @@ import time
 
 import numpy as np
 import pytest
+from calibration.records import begin
 from generator.boards import plant
 from scipy import stats
 from trial.amplitudes import MEANINGS, quantiles
 from trial.cells import CELLS, KINDS, NOISES, SENSORS, Cell, identity, jobs
 from trial.counts import Share, mean, median
 from trial.judge import judge_one, plant_board
-from trial.run import BASE_SEED, BEGUN, begin, run
+from trial.run import BASE_SEED, BEGUN, run
 from trial.shared import baseline_of_card, control_of
 from trial.summary import CONDITIONS
 
