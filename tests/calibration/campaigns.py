@@ -2,7 +2,7 @@
 
 Where all boards share it, they have a sensor of one mass and shear moduli of their own species, all drawn from the
 priors that the cards give them: intervals have to hold them as often as they say. Where three boards have the sensor,
-or none, they are thin, and the sensor alone is said to be shared: that has not to be claimed.
+or none, they are thin, and the sensor alone is said to be shared: that must not be claimed.
 """
 
 from __future__ import annotations
