@@ -141,7 +141,9 @@ def _terms(u: Floats, degree: int) -> Floats:
 
 
 def _near(u: Floats) -> Floats:
-    return np.clip(u, -_REACH, _REACH)
+    """The same points, those out of reach brought back towards the middle: in a corner of a box there are no draws."""
+    radius = np.linalg.norm(u, axis=1, keepdims=True)
+    return np.asarray(np.where(radius > _REACH, u * (_REACH / np.maximum(radius, _REACH)), u))
 
 
 def _told(reference: Floats) -> Floats:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from linear_boards import linear_boards
 from scipy import stats
 
 from bayesplate.campaigns.evidence import bridge_sampling
-from bayesplate.campaigns.likelihood import SharedLikelihood
+from bayesplate.campaigns.likelihood import _REACH, SharedLikelihood, _near
 
 N = 6000
 Z_TRUE = [1.2, -0.7, 0.4]
@@ -111,3 +113,12 @@ def test_the_evidence_of_a_linear_board_is_the_closed_form():
     assert (
         abs(bridge_sampling(log_density, np.column_stack([own, z + 0.5]), rng) - exact) > 0.05
     )  # draws from elsewhere
+
+
+def test_a_polynomial_is_believed_in_a_ball_about_its_draws():
+    """Not in a box: in its corners, six standard deviations off, the sum over boards rose to peaks of its own."""
+    corners = 3.4 * np.array(list(product((-1.0, 1.0), repeat=3)))
+
+    assert np.linalg.norm(_near(corners), axis=1) == pytest.approx(_REACH)
+    assert _near(corners) == pytest.approx(corners * _REACH / np.linalg.norm(corners[0]))
+    assert np.array_equal(_near(0.5 * corners), 0.5 * corners)
