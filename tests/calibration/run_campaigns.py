@@ -53,8 +53,10 @@ def main() -> int:
     kinds = given.kinds.split(",")
     if not set(kinds) <= set(KINDS):
         parser.error(f"--kinds: wanted some of {','.join(KINDS)}, got {given.kinds}")
-    begin(given.out, BEGUN)
-    records = run(CampaignDesign(n_boards=given.boards), kinds, given.campaigns, given.workers, given.out)
+    design = CampaignDesign(n_boards=given.boards)
+    if design == CampaignDesign():
+        begin(given.out, BEGUN)
+    records = run(design, kinds, given.campaigns, given.workers, given.out)
     lines, well = judge(records)
     wanted = len(KINDS) * given.campaigns
     if len(records) < wanted:

@@ -60,6 +60,10 @@ def test_the_run_that_is_begun_is_of_this_design_and_counts_as_not_whole(tmp_pat
     assert main() == 1
     assert "not whole: " in capsys.readouterr().out
     assert read_done(out, identity(CampaignDesign()))
+    other = tmp_path / "other.jsonl"
+    monkeypatch.setattr("sys.argv", ["run_campaigns.py", "--workers", "0", "--boards", "3", "--out", str(other)])
+    assert main() == 1
+    assert read_done(other, identity(CampaignDesign(n_boards=3))) == []
 
 
 @pytest.mark.slow
