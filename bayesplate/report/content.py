@@ -61,7 +61,7 @@ def _cents(value: float) -> str:
     return f"{two_digits(value)} cents ({two_digits(2 ** (value / 1200) - 1, 100)} %)"
 
 
-def constants_table(summary: Summary) -> Table:
+def constants_table(summary: Summary, title: str) -> Table:
     """The constants beside the older methods."""
     rows = []
     for name in CONSTANTS:
@@ -72,7 +72,7 @@ def constants_table(summary: Summary) -> Table:
         trimmed = _trimmed(summary.percentile, name)
         rows.append((constant_name(name), plus_minus(entry, GPA), interval(entry, GPA), *cells, trimmed))
     columns = ("GPa", "mean ± sd", "90 % interval", "paper's least squares", "weighted", "percentile method")
-    return Table("Elastic constants", columns, tuple(rows))
+    return Table(title, columns, tuple(rows))
 
 
 def _trimmed(percentile: Percentile | None, name: str) -> str:

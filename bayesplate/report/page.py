@@ -39,7 +39,7 @@ from bayesplate.report.signatures import before_after_picture, signatures_pictur
 from bayesplate.report.spectrum import spectrum_pictures
 from bayesplate.report.style import Picture, visible
 from bayesplate.report.symbols import in_page
-from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, short_sentences
+from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, quoted_constants, short_sentences
 from bayesplate.results.exports import write_exports
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
 from bayesplate.results.references import references
@@ -222,7 +222,7 @@ def render(
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
         pictures=_with_all_places(shown),
         tables={
-            "constants": content.constants_table(quoted(summary, diagnosis)),
+            "constants": quoted_constants(summary, diagnosis),
             "effects": content.effects_table(board, summary),
             "makers": content.makers_table(summary),
             "ratios": content.ratios_table(summary),

@@ -13,10 +13,11 @@ from bayesplate.diagnosis.wording.tables import (
     errors_table,
     shift_table,
     sizes_table,
+    what_is_quoted,
 )
 from bayesplate.diagnosis.wording.told import headline_sentence, remarks, shown_model, verdict_sentences, warnings
 from bayesplate.diagnosis.wording.words import VERDICTS
-from bayesplate.report.content import summary_sentences
+from bayesplate.report.content import constants_table, summary_sentences
 from bayesplate.results.contract import Elastic, Rigidity
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table
@@ -108,6 +109,12 @@ def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
             leave_one_out_rms_cents=errors.leave_one_out_rms_cents,
         ),
     )
+
+
+def quoted_constants(summary: Summary, diagnosis: Diagnosis | None) -> Table:
+    """The constants to quote beside the older methods; its title says what they are."""
+    title = "Elastic constants" + ("" if diagnosis is None else f", {what_is_quoted(diagnosis)}")
+    return constants_table(quoted(summary, diagnosis), title)
 
 
 def short_sentences(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:

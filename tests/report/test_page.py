@@ -173,6 +173,7 @@ def test_constants_averaged_over_the_effects_are_shown(clamped):
     text = Read(clamped.page("A board", diagnosis=found)).text
 
     assert "averaged over everything that may be the case" in text
+    assert "Elastic constants, averaged over all explanations by their probability" in text
     assert text.count("10.25 ± 0.50") == 2  # in short, and beside the older methods
     assert "9.50 to 11.00" in text
 

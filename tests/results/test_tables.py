@@ -108,7 +108,7 @@ def test_what_a_page_says():
         "The fit misses the frequencies by 7.5 cents (0.43 %); a mode that it has not seen, by 12 cents (0.71 %)."
     )
     assert weakest == "Least well known is G_xy, shear: ± 12 %."
-    assert content.constants_table(SUMMARY).rows == (
+    assert content.constants_table(SUMMARY, "Constants").rows == (
         ("E_x, along the grain", "10.50 ± 0.25", "10.00 to 11.00", "10.25", "10.25", "10.00 ± 0.20"),
         ("E_y, across the grain", "1.00 ± 0.12", "0.75 to 1.25", "–", "1.12", "–"),
         ("G_xy, shear", "0.500 ± 0.062", "0.375 to 0.625", "0.500", "0.500", "0.500"),

@@ -83,13 +83,18 @@ def shift_table(diagnosis: Diagnosis) -> Table | None:
     return Table(title, ("constant", "before", "after", "shift, sd"), tuple(rows))
 
 
+def what_is_quoted(diagnosis: Diagnosis) -> str:
+    """What the constants are that a diagnosis shows, as it stands after a comma."""
+    if diagnosis.verdict == "unexplained":
+        return "of the model that does not explain the readings"
+    return "averaged over all explanations by their probability"
+
+
 def averaged_table(diagnosis: Diagnosis) -> Table:
     """The moduli to quote."""
     every = diagnosis.elastic_averaged.items()
     rows = tuple((narrow_name(name), plus_minus(one, GPA), interval(one, GPA)) for name, one in every)
-    averaged = "averaged over all explanations by their probability"
-    what = "of the model that does not explain the readings" if diagnosis.verdict == "unexplained" else averaged
-    return Table(f"The constants, {what}, GPa", ("constant", "mean ± sd", "90 % interval"), rows)
+    return Table(f"The constants, {what_is_quoted(diagnosis)}, GPa", ("constant", "mean ± sd", "90 % interval"), rows)
 
 
 def answers_table(diagnosis: Diagnosis) -> Table:

@@ -44,12 +44,11 @@ def shown_model(diagnosis: Diagnosis) -> str:
     """Which model the figures and tables below a verdict belong to; empty where it is the only one."""
     if not diagnosis.is_refitted:
         return ""
+    model = f"the model with {diagnosis.refitted_words}"
+    told = f"The table of the constants is of the averaged ones; all else below is of {model}"
     if diagnosis.verdict == "named":
-        return f"The figures and tables below are of the model with {diagnosis.refitted_words}."
-    return (
-        f"The figures and tables below are of the model with {diagnosis.refitted_words}, which is only one of the "
-        "explanations. Quote the averaged constants."
-    )
+        return f"{told}."
+    return f"{told}, which is only one of the explanations. Quote the averaged constants."
 
 
 def headline_sentence(diagnosis: Diagnosis) -> str:

@@ -135,7 +135,7 @@ def test_the_terminal_and_the_page_tell_the_same(word, words):
 
 def test_the_page_says_what_its_constants_are():
     assert remarks(replace(NAMED, notes=("mind this",))) == ["The reason: the reason of it.", "mind this"]
-    assert shown_model(NAMED) == "The figures and tables below are of the model with membrane tension."
+    assert shown_model(NAMED).endswith("averaged ones; all else below is of the model with membrane tension.")
     assert "only one of the explanations. Quote the averaged" in shown_model(DIAGNOSES["indistinguishable group"])
     assert shown_model(DIAGNOSES["none needed"]) == shown_model(DIAGNOSES["unexplained"]) == ""
     for word, one in DIAGNOSES.items():
