@@ -181,8 +181,8 @@ def _posterior(problem: PosedProblem, read: np.ndarray, rng: np.random.Generator
         {name: np.ravel(v)[0] for name, v in parameters.values(_whole(problem, columns, best)).items()},
         np.array([board.setups[0].noise.median * widening**0.5]),
     )
-    for _ in range(2):  # the second time from what the first has found
-        theta, weights = _weighted_draws(posterior, centre, covariance, rng)
+    for n_draws in (N_DRAWS // 2, N_DRAWS):  # the second time from what the first has found
+        theta, weights = _weighted_draws(posterior, centre, covariance, n_draws, rng)
         centre, covariance = weights @ theta, np.cov(theta.T, aweights=weights)
     values = parameters.values(theta)
     elastic = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
@@ -197,11 +197,11 @@ def _posterior(problem: PosedProblem, read: np.ndarray, rng: np.random.Generator
 
 
 def _weighted_draws(
-    posterior: Posterior, centre: np.ndarray, covariance: np.ndarray, rng: np.random.Generator
+    posterior: Posterior, centre: np.ndarray, covariance: np.ndarray, n_draws: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draws from a Student distribution, with the weights that make them draws of the posterior."""
     factor = WIDER * np.linalg.cholesky(covariance)
-    z = rng.standard_normal((N_DRAWS, centre.size)) / np.sqrt(rng.chisquare(DEGREES, (N_DRAWS, 1)) / DEGREES)
+    z = rng.standard_normal((n_draws, centre.size)) / np.sqrt(rng.chisquare(DEGREES, (n_draws, 1)) / DEGREES)
     theta = centre + z @ factor.T
     log_proposal = -0.5 * (DEGREES + centre.size) * np.log1p(np.sum(z**2, axis=1) / DEGREES)
     log_weights = posterior(theta) - log_proposal
