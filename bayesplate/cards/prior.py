@@ -233,9 +233,7 @@ class PriorCard(Section):
             "poisson_xy": self.stated_poisson,
             "density_kg_m3": self.stated_density,
         }
-        return {
-            **{name: one.source for name, one in (self.stated_constants | stated).items() if one},
-        }
+        return {name: one.source for name, one in (self.stated_constants | stated).items() if one}
 
 
 def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None) -> PriorCard:
