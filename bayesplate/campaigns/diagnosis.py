@@ -10,7 +10,7 @@ import numpy as np
 from bayesplate.campaigns.claim import SharedClaim, TaughtBoard
 from bayesplate.campaigns.common import CommonResidual, clear_of_zero
 from bayesplate.campaigns.search import Explanation
-from bayesplate.effects.words import effect_names, joined
+from bayesplate.effects.words import effect_name, effect_names, joined
 
 FORMAT = 1
 CLEARLY = 3.0
@@ -119,7 +119,9 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
     near = [one for one in found if CLEARLY * one.probability > best.probability]
     shared = tuple(dict.fromkeys(effect for one in near if one.way == "shared" for effect in one.effects))
     if best.way != "shared":
-        return "unexplained", (), f"the most probable is {words_of(best)}, which the boards do not share"
+        rival = f"; {joined([words_of(one) for one in near[1:]], 'or')} may be as probable" if near[1:] else ""
+        what = "of which they share the first" if best.way == "shared and own" else "which the boards do not share"
+        return "unexplained", (), f"the most probable is {words_of(best)}, {what}{rival}"
     if len(near) == 1:
         rest = found[1]
         times = best.probability / max(rest.probability, 1e-300)
@@ -130,6 +132,9 @@ def named(found: Sequence[Explanation]) -> tuple[str, tuple[str, ...], str]:
 
 def words_of(one: Explanation) -> str:
     """An explanation as people say it."""
+    if one.way == "shared and own":
+        shared, own = one.effects
+        return f"{effect_name(shared)} alike on all boards beside {effect_name(own)} of another size on each"
     effect = effect_names(one.effects)
     return {
         "none": "no effect",
@@ -171,11 +176,18 @@ def pooled_rms(boards: Mapping[str, float], counts: Mapping[str, int]) -> float:
 
 
 def next_step(
-    common: Mapping[str, CommonResidual], conditions: SharedClaim | None, n_boards: int, *, is_declared: bool
+    common: Mapping[str, CommonResidual],
+    conditions: SharedClaim | None,
+    n_boards: int,
+    *,
+    is_declared: bool,
+    verdict: str = "named",
+    explanations: Sequence[Explanation] = (),
 ) -> str:
-    """What to do next: ask a board that refuses, or look for the cause of what is left over on all of them.
+    """What to do next.
 
-    Where the card names what is shared, nothing else was searched for.
+    Ask a board that refuses, declare what boards have each of its own, or look for the cause of what is left over on
+    all of them. Where the card names what is shared, nothing else was searched for.
     """
     if conditions is not None and conditions.refused_by:
         boards, is_one = joined(conditions.refused_by), len(conditions.refused_by) == 1
@@ -184,6 +196,13 @@ def next_step(
         they, do = ("it", "does") if is_one else ("they", "do")
         out = "it" if is_one else "them"
         return f"measure {boards} again, or take {out} out of the campaign: {they} {do} not want what the others share"
+    if verdict == "unexplained" and explanations:
+        best = explanations[0]
+        where = f"the card of {best.board}" if best.board else "the card of each board"
+        return (
+            f'declare it on {where}, effects = ["{best.effects[-1]}"], and diagnose again: what the boards share is '
+            "judged beside it then"
+        )
     clear = clear_of_zero(common)
     if clear:
         modes = joined(clear[:_MOST_LISTED])

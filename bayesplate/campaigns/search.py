@@ -9,7 +9,8 @@ Given the size the boards are independent, so that one size for all has the evid
 
 beside each board with a size of its own, one board alone, and no effect at all. It costs nothing more than the boards'
 own searches. Cells are the same for all boards in the standard coordinates of the effect's prior. All boards may share
-two effects as well, as boards of one species and one sensor do: then a cell is one of each, and their shifts add.
+two effects as well, as boards of one species and one sensor do: then a cell is one of each, and their shifts add. Or
+they share one, and have another at a size of its own each: that one is summed over on every board first.
 """
 
 from __future__ import annotations
@@ -28,11 +29,14 @@ from bayesplate.diagnosis.evidence.terms import log_sum
 from bayesplate.diagnosis.shifts.baseline import Baseline
 
 Floats = NDArray[np.float64]
-Way = Literal["none", "shared", "own", "one board"]
+Way = Literal["none", "shared", "own", "one board", "shared and own"]
 Cell = tuple[float, ...]
 
-PRIOR: Mapping[Way, float] = {"none": 0.5, "shared": 0.25, "one board": 0.15, "own": 0.1}
-"""Prior probability of each way, divided among the effects, and among the boards, that it may be."""
+PRIOR: Mapping[Way, float] = {"none": 0.5, "shared": 0.25, "one board": 0.15, "own": 0.08, "shared and own": 0.02}
+"""Prior probability of each way, divided among the effects, and among the boards, that it may be.
+
+That of two where the boards cannot have two goes to the one effect of a size of its own.
+"""
 OF_TWO = 0.2
 """Share of what is shared beforehand that is two effects, where the boards can have two."""
 _DIGITS = 9
@@ -44,10 +48,11 @@ class Explanation:
 
     Attributes
     ----------
-    way : "none", "shared", "own" or "one board"
-        No effect; one size for all boards; a size of its own for each; one board alone.
+    way : "none", "shared", "own", "one board" or "shared and own"
+        No effect; one size for all boards; a size of its own for each; one board alone; the first effect of one size
+        for all and the second of a size of its own for each.
     effects : tuple of str
-        Empty for none; two only where both are shared.
+        Empty for none; two where both are shared or the second is each board's own.
     board : str
         The one board; otherwise empty.
     log_evidence : float
@@ -89,6 +94,22 @@ class BoardSearch:
         one = self.hypothesis(effects)
         if one is None:
             return {}
+        return dict(zip(*self._of_cells(one), strict=True))
+
+    def cells_beside(self, shared: str, own: str) -> dict[Cell, tuple[float, float]]:
+        """The same for one effect, another of whatever size being there as well: empty where there are no pairs."""
+        one = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
+        if one is None:
+            return {}
+        first = 1 + self.ground.candidates[one.members[0]].coarse.z.shape[1]
+        kept = slice(None, first) if one.members[0] == shared else slice(first, None)
+        by_cell: dict[Cell, list[tuple[float, float]]] = {}
+        for key, value in zip(*self._of_cells(one), strict=True):
+            by_cell.setdefault(key[kept], []).append(value)
+        return {key: _summed(np.array(values)) for key, values in by_cell.items()}
+
+    def _of_cells(self, one: Hypothesis) -> tuple[list[Cell], list[tuple[float, float]]]:
+        """Cells that are possible, and ln of the prior probability and of the likelihood in each."""
         terms = one.terms(self.ground.whole)
         seen = one.seen(self.ground.baseline, self.ground.baseline.residual[None, :])
         n_cells = one.table.n_cells
@@ -97,12 +118,9 @@ class BoardSearch:
         )
         with np.errstate(divide="ignore"):
             log_prior = np.log(one.table.weights)
-        keys = self._keys(one)
-        return {
-            tuple(float(part) for part in key): (float(prior), float(joint - prior))
-            for key, prior, joint in zip(keys, log_prior, by_cell, strict=True)
-            if np.isfinite(prior)
-        }
+        possible = np.flatnonzero(np.isfinite(log_prior))
+        keys = [tuple(float(part) for part in key) for key in self._keys(one)[possible]]
+        return keys, [(float(log_prior[i]), float(by_cell[i] - log_prior[i])) for i in possible]
 
     def _keys(self, one: Hypothesis) -> Floats:
         """What a cell is on any board: form and standard coordinates of each of its effects, (n_cells, n) array."""
@@ -156,16 +174,18 @@ def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...
     shared = {each: log_evidence_shared(boards, each) for each in effects}
     single = [each for each in effects if len(each) == 1]
     pairs = [each for each in effects if len(each) == 2 and np.isfinite(shared[each])]
-    of_two = OF_TWO * PRIOR["shared"] if pairs else 0.0
+    beside = [each for one, other in pairs for each in ((one, other), (other, one))]
+    of_two, mixed = (OF_TWO * PRIOR["shared"], PRIOR["shared and own"]) if pairs else (0.0, 0.0)
     found: list[tuple[Way, tuple[str, ...], str, float, float]] = [
         ("none", (), "", float(none.sum()), PRIOR["none"]),
         *(("shared", pair, "", shared[pair], of_two / len(pairs)) for pair in pairs),
+        *(("shared and own", each, "", log_evidence_beside(boards, *each), mixed / len(beside)) for each in beside),
     ]
     for effect in single:
         alone = np.array([one.log_evidence(effect) for one in boards])
         share = 1.0 / len(single)
         found.append(("shared", effect, "", shared[effect], share * (PRIOR["shared"] - of_two)))
-        found.append(("own", effect, "", float(alone.sum()), share * PRIOR["own"]))
+        found.append(("own", effect, "", float(alone.sum()), share * (PRIOR["own"] + PRIOR["shared and own"] - mixed)))
         each = share * PRIOR["one board"] / len(boards)
         found += [
             ("one board", effect, one.name, float(none.sum() - none[i] + alone[i]), each)
@@ -180,7 +200,21 @@ def explanations(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...
 
 def log_evidence_shared(boards: Sequence[BoardSearch], effects: tuple[str, ...]) -> float:
     """ln of the evidence of one size for all boards, of each effect; -inf where they have no cell in common."""
-    by_board = [one.cells(effects) for one in boards]
+    return _over_common([one.cells(effects) for one in boards])
+
+
+def log_evidence_beside(boards: Sequence[BoardSearch], shared: str, own: str) -> float:
+    """ln of the evidence of one size for all boards of an effect, and of a size of its own for each of another."""
+    return _over_common([one.cells_beside(shared, own) for one in boards])
+
+
+def _summed(values: Floats) -> tuple[float, float]:
+    """ln of prior probability and likelihood of several cells together, from those of each: (n_cells, 2) array."""
+    log_prior = float(log_sum(values[:, 0]))
+    return log_prior, float(log_sum(values.sum(axis=1))) - log_prior
+
+
+def _over_common(by_board: Sequence[Mapping[Cell, tuple[float, float]]]) -> float:
     common = set.intersection(*(set(cells) for cells in by_board))
     if not common:
         return -np.inf

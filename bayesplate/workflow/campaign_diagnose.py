@@ -271,6 +271,13 @@ def _diagnosis(
         after=PooledErrors(pooled_after, left_after),
         common_residual=after.summary.common_residual,
         common_residual_before=common_residuals({name: one.summary for name, one in before.items()}),
-        recommendation=next_step(after.summary.common_residual, claim, len(before), is_declared=bool(campaign.shared)),
+        recommendation=next_step(
+            after.summary.common_residual,
+            claim,
+            len(before),
+            is_declared=bool(campaign.shared),
+            verdict=verdict,
+            explanations=searched,
+        ),
         notes=after.summary.warnings,
     )

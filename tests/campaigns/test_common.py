@@ -8,6 +8,7 @@ import pytest
 from bayesplate.campaigns.claim import SharedClaim
 from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero
 from bayesplate.campaigns.diagnosis import next_step, pooled_rms
+from bayesplate.campaigns.search import Explanation
 from bayesplate.posterior.parameters import N_RIGIDITIES
 
 N_MODES, N_CAMPAIGNS = 12, 400
@@ -82,6 +83,15 @@ def test_what_all_boards_have_is_clear_of_zero():
 )
 def test_boards_that_refuse_are_to_be_measured_again(refused, told):
     assert next_step({}, SharedClaim(1.0, 1.0, refused, 0, holds=False), 3, is_declared=True) == told
+
+
+@pytest.mark.parametrize(("way", "board", "card"), [("own", "", "each board"), ("one board", "a", "a")])
+def test_what_boards_have_of_their_own_is_to_be_declared(way, board, card):
+    best = Explanation(way, ("support_stiffness",), board, 0.0, 0.9)
+    step = next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[best])
+
+    assert next_step({}, None, 6, is_declared=False, verdict="none needed", explanations=[best]) == ""
+    assert step.startswith(f'declare it on the card of {card}, effects = ["support_stiffness"]')
 
 
 def test_pooled_errors_count_every_mode_once():

@@ -34,6 +34,12 @@ class Cells:
         values = self.effects.get("_".join(effects), {})
         return {(0.0, z): (-np.log(len(values)), value) for z, value in values.items()}
 
+    def cells_beside(self, shared, own):
+        """A board's likelihood is the product of what it says of the two."""
+        return {
+            key: (prior, value + self.log_evidence((own,))) for key, (prior, value) in self.cells((shared,)).items()
+        }
+
     def log_evidence(self, effects):
         return float(np.log(np.mean(np.exp(list(self.effects["_".join(effects)].values()))))) if effects else self.none
 
@@ -73,6 +79,12 @@ def test_the_evidence_of_one_size_for_all_is_the_sum_over_cells_of_the_product()
     assert sum(each.probability for each in found.values()) == pytest.approx(1.0)
     ratio = found["shared", "b", ""].probability / found["none", "", ""].probability
     assert ratio == pytest.approx(0.5 * PRIOR["shared"] / PRIOR["none"] * np.exp(4.0))
+    own, none = found["own", "b", ""], found["none", "", ""]
+    before = 0.5 * (PRIOR["own"] + PRIOR["shared and own"])  # no two effects are asked for
+    assert own.probability / none.probability == pytest.approx(
+        before / PRIOR["none"] * np.exp(own.log_evidence - none.log_evidence)
+    )
+    assert sum(PRIOR.values()) == pytest.approx(1.0)
 
 
 def test_boards_that_agree_share_and_boards_that_differ_do_not():
@@ -107,6 +119,28 @@ def test_two_effects_alike_take_their_share_of_what_is_shared():
     assert set(alone) == {("mass",), ("stiffness",)}
 
 
+@pytest.mark.parametrize("sizes", [(-1.0, 0.0, 2.0), (1.0, 1.0, 1.0)])
+def test_an_effect_alike_is_found_beside_another_that_each_board_has_of_its_own(sizes):
+    """With the share that it has beforehand; where the other is of one size too, the boards share both."""
+    boards = [board(name, 1.0) for name in "abc"]
+    for one, size in zip(boards, sizes, strict=True):
+        one.effects["support"] = {z: 8.0 - 4.0 * (z - size) ** 2 for z in SIZES}
+        both = {(a, b): one.effects["mass"][a] + one.effects["support"][b] for a in SIZES for b in SIZES}
+        one.effects["mass_support"] = both
+    found = explanations(boards, [("mass",), ("support",), ("mass", "support")])
+    by_kind = {(one.way, one.effects): one for one in found if not one.board}
+    one = by_kind["shared and own", ("mass", "support")]
+
+    own = by_kind["own", ("support",)].log_evidence
+    assert one.log_evidence == pytest.approx(by_kind["shared", ("mass",)].log_evidence + own)
+    none = by_kind["none", ()]
+    ratio = 0.5 * PRIOR["shared and own"] / PRIOR["none"] * np.exp(one.log_evidence - none.log_evidence)
+    assert one.probability / none.probability == pytest.approx(ratio)
+    assert sum(each.probability for each in found) == pytest.approx(1.0)
+    assert (found[0].way == "shared and own") is (sizes[0] != sizes[1])
+    assert found[0].effects == ("mass", "support")
+
+
 def explanation(way, probability, *effects):
     return Explanation(way, () if way == "none" else effects or ("attached_mass",), "", 0.0, probability)
 
@@ -118,6 +152,8 @@ def explanation(way, probability, *effects):
         ([("none", 0.9), ("shared", 0.1)], "none needed", ()),
         ([("shared", 0.5), ("own", 0.45), ("none", 0.04)], "indistinguishable group", ("attached_mass",)),
         ([("own", 0.9), ("shared", 0.08), ("none", 0.01)], "unexplained", ()),
+        ([("shared and own", 0.5, "a", "b"), ("none", 0.01)], "unexplained", ()),
+        ([("shared", 0.5, "a"), ("shared and own", 0.4, "a", "b"), ("none", 0.01)], "indistinguishable group", ("a",)),
         ([("shared", 0.9, "a", "b"), ("shared", 0.05, "a"), ("none", 0.01)], "named", ("a", "b")),
         ([("shared", 0.5, "a", "b"), ("shared", 0.4, "a"), ("none", 0.01)], "indistinguishable group", ("a", "b")),
     ],
@@ -127,6 +163,15 @@ def test_what_a_search_allows_to_say(found, verdict, effects):
 
     assert said[:2] == (verdict, effects)
     assert said[2]
+
+
+def test_what_may_be_as_probable_as_something_that_is_not_shared_is_told():
+    found = [("own", 0.5, "b"), ("shared and own", 0.4, "a", "b"), ("none", 0.01)]
+
+    assert named([explanation(*one) for one in found])[2] == (
+        "the most probable is b of another size on each board, which the boards do not share; a alike on all boards "
+        "beside b of another size on each may be as probable"
+    )
 
 
 def searching(folder, twice="", **planted):
@@ -193,6 +238,24 @@ def test_the_cells_of_two_effects_are_those_of_each_and_make_up_the_evidence(fou
     for key, (log_prior, _) in cells.items():
         at = [np.isclose(table.z, z).all(axis=1) for table, z in zip(tables, (key[1:3], key[4:]), strict=True)]
         assert np.exp(log_prior) == pytest.approx(tables[0].weights[at[0]][0] * tables[1].weights[at[1]][0])
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_cells_of_one_effect_beside_another_are_sums_over_those_of_both(found_on_boards, order):
+    one = found_on_boards[1][0]
+    shared, own = SHEAR_AND_SENSOR[::order]
+    beside = one.cells_beside(shared, own)
+    by_hand = {}
+    for key, (log_prior, log_likelihood) in one.cells(SHEAR_AND_SENSOR).items():
+        kept = key[:3] if shared == "transverse_shear" else key[3:]
+        prior, joint = by_hand.get(kept, (0.0, 0.0))
+        by_hand[kept] = prior + np.exp(log_prior), joint + np.exp(log_prior + log_likelihood)
+
+    assert set(beside) == set(by_hand)
+    for key, (log_prior, log_likelihood) in beside.items():
+        prior, joint = by_hand[key]
+        assert np.exp(log_prior) == pytest.approx(prior)
+        assert np.exp(log_prior + log_likelihood) == pytest.approx(joint)
 
 
 def test_a_pair_is_asked_for_where_the_boards_together_would_show_both():

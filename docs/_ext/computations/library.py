@@ -253,6 +253,7 @@ _WAYS = {
     "shared": "an effect, or two, alike on all boards",
     "one board": "an effect on one board",
     "own": "an effect of another size on each board",
+    "shared and own": "an effect alike on all boards beside another of another size on each",
 }
 
 
@@ -287,7 +288,7 @@ def campaign_limits(folder: Path) -> str:
         ("least probability that nothing is lacking, for *none needed*", f"{of_campaigns.IMPROBABLE:g}"),
         ("how many times as probable as the next, for *named*", f"{of_campaigns.CLEARLY:g}"),
         *((f"probability before: {_WAYS[way]}", f"{before:g}") for way, before in WAYS_BEFORE.items()),
-        ("share of what is alike beforehand that is two effects, where the boards can have two", f"{OF_TWO:g}"),
+        ("share of what is alike beforehand that is two effects, where the boards can show two", f"{OF_TWO:g}"),
     ]
     return words_table(("limit", "value"), rows)
 
