@@ -68,16 +68,12 @@ CHECKS = (
     (
         "spruce-half-tops",
         "python examples/campaign.py --out docs/validation --results results/spruce-half-tops",
-        "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it. In "
-        "this run, and in that with scatter, a board that only leans to one side of a number could look as if it "
-        "refused what the others teach, and one that the others lead far off was judged by the few of its own draws "
-        "there. They were not made again since, so that it is open whether a board refuses.",
+        "Six half-tops of one laboratory through `diagnose`: what they share, and what boards left out say of it.",
     ),
     (
         "spruce-half-tops-shear",
         "python examples/campaign.py spruce-half-tops-shear --out docs/validation --results results/shear",
-        "The same six with transverse shear alone shared. These three were made before the polynomial of a board's "
-        "likelihood was held to a ball about its draws, and not to a box: far out it could rise there.",
+        "The same six with transverse shear alone shared.",
     ),
     (
         "spruce-half-tops-scatter",
