@@ -198,9 +198,9 @@ def next_step(
         return f"measure {boards} again, or take {out} out of the campaign: {they} {do} not want what the others share"
     if verdict == "unexplained" and explanations:
         best = explanations[0]
-        where = f"the card of {best.board}" if best.board else "the card of each board"
+        where, own = f"the card of {best.board}" if best.board else "the card of each board", best.effects[-1]
         return (
-            f'declare it on {where}, effects = ["{best.effects[-1]}"], and diagnose again: what the boards share is '
+            f'declare {effect_name(own)} on {where}, effects = ["{own}"], and diagnose again: what the boards share is '
             "judged beside it then"
         )
     clear = clear_of_zero(common)
