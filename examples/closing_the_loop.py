@@ -34,7 +34,7 @@ BOARDS = (
     "spruce-free-1L",
     "spruce-free-3L",
 )
-COLUMNS = ("board", "verdict", "effects", "claim", "in sample", "left out", "nested", "E_x", "E_y", "G_xy")
+COLUMNS = ("board", "verdict", "effects", "claim", "in sample", "left out", "nested", "E_x", "E_y", "G_xy", "nearest")
 
 
 def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, Diagnosis]:
@@ -59,7 +59,10 @@ def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, D
 
 
 def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
-    """One row a board: errors in cents before -> after, shift of each constant in standard deviations."""
+    """One row per board: errors in cents before -> after, shift of each constant in standard deviations.
+
+    The last column is for a board that nothing explains: what comes nearest, and the left-out error with it.
+    """
     return [
         (
             name,
@@ -68,6 +71,7 @@ def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
             "error reduced" if one.claim else "no claim",
             *(f"{_cents(merit.of(one.before))} → {_cents(merit.of(one.after))}" for merit in MERITS if merit.is_rms),
             *(f"{shift.shift_in_sd:+.1f}" for shift in one.elastic_shift.values()),
+            _nearest(one),
         )
         for name, one in diagnoses.items()
     ]
@@ -77,6 +81,13 @@ def markdown(diagnoses: Mapping[str, Diagnosis]) -> str:
     """The table as Markdown."""
     lines = [COLUMNS, tuple("---" for _ in COLUMNS), *rows(diagnoses)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def _nearest(one: Diagnosis) -> str:
+    if one.verdict != "unexplained" or not one.finalists:
+        return "-"
+    nearest = one.finalists[0]
+    return f"{', '.join(nearest.effects)}: {_cents(nearest.leave_one_out_rms_cents)}"
 
 
 def _cents(value: float | None) -> str:

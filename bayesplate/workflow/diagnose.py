@@ -16,7 +16,7 @@ from bayesplate.cards import PriorCard
 from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
-from bayesplate.diagnosis.decision.verdict import Verdict, answer_words, decide
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, decide
 from bayesplate.diagnosis.evidence.folds import Nested
 from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
@@ -186,7 +186,7 @@ def diagnose(
     folded = nested_of(found, control)
     if verdict.index and folded is not None:
         control = made_to_choose(ground, control, float(folded.ratio[0]))
-    finals = verdict.stands_for[:_MOST_FINALISTS]
+    finals = verdict.stands_for[:_MOST_FINALISTS] if verdict.nearest is None else (verdict.nearest,)
     stages.left = _FIT * len(finals)
     refits: dict[int, Fitted] = {}
     failures = []
@@ -204,7 +204,7 @@ def diagnose(
         first, last = (one.inference.problem.board for one in (before, after))
         told = relabelled_sentence(first, last, with_words)
         notes += [told] if told else []
-    case = _case(found, verdict, control, folded, known, before, refits, tuple(notes))
+    case = _case(found, verdict, control, folded, known, before, finals, refits, tuple(notes))
     diagnosis = diagnosis_of(case)
     if folder is not None:
         if after is not before:
@@ -225,6 +225,7 @@ def _case(
     folded: Nested | None,
     known: Sequence[KnownFit],
     before: Fitted,
+    finals: Sequence[Answer],
     refits: Mapping[int, Fitted],
     notes: tuple[str, ...],
 ) -> Case:
@@ -240,7 +241,7 @@ def _case(
         claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
         recommendation=advice(found, verdict, before.problem.prior, before.summary.seed),
         known=known,
-        finalists=[(one, refits[one.index].summary) for one in verdict.stands_for if one.index in refits],
+        finalists=[(one, refits[one.index].summary) for one in finals if one.index in refits],
         drawn={index: one.draws for index, one in refits.items()},
         notes=notes,
     )

@@ -81,6 +81,11 @@ class Verdict:
     is_needed: bool = False
     stands_for: tuple[Answer, ...] = ()
 
+    @property
+    def nearest(self) -> Answer | None:
+        """The answer that explains the readings best and yet not well enough; None where there is no such thing."""
+        return self.best if self.word == "unexplained" and self.is_needed else None
+
 
 def answers(found: Found) -> tuple[Answer, ...]:
     """Single effects and pairs by their support, best first.

@@ -190,7 +190,7 @@ class Diagnosis:
     elastic_shift : dict of ElasticShift
         By modulus.
     finalists : tuple of Finalist
-        Best first.
+        Best first; the one that comes nearest where none is enough.
     elastic_averaged, rigidity_averaged : dict of Spread
         The constants to quote, Pa and N m: averaged over everything that may be the case, each by its probability; if
         nothing explains the readings, those of the first fit. The rigidities are not written to JSON.

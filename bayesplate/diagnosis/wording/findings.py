@@ -74,7 +74,8 @@ class Case:
     known : sequence of KnownFit
         The board as it stands first.
     finalists : sequence of (Answer, Summary)
-        Explanations that were fitted again, best first, each with the summary of its fit.
+        Explanations that were fitted again, best first, or the one that comes nearest where none is enough; each with
+        the summary of its fit.
     drawn : dict of Draws
         Of these fits, by the index of the hypothesis.
     notes : tuple of str
@@ -245,7 +246,24 @@ def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
         for one in taken
         if (swap := case.found.ground.hypotheses[one.index].swap) is not None
     ]
-    return (*effects, *exchanged)
+    nearest = [_nearest_sentence(case, *one) for one in case.finalists if one[0] == case.verdict.nearest]
+    return (*effects, *exchanged, *nearest)
+
+
+def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
+    """What the most probable explanation does to the errors though it is not enough, and how to go on from it."""
+    before, after = case.before.summary.error, summary.error
+    told = (
+        f"{answer_words(case.found, answer).capitalize()} comes nearest: with it the error goes from "
+        f"{before.in_sample_rms_cents:.1f} to {after.in_sample_rms_cents:.1f} cents in the fit"
+    )
+    first, last = before.leave_one_out_rms_cents, after.leave_one_out_rms_cents
+    if first is not None and last is not None:
+        told += f", and from {first:.1f} to {last:.1f} for a mode left out"
+    if RELABELLING in answer.members:
+        return f"{told}."
+    names = ", ".join(f'"{name}"' for name in answer.members)
+    return f"{told}. Declare it, effects = [{names}], and diagnose again to look for what else is lacking."
 
 
 def _finalist(answer: Answer, summary: Summary) -> Finalist:

@@ -313,6 +313,26 @@ def test_a_named_effect_that_was_refitted():
     assert told.after.log_score > told.before.log_score
 
 
+@pytest.mark.parametrize(("members", "told"), [
+    ((AIR,), 'Declare it, effects = ["air_loading"], and diagnose again to look for what else is lacking.'),
+    ((RELABELLING,), "for a mode left out."),
+])  # fmt: skip
+def test_what_comes_nearest_is_told_though_it_is_not_enough(members, told):
+    found = made({members: 0.99, (): 0.01})
+    verdict = decided(found)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25), finalists=[(answers(found)[0], MOVED)])
+    (sentence,) = diagnosis_of(replace(case, after=case.before)).sentences
+
+    assert (verdict.word, verdict.nearest) == ("unexplained", answers(found)[0])
+    assert "comes nearest: with it the error goes from 21.2 to 4.2 cents in the fit" in sentence
+    assert sentence.endswith(told)
+
+
+def test_only_what_is_needed_and_not_enough_comes_nearest():
+    assert decided(made(NAMED)).nearest is None
+    assert decided(made({(): 0.99})).nearest is None
+
+
 def test_a_claim_is_told_with_its_conditions():
     found = made(NAMED)
     met, missed = (Condition("prior predictive", value, 0.05, value >= 0.05) for value in (0.5, 0.01))
