@@ -51,7 +51,7 @@ def suspects(found: Found) -> tuple[Suspect, ...]:
         if p_value >= PASSES:
             terms = bare.terms(fold)
             weight = float(terms.log_evidence(seen)[0]) - whole
-            told.append(Suspect(int(index), p_value, float(seen[0] @ terms.fold.misses), weight))
+            told.append(Suspect(int(index), p_value, float(terms.left_out_errors(seen)[0]), weight))
     return tuple(sorted(told, key=lambda one: -one.log_weight))
 
 

@@ -79,7 +79,7 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
         return np.stack([predicted(_without(ground.baseline, reading, mode), chosen) for reading in mode])
 
     def predicted(fold: Fold, chosen: NDArray[np.intp]) -> Floats:
-        before = none.seen(ground.baseline, residuals) @ none.terms(fold).fold.misses
+        before = none.terms(fold).left_out_errors(none.seen(ground.baseline, residuals))
         after = before.copy()
         for index in np.unique(chosen[chosen > 0]):
             sets = chosen == index

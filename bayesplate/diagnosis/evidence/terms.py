@@ -191,16 +191,29 @@ class Terms:
         misses = self.fold.misses
         by_cell = shares.reshape(self.noise.weights.size, self.table.n_cells, -1)
         own = (residuals @ misses)[None, :] - (self.table.shift @ misses)[:, None]
-        if not self.table.slopes.shape[2]:
-            return log_mass, np.asarray((by_cell.sum(axis=0) * own).sum(axis=0))
-        gains = self._gains
-        seen = residuals @ self.fold.blind.T
-        along = np.einsum("i,kip->kp", misses, self.table.slopes)
         total = (by_cell.sum(axis=0) * own).sum(axis=0)
-        rows = np.einsum("kp,lkpd->lkd", along, gains)
+        of_inputs, has_tangents = self._gains_of_inputs, self.table.slopes.shape[2] > 0
+        if not has_tangents and not of_inputs.any():
+            return log_mass, np.asarray(total)
+        seen = residuals @ self.fold.blind.T
+        rows = np.repeat(of_inputs[:, None], self.table.n_cells, axis=1)
+        if has_tangents:
+            there = np.einsum("di,kip->kdp", self.fold.blind, self.table.slopes)
+            along = np.einsum("i,kip->kp", misses, self.table.slopes) - np.einsum("ld,kdp->lkp", of_inputs, there)
+            rows = rows + np.einsum("lkp,lkpd->lkd", along, self._gains)
         offsets = np.einsum("lkd,kd->lk", rows, self.middles)
         inside = np.einsum("lkd,nd->lkn", rows, seen) - offsets[:, :, None]
         return log_mass, np.asarray(total - (by_cell * inside).sum(axis=(0, 1)))
+
+    @cached_property
+    def _gains_of_inputs(self) -> Floats:
+        """Takes what is seen to what the inputs add to the reading, as far as it tells them: (n_levels, d) array."""
+        slopes = self.fold.baseline.input_slopes
+        if not slopes.shape[1]:
+            return np.zeros((self.noise.weights.size, self.fold.blind.shape[0]))
+        covariance = (self.fold.misses @ slopes) @ (self.fold.blind @ slopes).T
+        wanted = np.broadcast_to(covariance, (self.noise.weights.size, covariance.size))
+        return np.asarray(np.linalg.solve(self.noise_covariance, wanted[:, :, None])[:, :, 0])
 
     @cached_property
     def _gains(self) -> Floats:

@@ -157,20 +157,22 @@ def test_the_noise_levels_stand_for_the_log_normal_prior(n_setups, few, allowed)
 
 
 def refitted_without(base, mode, residual, cell, sd):
-    """Error of predicting one reading by the least-squares fit of constants and place in the cell to the others."""
+    """Error of predicting one reading by the fit of constants, inputs and place in the cell to the others."""
     shift, slopes = cell
     used = np.delete(np.arange(base.n_modes), mode)  # or those of one mode
-    columns = np.hstack([base.slopes, slopes])
+    columns = np.hstack([base.slopes, slopes, base.input_slopes])
     rows = np.vstack([columns[used] / sd, np.eye(columns.shape[1])[3:]])
     target = np.r_[(residual - shift)[used] / sd, np.zeros(columns.shape[1] - 3)]
     fitted = np.linalg.lstsq(rows, target, rcond=None)[0]
     return (residual - shift)[mode] - columns[mode] @ fitted
 
 
+@pytest.mark.parametrize("n_inputs", [0, 2])
 @pytest.mark.parametrize("n_tangents", [0, 1, 2])
-def test_a_reading_that_was_left_out_is_predicted_as_by_a_refit(n_tangents):
+def test_a_reading_that_was_left_out_is_predicted_as_by_a_refit(n_tangents, n_inputs):
+    """What the others tell of the inputs counts: sizes of declared effects, which may lie far from their priors."""
     rng = np.random.default_rng(4)
-    base = baseline(rng)
+    base = baseline(rng, n_inputs=n_inputs)
     cells = table(rng, n_cells=1, n_tangents=n_tangents)
     ground = ground_of(base, Hypothesis(("first",), 1.0, cells, one_level(base)))
     residual = 0.01 * rng.standard_normal(6)
@@ -178,8 +180,12 @@ def test_a_reading_that_was_left_out_is_predicted_as_by_a_refit(n_tangents):
     assert left_out(ground, 0, residual) == pytest.approx(refits, abs=1e-12)
 
     wrong = [refitted_without(base, i, residual, (cells.shift[0], cells.slopes[0]), 2 * NOISE) for i in range(6)]
-    if n_tangents:
+    if n_tangents or n_inputs:
         assert np.abs(left_out(ground, 0, residual) - wrong).max() > 1e-4
+    bare_ground = ground_of(base, bare(base, one_level(base)))
+    nothing_added = np.zeros(6), np.zeros((6, 0))
+    without = [refitted_without(base, i, residual, nothing_added, NOISE) for i in range(6)]
+    assert nested(bare_ground, residual[None, :]).before[0] == pytest.approx(without, abs=1e-12)
 
 
 def test_cells_and_levels_predict_with_their_share():
