@@ -186,7 +186,7 @@ def diagnose(
     folded = nested_of(found, control)
     if verdict.index and folded is not None:
         control = made_to_choose(ground, control, float(folded.ratio[0]))
-    finals = verdict.stands_for[:_MOST_FINALISTS] if verdict.nearest is None else (verdict.nearest,)
+    finals = verdict.fitted_again[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals)
     refits: dict[int, Fitted] = {}
     failures = []

@@ -86,6 +86,11 @@ class Verdict:
         """The answer that explains the readings best and yet not well enough; None where there is no such thing."""
         return self.best if self.word == "unexplained" and self.is_needed else None
 
+    @property
+    def fitted_again(self) -> tuple[Answer, ...]:
+        """What it stands for, or what comes nearest."""
+        return self.stands_for if self.nearest is None else (self.nearest,)
+
 
 def answers(found: Found) -> tuple[Answer, ...]:
     """Single effects and pairs by their support, best first.

@@ -324,12 +324,15 @@ def test_what_comes_nearest_is_told_though_it_is_not_enough(members, told):
     (sentence,) = diagnosis_of(replace(case, after=case.before)).sentences
 
     assert (verdict.word, verdict.nearest) == ("unexplained", answers(found)[0])
+    assert verdict.fitted_again == (verdict.nearest,)
     assert "comes nearest: with it the error goes from 21.2 to 4.2 cents in the fit" in sentence
     assert sentence.endswith(told)
 
 
 def test_only_what_is_needed_and_not_enough_comes_nearest():
-    assert decided(made(NAMED)).nearest is None
+    named = decided(made(NAMED))
+    assert named.nearest is None
+    assert named.fitted_again == named.stands_for
     assert decided(made({(): 0.99})).nearest is None
 
 
