@@ -76,7 +76,11 @@ def test_the_readme_says_what_the_table_shows():
         assert f"{effects.replace('_', ' ').replace(', ', ' or ')} on {name}" in readme
     (nested,) = [row[6] for row in groups if row[0] == "spruce-free-1R"]
     assert "goes from {} to {}".format(*nested.split(" → ")) in readme
-    assert "On two nothing known explains it." in readme
+    *_, nearest = rows["spruce-free-3L"]
+    assert nearest.startswith("support_stiffness: ")
+    before, after = rows["spruce-free-3L"][5].split(" → ")[0], nearest.split(": ")[1]
+    told = f"a support stiffness comes nearest on spruce-free-3L, {before} to {after} cents, and leaves more than noise"
+    assert f"On two nothing known explains it; {told}" in readme
     assert [row[1] for row in measured].count("unexplained") == 2
     assert [row[1] for row in measured].count("named") == 0
 
