@@ -262,7 +262,8 @@ def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
         told += f", and from {first:.1f} to {last:.1f} for a mode left out"
     if RELABELLING in answer.members:
         return f"{told}."
-    names = ", ".join(f'"{name}"' for name in answer.members)
+    every = (*case.found.ground.baseline.board.effects, *answer.members)  # what a card lists is all that it declares
+    names = ", ".join(f'"{name}"' for name in every)
     return f"{told}. Declare it, effects = [{names}], and diagnose again to look for what else is lacking."
 
 

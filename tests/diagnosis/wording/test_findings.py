@@ -327,6 +327,11 @@ def test_what_comes_nearest_is_told_though_it_is_not_enough(members, told):
     assert verdict.fitted_again == (verdict.nearest,)
     assert "comes nearest: with it the error goes from 21.2 to 4.2 cents in the fit" in sentence
     assert sentence.endswith(told)
+    base = found.ground.baseline
+    declared = replace(base, board=replace(base.board, effects=("thickness_profile",)))
+    beside = replace(found, ground=replace(found.ground, baseline=declared))
+    (sentence,) = diagnosis_of(replace(case, found=beside, after=case.before)).sentences
+    assert ('effects = ["thickness_profile", "air_loading"]' in sentence) is (members == (AIR,))
 
 
 def test_only_what_is_needed_and_not_enough_comes_nearest():
