@@ -200,8 +200,8 @@ def next_step(
         best = explanations[0]
         where, own = f"the card of {best.board}" if best.board else "the card of each board", best.effects[-1]
         return (
-            f'declare {effect_name(own)} on {where}, effects = ["{own}"], and diagnose again: what the boards share is '
-            "judged beside it then"
+            f"declare {effect_name(own)} on {where}, {own} in its effects beside those that it has, and diagnose "
+            "again: what the boards share is judged beside it then"
         )
     clear = clear_of_zero(common)
     if clear:

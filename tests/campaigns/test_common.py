@@ -91,7 +91,7 @@ def test_what_boards_have_of_their_own_is_to_be_declared(way, board, card):
     step = next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[best])
 
     assert next_step({}, None, 6, is_declared=False, verdict="none needed", explanations=[best]) == ""
-    assert step.startswith(f'declare support stiffness on the card of {card}, effects = ["support_stiffness"]')
+    assert step.startswith(f"declare support stiffness on the card of {card}, support_stiffness in its effects beside")
 
 
 def test_pooled_errors_count_every_mode_once():
