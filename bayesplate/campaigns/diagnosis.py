@@ -196,8 +196,8 @@ def next_step(
         they, do = ("it", "does") if is_one else ("they", "do")
         out = "it" if is_one else "them"
         return f"measure {boards} again, or take {out} out of the campaign: {they} {do} not want what the others share"
-    if verdict == "unexplained" and explanations:
-        best = explanations[0]
+    best = next((one for one in explanations if one.effects), None)
+    if verdict == "unexplained" and best is not None:
         where, own = f"the card of {best.board}" if best.board else "the card of each board", best.effects[-1]
         return (
             f"declare {effect_name(own)} on {where}, {own} in its effects beside those that it has, and diagnose "

@@ -90,6 +90,8 @@ def test_what_boards_have_of_their_own_is_to_be_declared(way, board, card):
     best = Explanation(way, ("support_stiffness",), board, 0.0, 0.9)
     step = next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[best])
 
+    nothing = Explanation("none", (), "", 0.0, 0.04)
+    assert next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[nothing, best]) == step
     assert next_step({}, None, 6, is_declared=False, verdict="none needed", explanations=[best]) == ""
     assert step.startswith(f"declare support stiffness on the card of {card}, support_stiffness in its effects beside")
 
