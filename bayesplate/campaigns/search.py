@@ -94,22 +94,6 @@ class BoardSearch:
         one = self.hypothesis(effects)
         if one is None:
             return {}
-        return dict(zip(*self._of_cells(one), strict=True))
-
-    def cells_beside(self, shared: str, own: str) -> dict[Cell, tuple[float, float]]:
-        """The same for one effect, another of whatever size being there as well: empty where there are no pairs."""
-        one = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
-        if one is None:
-            return {}
-        first = 1 + self.ground.candidates[one.members[0]].coarse.z.shape[1]
-        kept = slice(None, first) if one.members[0] == shared else slice(first, None)
-        by_cell: dict[Cell, list[tuple[float, float]]] = {}
-        for key, value in zip(*self._of_cells(one), strict=True):
-            by_cell.setdefault(key[kept], []).append(value)
-        return {key: _summed(np.array(values)) for key, values in by_cell.items()}
-
-    def _of_cells(self, one: Hypothesis) -> tuple[list[Cell], list[tuple[float, float]]]:
-        """Cells that are possible, and ln of the prior probability and of the likelihood in each."""
         terms = one.terms(self.ground.whole)
         seen = one.seen(self.ground.baseline, self.ground.baseline.residual[None, :])
         n_cells = one.table.n_cells
@@ -120,7 +104,21 @@ class BoardSearch:
             log_prior = np.log(one.table.weights)
         possible = np.flatnonzero(np.isfinite(log_prior))
         keys = [tuple(float(part) for part in key) for key in self._keys(one)[possible]]
-        return keys, [(float(log_prior[i]), float(by_cell[i] - log_prior[i])) for i in possible]
+        return {
+            key: (float(log_prior[i]), float(by_cell[i] - log_prior[i])) for key, i in zip(keys, possible, strict=True)
+        }
+
+    def cells_beside(self, shared: str, own: str) -> dict[Cell, tuple[float, float]]:
+        """ln of prior probability and likelihood of each cell of one effect, another of any size being there as well."""
+        one = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
+        if one is None:
+            return {}
+        first = 1 + self.ground.candidates[one.members[0]].coarse.z.shape[1]
+        kept = slice(None, first) if one.members[0] == shared else slice(first, None)
+        by_cell: dict[Cell, list[tuple[float, float]]] = {}
+        for key, value in self.cells(one.members).items():
+            by_cell.setdefault(key[kept], []).append(value)
+        return {key: _summed(np.array(values)) for key, values in by_cell.items()}
 
     def _keys(self, one: Hypothesis) -> Floats:
         """What a cell is on any board: form and standard coordinates of each of its effects, (n_cells, n) array."""

@@ -57,7 +57,8 @@ CHECKS = (
         "closing-the-loop",
         "python examples/closing_the_loop.py --out docs/validation",
         "Shipped boards through `diagnose`: the verdict, whether an improvement is claimed, errors in cents before and "
-        "after, and the shift of each constant in standard deviations.",
+        "after, the shift of each constant in standard deviations, and what comes nearest where nothing explains the "
+        "board.",
     ),
     (
         "plans",
