@@ -109,7 +109,7 @@ class BoardSearch:
         }
 
     def cells_beside(self, shared: str, own: str) -> dict[Cell, tuple[float, float]]:
-        """ln of prior probability and likelihood of each cell of one effect, another of any size being there as well."""
+        """The same of each cell of one effect, another of whatever size being there as well; empty without pairs."""
         one = self.hypothesis((shared, own)) or self.hypothesis((own, shared))
         if one is None:
             return {}
