@@ -136,7 +136,7 @@ def board_in_joint(
     assert at is not None
     noise = np.array([setup.noise.median for setup in board.setups])
     if estimate is not None:
-        noise = noise * noise_widenings(board, estimate)
+        noise = noise * noise_widenings(board, estimate.residuals)
     laws = tuple(bare_law(board, one, at) for one in stations(board, at, prior, is_elsewhere=False))
     parameters = Parameters(board)
     names, turned = _columns(board, prior, shared, at, noise)

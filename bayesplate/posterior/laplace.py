@@ -29,6 +29,9 @@ _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
 _N_HELD_OUT = 6
 _INSIDE = 0.1
+_MOST_LEVELS = 20
+_SAME_LEVEL = 1e-3
+"""Change of the logarithm of the noise below which a fit of the inputs is not made again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +58,9 @@ def laplace_approximation(
     """Locate the posterior of a board.
 
     The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
-    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, and the models
-    are made anew at the point it finds. Under Student's errors a reading far off weighs little.
+    far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, which tells the
+    noise anew, and the models are made anew at the point it finds. Under Student's errors a reading far off weighs
+    little.
 
     Parameters
     ----------
@@ -73,8 +77,8 @@ def laplace_approximation(
     LaplaceApproximation
     """
     parameters = Parameters(board)
-    widenings = noise_widenings(board, estimate)
-    noise = np.array([setup.noise.median for setup in board.setups]) * widenings
+    medians = np.array([setup.noise.median for setup in board.setups])
+    noise = medians * noise_widenings(board, estimate.residuals)
     centre = parameters.theta(estimate.values, noise)
     models = _with_peaks(estimate.models, estimate.values)
     scales = reading_sd(board.setups, noise)
@@ -93,8 +97,17 @@ def laplace_approximation(
         centre = centre.copy()
         predict = predictor(board, models, "exact", centre)
         bounds = parameters.fitted_bounds
-        start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
-        centre[columns] = refit(predict, log_measured(board), scales, start, bounds)
+        target = log_measured(board)
+        for _ in range(_MOST_LEVELS):
+            start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
+            centre[columns] = refit(predict, target, scales, start, bounds)
+            if robust:
+                break
+            before, noise = noise, medians * noise_widenings(board, target - predict(centre[None, columns])[0])
+            scales = reading_sd(board.setups, noise)
+            if np.abs(np.log(noise / before)).max() < _SAME_LEVEL:
+                break
+        centre[N_RIGIDITIES : parameters.first_input] = np.log(noise)
         values = {name: np.ravel(value)[0] for name, value in parameters.values(centre[None, :]).items()}
         models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
         covariance = _covariance(board, models, "linear", scales, centre, spread)
@@ -107,8 +120,10 @@ def _with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupMode
     return tuple(with_others(model, values) if takes_part(model.setup) else model for model in models)
 
 
-def noise_widenings(board: Board, estimate: Estimate) -> Floats:
+def noise_widenings(board: Board, residuals: Floats) -> Floats:
     """Likely noise of each setup over its prior median, at least 1: (n_setups,) array.
+
+    Of the (n_modes,) residuals of ln f.
 
     Where all noises are w times their medians a residual r has the variance v = (w median)^2 + own, so that it tells of
     w by the share s = (w median)^2 / v. With a part p of each reading to spare, the density of ln w is highest where
@@ -117,7 +132,7 @@ def noise_widenings(board: Board, estimate: Estimate) -> Floats:
     """
     from scipy.optimize import brentq
 
-    squares = estimate.residuals**2
+    squares = residuals**2
     spare = max(squares.size - N_RIGIDITIES, 1) / squares.size
     medians = np.array([setup.noise.median for setup in board.setups])
     noise = np.repeat(medians, [len(setup.readings) for setup in board.setups])

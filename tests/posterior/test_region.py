@@ -66,6 +66,9 @@ def test_the_centre_that_a_rough_law_found_is_that_of_the_final_one(problem):
     noise = np.exp(problem.centre[N_RIGIDITIES : N_RIGIDITIES + len(board.setups)])
     scales, start = reading_sd(board.setups, noise), problem.centre[columns]
 
+    residuals = log_measured(board) - predict(start[None, :])[0]
+    medians = np.array([setup.noise.median for setup in board.setups])
+    assert noise == pytest.approx(medians * noise_widenings(board, residuals), rel=0.01)
     for away in (0.0, 1.0):
         found = refit(predict, log_measured(board), scales, start + away * errors, bounds)
         assert np.abs((found - start) / errors).max() < 0.01
@@ -110,7 +113,7 @@ def test_the_noise_follows_the_residuals_as_far_as_its_prior_lets_it(log_sd):
     spare = estimate.residuals.size - 3
     log_w = np.linspace(0.0, 2.0, 200_001)
     density = -spare * log_w - 0.5 * squares * np.exp(-2.0 * log_w) - 0.5 * (log_w / log_sd) ** 2
-    (found,) = noise_widenings(board, estimate)
+    (found,) = noise_widenings(board, estimate.residuals)
     assert np.log(found) == pytest.approx(log_w[np.argmax(density)], abs=2e-5)  # two steps of the grid
     assert (found < 1.001) == (log_sd < 0.01)
     assert (found > 0.97 * np.sqrt(squares / spare)) == (log_sd > 1.0)

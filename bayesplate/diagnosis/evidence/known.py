@@ -1,8 +1,8 @@
 """What physics knows and nobody needs to search: shear, air, a stated sensor; computed, and the error they lead to.
 
-The sizes of a computed effect are the medians of their priors; all other inputs stand at their nominal values, as in
-`bayesplate.estimates.least_squares`. Nothing is fitted but the three constants, so that an error may rise as well as
-fall.
+The sizes of a computed effect are the medians of their priors. Sizes that the board declares without stating them
+stand where its own fit has them, all other inputs at their nominal values, as in `bayesplate.estimates.least_squares`.
+Nothing is fitted but the three constants, so that an error may rise as well as fall.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def known_fit(
     KnownFit
     """
     board = with_known_sizes(problem.board.without(without), effects)
-    inputs, target, scales = board.nominal(), log_measured(board), reading_scales(board)
+    inputs, target, scales = inputs_of(problem, board), log_measured(board), reading_scales(board)
     start = np.log(problem.estimate.rigidities) if start is None else start
     models = solved or _solved(problem, board, start)
     law, rows = _law(models, inputs), _labelled(models)
@@ -209,6 +209,17 @@ def with_known_sizes(board: Board, effects: Sequence[str]) -> Board:
     return added.with_parameters(replace(size, prior=Quantity.exact(size.prior.median)) for size in sizes)
 
 
+def inputs_of(problem: PosedProblem, board: Board) -> Values:
+    """Nominal inputs of a board, but for sizes that the problem's board declares and leaves to a prior of the library.
+
+    The readings tell those: they stand at the centre of the posterior.
+    """
+    there = problem.parameters.values(problem.centre[None, :])
+    learnt = (one.name for one in problem.board.uncertain if one.is_of_effect and one.source and not one.is_component)
+    nominal = board.nominal()
+    return {**nominal, **{name: np.asarray(there[name][0]) for name in learnt if name in nominal}}
+
+
 def _law(models: Models, inputs: Values) -> Predictor:
     """ln f (Hz) of all modes from (n, 3) ln D by the exact law, all else at its nominal value."""
     return Predictor(lambda x: _values(x, inputs), models, "exact")
@@ -225,7 +236,7 @@ def _solved(problem: PosedProblem, board: Board, at: Floats) -> Models:
     there, as long as the plate keeps its symmetry: where two modes lie close, their shapes would exchange names from
     one model to the next, and errors of different modes would be compared.
     """
-    inputs = board.nominal()
+    inputs = inputs_of(problem, board)
     values, meshed = _values(at, inputs), _values(np.log(problem.estimate.rigidities), inputs)
     models = []
     for setup, before in zip(board.setups, problem.posterior.models, strict=True):

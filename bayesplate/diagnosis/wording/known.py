@@ -31,7 +31,8 @@ class KnownModel:
     without : tuple of str
         Declared ones that are left out, as the stated mass of a sensor, to show what they do; mostly none.
     in_sample_rms_cents : float
-        Of the readings, by weighted least squares, all inputs at their nominal values.
+        Of the readings, by weighted least squares, all inputs at their nominal values, declared sizes that the card
+        leaves open where the fit has them.
     leave_one_out_rms_cents : float or None
         Of each reading, predicted by a fit that has not seen it; None where they are too few.
     change_percent : dict of float

@@ -227,6 +227,26 @@ def test_a_planted_effect_of_known_size_lowers_the_error_to_the_noise(tmp_path, 
     assert np.any(np.abs(np.log(found[()].moduli / true)) > limits)
 
 
+SUPPORT = "support_stiffness"
+
+
+def test_a_declared_size_that_the_readings_tell_stands_where_they_have_it(tmp_path):
+    """A support far stiffer than the median of its prior: chi-squared as above, and far above it at that median."""
+    noise, stiffness = 2.0, 5e4
+    board = plant(
+        np.random.default_rng(1), "free-12", [SUPPORT], noise_cents=noise, fixed={SUPPORT: {"stiffness": stiffness}}
+    )
+    path = tmp_path / f"{board.name}.toml"
+    path.write_text(board.card_text(), encoding="utf-8")
+    problem = Problem.from_card(path, effects=(SUPPORT,)).posed
+    (size,) = (one for one in problem.board.uncertain if one.effect == SUPPORT)
+    assert size.prior.median < 0.5 * stiffness
+    at_the_median = replace(problem, board=problem.board.with_priors({size.name: Quantity.exact(size.prior.median)}))
+    errors = [known_fit(one).errors.in_sample for one in (problem, at_the_median)]
+    squares = [one.size * (rms(one) / noise) ** 2 for one in errors]
+    assert squares[0] < chi2.ppf(0.999, errors[0].size - 4) < squares[1]
+
+
 def test_an_error_that_rises_where_something_opposes_is_told(tmp_path):
     """A frame that pulls on the board raises its low modes; computed air, which is not there, would lower them."""
     problem, _ = planted(tmp_path, "clamped-9", ["membrane_tension"], 2.0)
