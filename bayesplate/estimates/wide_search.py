@@ -4,6 +4,7 @@ Peaks without labels may be many different modes, and each way to take them is a
 of the prior is searched for these: a population of draws is weighted by the summed likelihood of the peaks
 (`bayesplate.frequencies.peaks`) under a large noise, walks, and is weighted anew under a smaller one. The frequencies
 come from a table over D_x / D_s and D_y / D_s: but for a common factor those of a bare plate depend on nothing else.
+Its modes are combinations of those at some members of the population, found again when that has become much narrower.
 
 References
 ----------
@@ -46,10 +47,12 @@ LOUD = 0.02
 """Noise from which on guesses are taken: a plate that lacks an effect misses its peaks by more than the last one."""
 MOST_FOUND = 4
 """Ways to take the peaks that are looked at under one noise."""
-_N_DRAWS, _N_STEPS, _N_LOOKED_AT = 3000, 3, 1000
+_N_FIRST, _N_DRAWS, _N_STEPS, _N_LOOKED_AT = 30_000, 3000, 3, 1000
 _N_NODES = (21, 15, 11, 11)
 """Of the tables under each noise, per axis: between them frequencies are off by less than the noise."""
-_N_TRAINED = 3
+_N_TRAINED = 10
+_NARROWER = 0.5
+"""Range of the population, beside that for which modes were found, from which on they are found again."""
 _RANGE = 0.005
 """Of the prior draws, on either side, that the tables leave out."""
 _SPARE = 8
@@ -98,14 +101,17 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
     """
     nominal = board.nominal()
     log_prior = _density(prior, nominal)
-    drawn = prior_draws(board, prior, rng, _N_DRAWS)
+    drawn = prior_draws(board, prior, rng, _N_FIRST)
     population = np.log(np.stack([drawn[name] for name in RIGIDITIES], axis=1))
-    population = population[np.isfinite(population).all(axis=1)]
+    population = population[np.isfinite(log_prior(population))]
     used = [setup for setup in board.setups if setup.readings or setup.peaks]
-    every = [_Modes.of(board, setups, population) for setups in _alike(used)]
-    weighted = np.zeros(len(population))
+    every: list[_Modes] = []
+    weighted, trained = np.zeros(len(population)), np.full(2, np.inf)
     guesses: list[Guess] = []
     for noise, n_nodes in zip(NOISES, _N_NODES, strict=True):
+        extent = np.ptp(_range(population), axis=0)
+        if (extent < _NARROWER * trained).any():
+            every, trained = [_Modes.of(board, setups, population) for setups in _alike(used)], extent
         tabled = _Tabled(tuple((modes.table(population, n_nodes), modes.peaks) for modes in every))
         found = tabled.log_likelihood(population, noise)
         log_weights = found - weighted
@@ -178,7 +184,7 @@ class _Modes:
     system : System
     nominal : dict of float
     reduced : ReducedOrderModel
-        Within a cent or so wherever the prior reaches.
+        Of the modes at some members of a population.
     scale : float
         ln D_s at which it is evaluated.
     peaks : tuple of PeakLikelihood
@@ -196,9 +202,8 @@ class _Modes:
         bare = [replace(setup, readings=(), peaks=_as_peaks(setup), hammer=None) for setup in setups]
         system = _symmetric(system_of(replace(board, setups=(bare[0],)), bare[0]))
         nominal, scale = board.nominal(), float(np.median(population[:, 2]))
-        low, middle, high = np.quantile(_ratios(population), [_RANGE, 0.5, 1.0 - _RANGE], axis=0)
-        trained = np.array(list(product(*np.linspace(low, high, _N_TRAINED).T)))
-        every = system.weights(_values(nominal, trained, scale))
+        middle, *trained = _spread(_ratios(population))
+        every = system.weights(_values(nominal, np.array(trained), scale))
         centre = system.weights(_values(nominal, middle[None], scale)).at(0)
         constants = dict(zip(RIGIDITIES, np.exp(np.r_[middle + scale, scale]), strict=True))
         model = setup_model(system, {**nominal, **constants})
@@ -240,9 +245,10 @@ class _Tabled:
     every: tuple[tuple[RegularGridInterpolator, tuple[PeakLikelihood, ...]], ...]
 
     def log_likelihood(self, x: Floats, noise: float) -> Floats:
-        """Of the peaks at (n, 3) ln D: (n,) array."""
+        """Of the peaks at (n, 3) ln D: (n,) array, minus infinity where the table has no plate."""
         noises = np.full(len(x), noise)
-        return np.sum([one.log_likelihood(there, noises) for there, peaks in self._there(x) for one in peaks], axis=0)
+        each = [one.log_likelihood(there, noises) for there, peaks in self._there(x) for one in peaks]
+        return np.nan_to_num(np.sum(each, axis=0), nan=-np.inf, neginf=-np.inf)
 
     def assignments(self, x: Floats, noise: float) -> NDArray[np.intp]:
         """The likeliest mode of each peak at each member, -1 for none: (n, n_peaks) array, setup by setup."""
@@ -258,6 +264,24 @@ class _Tabled:
             ends = np.array([[axis[0], axis[-1]] for axis in table.grid]).T
             at = np.clip(_ratios(x), *ends)
             yield np.asarray(table(at) + 0.5 * x[:, 2:]), peaks
+
+
+def _range(population: Floats) -> Floats:
+    """Ends of the range of ln D_x / D_s and ln D_y / D_s that tables cover: (2, 2) array."""
+    return np.quantile(_ratios(population), [_RANGE, 1.0 - _RANGE], axis=0)
+
+
+def _spread(ratios: Floats) -> Floats:
+    """The middle member of (n, 2) ratios and others, each as far as can be from those before: (n_spread, 2) array."""
+    low, high = np.quantile(ratios, [_RANGE, 1.0 - _RANGE], axis=0)
+    inside = ratios[((ratios >= low) & (ratios <= high)).all(axis=1)]
+    at = (inside - np.median(inside, axis=0)) / np.maximum(high - low, 1e-12)
+    chosen = [int(np.argmin((at**2).sum(axis=1)))]
+    nearest = np.full(len(at), np.inf)
+    for _ in range(_N_TRAINED):
+        nearest = np.minimum(nearest, ((at - at[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(np.argmax(nearest)))
+    return np.asarray(inside[chosen])
 
 
 def _ratios(x: Floats) -> Floats:

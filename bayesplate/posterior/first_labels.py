@@ -1,18 +1,20 @@
 """First labels for peaks that have none, or doubtful ones: from where a search for the posterior begins.
 
 From a guess of the constants follow labels, from these better constants, and so on; where the sure labels do not make a
-guess, all of the prior is searched for some (`bayesplate.estimates.wide_search`). Of several answers the likeliest is
-taken, and how far the others lie from it is told.
+guess, all of the prior is searched for some (`bayesplate.estimates.wide_search`). Of several answers the most probable
+is taken, and how far the others lie from it is told; answers too far apart for one walk between them are refused.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
+from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.labelling import LIKELY, with_labels
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
@@ -21,7 +23,7 @@ from bayesplate.frequencies.model import setup_model, with_others
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
-from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.plate.setup import Setup
 from bayesplate.posterior.target import Posterior
 
@@ -32,6 +34,38 @@ _NEAR = 1e-4
 """Of ln D, near enough to label peaks."""
 _N_LEVELS = 17
 _MOST_ROUNDS = 8
+FAR = 0.2
+"""Of ln D: what is further apart is two answers, and no uncertainty of one."""
+POSSIBLE = 0.02
+"""Probability from which on another answer is one that has to be told."""
+UNLIKE = 0.01
+"""Relative: by how much a plate may miss its own modes, for what it lacks; answers are told apart at no less noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One way to take the peaks of a board for modes.
+
+    Attributes
+    ----------
+    board : Board
+        With the labels of the peaks that are likely one certain mode.
+    log_rigidities : (3,) array
+        ln of D_x, D_y, D_s (N m) near those of its readings.
+    log_density : float
+        ln of the posterior density there, at the noise that suits it best.
+    log_density_unlike : float
+        The same where the plate may be as unlike the board as `UNLIKE`.
+    """
+
+    board: Board
+    log_rigidities: NDArray[np.float64]
+    log_density: float
+    log_density_unlike: float
+
+    def is_far_from(self, other: Way) -> bool:
+        """Whether the constants are others altogether."""
+        return bool(np.abs(self.log_rigidities - other.log_rigidities).max() > FAR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +105,11 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     -------
     Proposed
         The same board where every label is sure and no peak lacks one.
+
+    Raises
+    ------
+    NotIdentifiableError
+        If the peaks may as well be taken another way, with constants that lie far off.
     """
     none = np.zeros((len(RIGIDITIES), len(RIGIDITIES)))
     if not any(takes_part(setup) for setup in board.setups):
@@ -83,11 +122,63 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     judged = [one for one in (_judged(each, prior, start) for each, start in found) if one is not None]
     if not judged:
         return Proposed(*found[0], none)
-    likelihoods, constants = np.array([one[0] for one in judged]), np.array([one[1] for one in judged])
-    best = int(np.argmax(likelihoods))
-    weights = np.exp(likelihoods - likelihoods[best])
-    off = constants - constants[best]
-    return Proposed(judged[best][2], np.exp(constants[best]), (off.T * weights / weights.sum()) @ off)
+    best = max(judged, key=lambda one: one.log_density)
+    require_one_way(judged)
+    near = [one for one in judged if not one.is_far_from(best)]
+    off = np.array([one.log_rigidities for one in near]) - best.log_rigidities
+    shares = _shares([one.log_density for one in near])
+    return Proposed(best.board, np.exp(best.log_rigidities), (off.T * shares) @ off)
+
+
+def _shares(log_densities: Sequence[float]) -> NDArray[np.float64]:
+    shares = np.exp(np.array(log_densities) - max(log_densities))
+    return np.asarray(shares / shares.sum())
+
+
+def require_one_way(ways: Sequence[Way]) -> None:
+    """Refuse peaks that may be taken for modes in ways so far apart that no walk leads from one to the other.
+
+    A free plate has nearly the same frequencies with its grain along the other side, and few peaks fit several plates.
+    What any board has that a plate lacks would decide between them, if the noise were left to be as small as it likes.
+
+    Raises
+    ------
+    NotIdentifiableError
+        Tells the constants of each, and which label would decide.
+    """
+    apart: list[Way] = []
+    for one in sorted(ways, key=lambda one: -one.log_density_unlike):
+        if all(one.is_far_from(other) for other in apart):
+            apart.append(one)
+    shares = _shares([one.log_density_unlike for one in apart])
+    told = [(one, share) for one, share in zip(apart, shares, strict=True) if share >= POSSIBLE]
+    if len(told) < 2:
+        return
+    each = " or ".join(f"{_constants_words(one)} ({100.0 * share:.0f} %)" for one, share in told)
+    raise NotIdentifiableError(
+        f"{told[0][0].board.name}: its peaks are modes of plates that lie far apart, {each}; "
+        f"{_deciding_label(told[0][0], told[1][0])}name a prior of the material or give the label of a mode"
+    )
+
+
+def _constants_words(way: Way) -> str:
+    nominal = way.board.nominal()
+    D_x, D_y, D_s = np.exp(way.log_rigidities)
+    elastic = moduli(D_x, D_y, D_s, nominal["thickness"], nominal["poisson_xy"])
+    return ", ".join(f"{name} {1e-9 * float(value):.3g}" for name, value in zip(MODULI, elastic, strict=True)) + " GPa"
+
+
+def _deciding_label(first: Way, second: Way) -> str:
+    """Which peak has one label in the first way and another in the second; empty if none has."""
+    labels = [
+        {(setup.name, one.frequency.mean): one.label for setup in way.board.setups for one in setup.readings}
+        for way in (first, second)
+    ]
+    for place in sorted(labels[0].keys() & labels[1].keys(), key=lambda place: place[1]):
+        one, other = (each[place] for each in labels)
+        if one != other:
+            return f"the peak at {place[1]:g} Hz is {one} in the first and {other} in the second: "
+    return ""
 
 
 def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tuple[Board, NDArray[np.float64]] | None:
@@ -135,10 +226,8 @@ def _of_labelled(board: Board) -> Board:
     return replace(board, setups=tuple(setup for setup in board.setups if setup.readings))
 
 
-def _judged(
-    board: Board, prior: PriorCard, start: NDArray[np.float64]
-) -> tuple[float, NDArray[np.float64], Board] | None:
-    """ln of the likelihood of a labelled board at its own estimate, at the noise that suits it best, and ln D there."""
+def _judged(board: Board, prior: PriorCard, start: NDArray[np.float64]) -> Way | None:
+    """A labelled board at its own estimate and the noise that suits it best; None if it has too few labels for one."""
     if sum(len(setup.readings) for setup in board.setups) < len(RIGIDITIES):
         return None
     estimate = weighted_least_squares(_of_labelled(board), _STEPS, start)
@@ -148,8 +237,9 @@ def _judged(
     medians, log_sds = np.array([(setup.noise.median, setup.noise.log_sd) for setup in board.setups]).T
     noises = medians * np.exp(np.outer(np.linspace(-1.0, 3.0, _N_LEVELS), log_sds))
     theta = np.stack([posterior.parameters.theta(estimate.values, noise) for noise in noises])
-    by_level = posterior.log_likelihood(theta).sum(axis=1) + posterior.parameters.log_prior_noise(theta)
-    return float(by_level.max()), np.log(estimate.rigidities), board
+    theta = np.concatenate([theta, [posterior.parameters.theta(estimate.values, np.maximum(medians, UNLIKE))]])
+    *by_level, unlike = (posterior.log_likelihood(theta).sum(axis=1) + posterior.log_prior(theta)).tolist()
+    return Way(board, np.log(estimate.rigidities), max(by_level), unlike)
 
 
 def _labelled(board: Board, guess: Guess) -> Board:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import ritz
 from made_boards import board_of, setup_of
 
 from bayesplate.cards import load_prior
+from bayesplate.errors import NotIdentifiableError
 from bayesplate.labels import Label
 from bayesplate.plate.setup import Peak
-from bayesplate.posterior.first_labels import propose_labels
+from bayesplate.posterior.first_labels import Way, propose_labels, require_one_way
 from bayesplate.quantities import Quantity
 
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2), (4, 0))
@@ -68,3 +70,48 @@ def test_a_doubtful_label_that_is_wrong_is_corrected_and_remembered():
 def test_too_few_peaks_get_none():
     board = board_with((), ALL[:2])
     assert propose_labels(board, PRIOR).board is board
+
+
+WIDE = load_prior("weakly-informative")
+
+
+def test_peaks_that_fit_a_plate_with_its_grain_the_other_way_are_refused():
+    """Seven peaks of a free plate, and a prior of any solid: both plates are told, and the label that decides."""
+    plate = ritz.FREE_SPRUCE
+    with pytest.raises(NotIdentifiableError, match=r"lie far apart, E_x .* or E_x .*%\); the peak at") as told:
+        propose_labels(board_with((), ALL[:7]), WIDE)
+    assert "(2,0) in the" in str(told.value)
+    assert "(0,2) in the" in str(told.value)
+
+    proposed = propose_labels(board_with([(2, 0)], [hertz for hertz in ALL[:7] if hertz != HERTZ[2, 0]]), WIDE)
+    assert np.log(proposed.rigidities / [plate.D_x, plate.D_y, plate.D_s]) == pytest.approx(0.0, abs=0.02)
+    assert labels_of(proposed.board) == {round(hertz, 3): label for label, hertz in [*HERTZ.items()][:7]}
+
+
+def way(beams, log_rigidities, log_density, log_density_unlike):
+    (setup,) = board_with([(2, 0)], ()).setups
+    reading = replace(setup.readings[0], label=Label(*beams))
+    board = board_of(ritz.FREE_SPRUCE, [replace(setup, readings=(reading,))])
+    return Way(board, np.array(log_rigidities), log_density, log_density_unlike)
+
+
+HERE = way((2, 0), [4.6, 2.2, 3.2], 10.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "is_refused"),
+    [
+        (way((0, 2), [6.1, 0.7, 3.2], 10.0, 5.0), True),
+        (way((0, 2), [6.1, 0.7, 3.2], 0.0, 5.0), True),  # by what the plate may lack it is as good
+        (way((0, 2), [6.1, 0.7, 3.2], 10.0, 5.0 + np.log(0.019)), False),
+        (way((0, 2), [6.1, 0.7, 3.2], 10.0, 5.0 + np.log(0.022)), True),
+        (way((0, 2), [4.6, 2.39, 3.2], 10.0, 5.0), False),
+        (way((0, 2), [4.6, 2.41, 3.2], 10.0, 5.0), True),
+    ],
+)
+def test_answers_far_apart_are_refused_where_both_are_possible(other, is_refused):
+    if not is_refused:
+        require_one_way([HERE, other])
+        return
+    with pytest.raises(NotIdentifiableError, match=r"is \((2,0|0,2)\) in the first and"):
+        require_one_way([HERE, other])
