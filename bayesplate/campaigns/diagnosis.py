@@ -198,9 +198,10 @@ def next_step(
         return f"measure {boards} again, or take {out} out of the campaign: {they} {do} not want what the others share"
     best = next((one for one in explanations if one.effects), None)
     if verdict == "unexplained" and best is not None:
-        where, own = f"the card of {best.board}" if best.board else "the card of each board", best.effects[-1]
+        where, own = f"the card of {best.board}" if best.board else "the campaign's card", best.effects[-1]
+        each = "" if best.board else ", for each board one of its own"
         return (
-            f"declare {effect_name(own)} on {where}, {own} in its effects beside those that it has, and diagnose "
+            f"declare {effect_name(own)} on {where}, {own} in its effects beside those that it has{each}, and diagnose "
             "again: what the boards share is judged beside it then"
         )
     clear = clear_of_zero(common)

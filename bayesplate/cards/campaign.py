@@ -25,6 +25,7 @@ from bayesplate.cards.values import (
     read_name,
     read_reference,
     read_text,
+    read_words,
 )
 from bayesplate.cards.words import EFFECT_NAMES, quoted
 from bayesplate.errors import Fault, plain
@@ -82,6 +83,9 @@ class CampaignCard(Section):
     source: Annotated[str, PlainValidator(read_text)] = ""
     notes: Annotated[str, PlainValidator(read_text)] = ""
     boards: Annotated[tuple[str, ...], PlainValidator(_read_boards)] = Field(description="a list of board cards")
+    effects: Annotated[
+        tuple[str, ...], PlainValidator(lambda value: read_words(value, "names of effects", EFFECT_NAMES))
+    ] = ()
     shared: Annotated[tuple[SharedSection, ...], BeforeValidator(_as_list)] = ()
     population: PopulationSection | None = None
     _path: Path = PrivateAttr(Path())

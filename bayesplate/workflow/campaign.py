@@ -54,7 +54,8 @@ class Campaign:
         card : str or path
             Name of a shipped campaign card, or a path.
         effects : sequence of str, optional
-            Declared effects of every board in place of those of its card; the shared ones are declared in any case.
+            Declared effects of every board in place of those of its card and of the campaign's; the shared ones are
+            declared in any case.
         law : "linear" or "exact", optional
             By default each board's own choice.
         robust : bool
@@ -139,9 +140,9 @@ def problem_or_campaign(
 
 
 def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[Prepared], PriorCard | None]:
-    """Every board with the shared effects declared, and the prior of the population."""
+    """Every board with the effects that the campaign declares or shares, and the prior of the population."""
     file = card.path.name
-    declared = [one.effect for one in card.shared]
+    declared = [*(card.effects if effects is None else ()), *(one.effect for one in card.shared)]
     faults: list[Fault] = []
     boards: list[Prepared] = []
     for number, board in enumerate(card.boards, start=1):

@@ -85,7 +85,9 @@ def test_boards_that_refuse_are_to_be_measured_again(refused, told):
     assert next_step({}, SharedClaim(1.0, 1.0, refused, 0, holds=False), 3, is_declared=True) == told
 
 
-@pytest.mark.parametrize(("way", "board", "card"), [("own", "", "each board"), ("one board", "a", "a")])
+@pytest.mark.parametrize(
+    ("way", "board", "card"), [("own", "", "the campaign's card"), ("one board", "a", "the card of a")]
+)
 def test_what_boards_have_of_their_own_is_to_be_declared(way, board, card):
     best = Explanation(way, ("support_stiffness",), board, 0.0, 0.9)
     step = next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[best])
@@ -93,7 +95,8 @@ def test_what_boards_have_of_their_own_is_to_be_declared(way, board, card):
     nothing = Explanation("none", (), "", 0.0, 0.04)
     assert next_step({}, None, 6, is_declared=False, verdict="unexplained", explanations=[nothing, best]) == step
     assert next_step({}, None, 6, is_declared=False, verdict="none needed", explanations=[best]) == ""
-    assert step.startswith(f"declare support stiffness on the card of {card}, support_stiffness in its effects beside")
+    assert step.startswith(f"declare support stiffness on {card}, support_stiffness in its effects beside")
+    assert ("for each board one of its own" in step) == (board == "")
 
 
 def test_pooled_errors_count_every_mode_once():

@@ -299,6 +299,22 @@ def test_what_cannot_be_shared_is_refused_board_by_board(tmp_path):
         bayesplate.Campaign.from_card(path)
 
 
+def test_effects_of_the_campaign_are_declared_on_every_board_as_its_own(tmp_path):
+    path = write_campaign(tmp_path)
+    text = path.read_text()
+    path.write_text(text.replace("\n[[shared]]", '\neffects = ["support_stiffness"]\n[[shared]]', 1))
+    own = bayesplate.Campaign.from_card(path)
+    assert [one.prepared.board.effects for one in own.problems] == [("support_stiffness", "attached_mass")] * len(
+        own.problems
+    )
+    assert {one.effect for one in own.shared} == {"attached_mass"}
+    replaced = bayesplate.Campaign.from_card(path, effects=("air_loading",))
+    assert {one.prepared.board.effects for one in replaced.problems} == {("air_loading", "attached_mass")}
+    path.write_text(text.replace("\n[[shared]]", '\neffects = ["clamp_rotation"]\n[[shared]]', 1))
+    with pytest.raises(InputError, match=r"together.toml boards 1 -> board-0.toml .*clamp_rotation"):
+        bayesplate.Campaign.from_card(path)
+
+
 def test_faults_of_several_boards_come_at_once(tmp_path):
     path = write_campaign(tmp_path)
     for i in (0, 2):

@@ -52,6 +52,14 @@ def test_boards_may_scatter_about_what_they_share(tmp_path):
     assert [one.scatter_percent for one in card.shared] == [0.0, 20.0]
 
 
+def test_effects_are_declared_for_every_board(tmp_path):
+    card = load_campaign(
+        written(tmp_path, CAMPAIGN.replace("\n[[shared]]", 'effects = ["support_stiffness"]\n\n[[shared]]', 1))
+    )
+
+    assert card.effects == ("support_stiffness",)
+
+
 def test_nothing_needs_to_be_shared(tmp_path):
     card = load_campaign(written(tmp_path, CAMPAIGN.split("[[shared]]", maxsplit=1)[0]))
 
