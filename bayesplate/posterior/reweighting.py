@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.laplace import linearisation_errors
 from bayesplate.posterior.target import linear_suffices
 
 Floats = NDArray[np.float64]
@@ -92,10 +91,16 @@ def effective_draws(weights: Floats) -> float:
 
 
 def linearisation(inference: Inference, draws: Draws) -> Floats:
-    """Linear less exact law over the posterior, of every mode: (n_some, n_every) array, cents."""
-    return linearisation_errors(
-        inference.problem.board, inference.problem.posterior.models, draws.flat[:: _every(draws)]
-    )
+    """Linear less exact law over the posterior, of every mode: (n_some, n_every) array, cents.
+
+    The draws know what their own law gives; the other one is evaluated.
+    """
+    every, law = _every(draws), inference.problem.posterior.law
+    own = [each.reshape(-1, each.shape[-1])[::every] for each in draws.every_log_frequency]
+    other: LawName = "linear" if law == "exact" else "exact"
+    there = inference.problem.under(other).posterior.every_log_frequency(draws.flat[::every])
+    apart = np.concatenate(there, axis=1) - np.concatenate(own, axis=1)
+    return cents(apart if other == "linear" else -apart)
 
 
 def _every(draws: Draws) -> int:
