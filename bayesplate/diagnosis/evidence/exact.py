@@ -42,7 +42,7 @@ def under_exact_law(found: Found) -> Found | None:
     Returns
     -------
     Found or None
-        None where the board without an effect has no exact law.
+        None where the board without an effect has no exact law, or no draw of any hypothesis is a plate by it.
     """
     if not _has_law(found, 0):
         return None
@@ -53,6 +53,8 @@ def under_exact_law(found: Found) -> Found | None:
         if _has_law(found, int(index)):
             corrections[index] = _correction(found, int(index), rng)
     evidence = found.log_evidence + corrections
+    if not np.isfinite(evidence).any():
+        return None
     return replace(found, log_evidence=evidence, probability=probabilities(found.ground.hypotheses, evidence))
 
 
@@ -62,6 +64,8 @@ def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int)
         return draw_terms(found, index, rng, n_draws)
     drawn = draw_terms(found, index, rng, _OVERSAMPLED * n_draws)
     log_weights = log_weights_of(found, drawn)
+    if not np.isfinite(log_weights.max()):  # no draw is a plate by the exact law: the linear terms are all there is
+        return drawn.at(np.arange(n_draws))
     shares = np.exp(log_weights - log_weights.max())
     return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=shares / shares.sum()))
 
@@ -80,7 +84,7 @@ def _log_weights(found: Found, drawn: TermDraws, exact: Floats) -> Floats:
     seen = own.middle + hypothesis.seen(found.ground.baseline, found.residual[None, :])[0]
     if not own.every.is_open:
         squares = ((seen - exact) ** 2 - (seen - drawn.predicted) ** 2) / drawn.variance
-        return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf)
+        return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf, neginf=-np.inf)
     return log_summed(own, exact, drawn.noise) - log_of_terms(own, seen, drawn)
 
 

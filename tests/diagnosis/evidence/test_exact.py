@@ -110,6 +110,36 @@ def test_odds_are_those_of_the_bent_law(found):
     )
 
 
+@pytest.mark.parametrize("off", [np.inf, -np.inf, np.nan])
+def test_draws_that_are_no_plate_by_the_exact_law_count_for_nothing(found, off):
+    """Where the exact law has no frequency, or an infinite one, whatever sign; where it has none at all, as drawn."""
+    base = found.ground.baseline
+    limit = base.log_rigidities[0]
+
+    def lacking(x):
+        there = bent(base)(x)
+        there[x[:, 0] > limit] = off
+        return there
+
+    def under(predict):
+        ground = replace(found.ground, baseline=replace(base, predict=predict), candidates={})
+        ground = replace(ground, hypotheses=found.ground.hypotheses[:1])
+        return replace(found, ground=ground, log_evidence=found.log_evidence[:1], probability=np.ones(1))
+
+    half = under(lacking)
+    drawn = draw_terms(half, 0, np.random.default_rng(2), 400)
+    is_lacking = drawn.log_rigidities[:, 0] > limit
+    assert 0 < is_lacking.sum() < 400
+    np.testing.assert_array_equal(log_weights_of(half, drawn) == -np.inf, is_lacking)
+    assert (draw_exact(half, 0, np.random.default_rng(2), 400).log_rigidities[:, 0] <= limit).all()
+
+    none = under(lambda x: np.full((len(x), base.n_modes), off))
+    as_drawn = draw_terms(none, 0, np.random.default_rng(2), 800)
+    kept = draw_exact(none, 0, np.random.default_rng(2), 400)
+    np.testing.assert_array_equal(kept.log_rigidities, as_drawn.log_rigidities[:400])
+    assert under_exact_law(none) is None
+
+
 def test_where_the_law_is_straight_nothing_changes(found):
     base = found.ground.baseline
     base = replace(base, predict=lambda x: base.log_frequency + (x - base.log_rigidities) @ base.slopes.T)
