@@ -104,6 +104,8 @@ def search_widely(board: Board, prior: PriorCard, rng: np.random.Generator) -> l
     drawn = prior_draws(board, prior, rng, _N_FIRST)
     population = np.log(np.stack([drawn[name] for name in RIGIDITIES], axis=1))
     population = population[np.isfinite(log_prior(population))]
+    if not len(population):
+        return []
     used = [setup for setup in board.setups if setup.readings or setup.peaks]
     every: list[_Modes] = []
     weighted, trained = np.zeros(len(population)), np.full(2, np.inf)

@@ -78,3 +78,8 @@ def test_tables_err_by_less_than_the_noise(found, level):
         there = tabled[[of_place[place.parity, place.rank] for place in model.places]]
         error = there - model.every_log_frequency(values, "linear")[0]
         assert np.abs(error).max() < NOISES[level]
+
+
+def test_a_prior_without_a_plate_leaves_nothing_to_guess(monkeypatch):
+    monkeypatch.setattr(wide_search, "_density", lambda *_: lambda x: np.full(len(x), -np.inf))
+    assert search_widely(board_with(HERTZ), WIDE, np.random.default_rng(0)) == []
