@@ -49,7 +49,7 @@ def in_short(summary: Mapping[str, Any]) -> str:
     right, wrong = "top-1, {}, 5 cents, 2x", "one {} 5c 2x: unique and wrong"
     sentences = (
         f"Of {sum(bar['n'] for bar in nothing)} planted boards that lack nothing, an effect was named on "
-        f"{sum(bar['count'] for bar in nothing):.0f}.",
+        f"{sum(bar['count'] for bar in nothing):.0f} and claimed on {bars['claim made on a null']['count']:.0f}.",
         "With one large effect and six modes of a cantilever, read to 5 cents, the most probable answer is the right "
         f"one on {share(right.format(six))} of the boards, and a wrong one alone is named on "
         f"{share(wrong.format(six))};",
@@ -59,7 +59,7 @@ def in_short(summary: Mapping[str, Any]) -> str:
         "Intervals of 90 % for the constants, averaged over the effects, hold the truth on "
         f"{share(f'constants after tracing, {six}, 2x: 90 % intervals')}, those of the ideal plate on "
         f"{share(f'constants without tracing, {six}, 2x: visibly worse')}.",
-        f"{sum(not bar['met'] for bar in bars.values())} of {len(bars)} bars set for the trial are missed.",
+        f"{sum(not bar['met'] for bar in bars.values())} of {len(bars)} bars are missed.",
     )
     return textwrap.fill(" ".join(sentences), 118, break_on_hyphens=False)
 
