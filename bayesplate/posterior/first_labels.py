@@ -34,8 +34,8 @@ _NEAR = 1e-4
 """Of ln D, near enough to label peaks."""
 _N_LEVELS = 17
 _MOST_ROUNDS = 8
-FAR = 0.2
-"""Of ln D: what is further apart is two answers, and no uncertainty of one."""
+FAR = 0.5
+"""Of ln D: walks lead from one answer to another that is nearer, and do not find one that is farther off."""
 POSSIBLE = 0.02
 """Probability from which on another answer is one that has to be told."""
 UNLIKE = 0.01

@@ -105,8 +105,8 @@ HERE = way((2, 0), [4.6, 2.2, 3.2], 10.0, 5.0)
         (way((0, 2), [6.1, 0.7, 3.2], 0.0, 5.0), True),  # by what the plate may lack it is as good
         (way((0, 2), [6.1, 0.7, 3.2], 10.0, 5.0 + np.log(0.019)), False),
         (way((0, 2), [6.1, 0.7, 3.2], 10.0, 5.0 + np.log(0.022)), True),
-        (way((0, 2), [4.6, 2.39, 3.2], 10.0, 5.0), False),
-        (way((0, 2), [4.6, 2.41, 3.2], 10.0, 5.0), True),
+        (way((0, 2), [4.6, 2.69, 3.2], 10.0, 5.0), False),
+        (way((0, 2), [4.6, 2.71, 3.2], 10.0, 5.0), True),
     ],
 )
 def test_answers_far_apart_are_refused_where_both_are_possible(other, is_refused):
