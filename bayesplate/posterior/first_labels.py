@@ -122,9 +122,9 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     judged = [one for one in (_judged(each, prior, start) for each, start in found) if one is not None]
     if not judged:
         return Proposed(*found[0], none)
-    best = max(judged, key=lambda one: one.log_density)
-    require_one_way(judged)
-    near = [one for one in judged if not one.is_far_from(best)]
+    leading = only_way(judged)
+    near = [one for one in judged if not one.is_far_from(leading)]
+    best = max(near, key=lambda one: one.log_density)
     off = np.array([one.log_rigidities for one in near]) - best.log_rigidities
     shares = _shares([one.log_density for one in near])
     return Proposed(best.board, np.exp(best.log_rigidities), (off.T * shares) @ off)
@@ -135,8 +135,8 @@ def _shares(log_densities: Sequence[float]) -> NDArray[np.float64]:
     return np.asarray(shares / shares.sum())
 
 
-def require_one_way(ways: Sequence[Way]) -> None:
-    """Refuse peaks that may be taken for modes in ways so far apart that no walk leads from one to the other.
+def only_way(ways: Sequence[Way]) -> Way:
+    """The most probable way, others that lie far from it being improbable: no walk leads from one to the other.
 
     A free plate has nearly the same frequencies with its grain along the other side, and few peaks fit several plates.
     What any board has that a plate lacks would decide between them, if the noise were left to be as small as it likes.
@@ -144,7 +144,7 @@ def require_one_way(ways: Sequence[Way]) -> None:
     Raises
     ------
     NotIdentifiableError
-        Tells the constants of each, and which label would decide.
+        If another is possible as well; tells the constants of each, and which label would decide.
     """
     apart: list[Way] = []
     for one in sorted(ways, key=lambda one: -one.log_density_unlike):
@@ -153,7 +153,7 @@ def require_one_way(ways: Sequence[Way]) -> None:
     shares = _shares([one.log_density_unlike for one in apart])
     told = [(one, share) for one, share in zip(apart, shares, strict=True) if share >= POSSIBLE]
     if len(told) < 2:
-        return
+        return apart[0]
     each = " or ".join(f"{_constants_words(one)} ({100.0 * share:.0f} %)" for one, share in told)
     raise NotIdentifiableError(
         f"{told[0][0].board.name}: its peaks are modes of plates that lie far apart, {each}; "

@@ -13,7 +13,8 @@ from bayesplate.cards import load_prior
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.labels import Label
 from bayesplate.plate.setup import Peak
-from bayesplate.posterior.first_labels import Way, propose_labels, require_one_way
+from bayesplate.posterior import first_labels
+from bayesplate.posterior.first_labels import Way, only_way, propose_labels
 from bayesplate.quantities import Quantity
 
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2), (3, 2), (4, 0))
@@ -111,7 +112,19 @@ HERE = way((2, 0), [4.6, 2.2, 3.2], 10.0, 5.0)
 )
 def test_answers_far_apart_are_refused_where_both_are_possible(other, is_refused):
     if not is_refused:
-        require_one_way([HERE, other])
+        assert only_way([other, HERE]) is (HERE if other.is_far_from(HERE) else other)
         return
     with pytest.raises(NotIdentifiableError, match=r"is \((2,0|0,2)\) in the first and"):
-        require_one_way([HERE, other])
+        only_way([HERE, other])
+
+
+def test_a_fit_begins_with_the_way_that_is_probable_whatever_the_plate_lacks(monkeypatch):
+    """Not with one far off that a small noise would favour."""
+    ways = iter([HERE, way((0, 2), [6.1, 0.7, 3.2], 100.0, -10.0)])
+    monkeypatch.setattr(first_labels, "_guesses", lambda *_: [None, None])
+    monkeypatch.setattr(first_labels, "_settled", lambda board, *_: (board, np.ones(3)))
+    monkeypatch.setattr(first_labels, "_judged", lambda *_: next(ways))
+    proposed = propose_labels(board_with([(2, 0)], ALL[3:]), PRIOR)
+
+    assert proposed.rigidities == pytest.approx(np.exp(HERE.log_rigidities))
+    assert proposed.spread == pytest.approx(0.0)
