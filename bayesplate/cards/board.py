@@ -35,6 +35,10 @@ DEFAULT_PRIOR = "weakly-informative"
 DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
 LARGEST_POISSON = 1.5
 MOST_SETUPS = 20
+EffectNames = Annotated[
+    tuple[str, ...], PlainValidator(lambda value: read_words(value, "names of effects", EFFECT_NAMES))
+]
+"""Effects that a card declares."""
 _LENGTH = Number(1, 100_000, "mm", too_small="in mm: 1 m is 1000 mm, 1 cm is 10 mm")
 _THICKNESS = Number(0.01, 1000, "mm")
 _MASS = Number(1e-3, 1e8, "g")
@@ -89,9 +93,7 @@ class BoardCard(Section):
     title: Annotated[str, PlainValidator(read_text)] = ""
     source: Annotated[str, PlainValidator(read_text)] = ""
     notes: Annotated[str, PlainValidator(read_text)] = ""
-    effects: Annotated[
-        tuple[str, ...], PlainValidator(lambda value: read_words(value, "names of effects", EFFECT_NAMES))
-    ] = ()
+    effects: EffectNames = ()
     plate: PlateSection = Field(description="a [plate] table")
     material: MaterialSection = MaterialSection()
     setups: Annotated[tuple[SetupSection, ...], BeforeValidator(_as_list)] = Field(

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, PrivateAttr
 
-from bayesplate.cards.board import name_faults
+from bayesplate.cards.board import EffectNames, name_faults
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.schema import Section, place, validated
 from bayesplate.cards.shelf import card_names, find
@@ -25,7 +25,6 @@ from bayesplate.cards.values import (
     read_name,
     read_reference,
     read_text,
-    read_words,
 )
 from bayesplate.cards.words import EFFECT_NAMES, quoted
 from bayesplate.errors import Fault, plain
@@ -83,9 +82,7 @@ class CampaignCard(Section):
     source: Annotated[str, PlainValidator(read_text)] = ""
     notes: Annotated[str, PlainValidator(read_text)] = ""
     boards: Annotated[tuple[str, ...], PlainValidator(_read_boards)] = Field(description="a list of board cards")
-    effects: Annotated[
-        tuple[str, ...], PlainValidator(lambda value: read_words(value, "names of effects", EFFECT_NAMES))
-    ] = ()
+    effects: EffectNames = ()
     shared: Annotated[tuple[SharedSection, ...], BeforeValidator(_as_list)] = ()
     population: PopulationSection | None = None
     _path: Path = PrivateAttr(Path())

@@ -204,7 +204,7 @@ class _Modes:
         bare = [replace(setup, readings=(), peaks=_as_peaks(setup), hammer=None) for setup in setups]
         system = _symmetric(system_of(replace(board, setups=(bare[0],)), bare[0]))
         nominal, scale = board.nominal(), float(np.median(population[:, 2]))
-        middle, *trained = _spread(_ratios(population))
+        middle, *trained = _spread(population)
         every = system.weights(_values(nominal, np.array(trained), scale))
         centre = system.weights(_values(nominal, middle[None], scale)).at(0)
         constants = dict(zip(RIGIDITIES, np.exp(np.r_[middle + scale, scale]), strict=True))
@@ -273,9 +273,9 @@ def _range(population: Floats) -> Floats:
     return np.quantile(_ratios(population), [_RANGE, 1.0 - _RANGE], axis=0)
 
 
-def _spread(ratios: Floats) -> Floats:
-    """The middle member of (n, 2) ratios and others, each as far as can be from those before: (n_spread, 2) array."""
-    low, high = np.quantile(ratios, [_RANGE, 1.0 - _RANGE], axis=0)
+def _spread(population: Floats) -> Floats:
+    """Ratios of the middle member and of others, each as far as can be from those before: (n_spread, 2) array."""
+    ratios, (low, high) = _ratios(population), _range(population)
     inside = ratios[((ratios >= low) & (ratios <= high)).all(axis=1)]
     at = (inside - np.median(inside, axis=0)) / np.maximum(high - low, 1e-12)
     chosen = [int(np.argmin((at**2).sum(axis=1)))]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
 from bayesplate.cards import PriorCard
 from bayesplate.errors import NotIdentifiableError
@@ -126,13 +127,8 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     near = [one for one in judged if not one.is_far_from(leading)]
     best = max(near, key=lambda one: one.log_density)
     off = np.array([one.log_rigidities for one in near]) - best.log_rigidities
-    shares = _shares([one.log_density for one in near])
+    shares = softmax([one.log_density for one in near])
     return Proposed(best.board, np.exp(best.log_rigidities), (off.T * shares) @ off)
-
-
-def _shares(log_densities: Sequence[float]) -> NDArray[np.float64]:
-    shares = np.exp(np.array(log_densities) - max(log_densities))
-    return np.asarray(shares / shares.sum())
 
 
 def only_way(ways: Sequence[Way]) -> Way:
@@ -150,7 +146,7 @@ def only_way(ways: Sequence[Way]) -> Way:
     for one in sorted(ways, key=lambda one: -one.log_density_unlike):
         if all(one.is_far_from(other) for other in apart):
             apart.append(one)
-    shares = _shares([one.log_density_unlike for one in apart])
+    shares = softmax([one.log_density_unlike for one in apart])
     told = [(one, share) for one, share in zip(apart, shares, strict=True) if share >= POSSIBLE]
     if len(told) < 2:
         return apart[0]

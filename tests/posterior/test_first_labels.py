@@ -85,7 +85,8 @@ def test_peaks_that_fit_a_plate_with_its_grain_the_other_way_are_refused():
     assert "(0,2) in the" in str(told.value)
 
     proposed = propose_labels(board_with([(2, 0)], [hertz for hertz in ALL[:7] if hertz != HERTZ[2, 0]]), WIDE)
-    assert np.log(proposed.rigidities / [plate.D_x, plate.D_y, plate.D_s]) == pytest.approx(0.0, abs=0.02)
+    apart = np.log(proposed.rigidities / [plate.D_x, plate.D_y, plate.D_s])
+    assert apart == pytest.approx(0.0, abs=0.004)  # the noise of the card, doubled for a square: the peaks have none
     assert labels_of(proposed.board) == {round(hertz, 3): label for label, hertz in [*HERTZ.items()][:7]}
 
 
