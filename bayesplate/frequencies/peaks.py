@@ -23,7 +23,7 @@ Group = tuple[Rows, Rows, Floats]
 
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""
-_DRAWS_AT_ONCE = 512
+_DRAWS_AT_ONCE = 1024
 """Enough for the arithmetic to be done in compiled code; thousands at once would hold gigabytes."""
 _SIGNS = {"+": 1, "-": -1, "": 0}
 
@@ -157,11 +157,11 @@ class PeakLikelihood:
         """`log_likelihood` of a few draws that have all modes: each takes peaks times modes times orders of memory."""
         from scipy.special import logsumexp
 
-        by_order = self._assignments(there, noise)
+        missed = self._missed(there, noise)
+        by_order = self._assignments(there, noise, missed)
         total = logsumexp([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
         # A mode in two orders was counted as missed in one of them at least.
-        twice = self._missed(there, noise)[:, self.shared]
-        return np.asarray(total - np.log(np.maximum(twice, LEAST)).sum(axis=1))
+        return np.asarray(total - np.log(np.maximum(missed[:, self.shared], LEAST)).sum(axis=1))
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
         """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes) array; the rest: it is none.
@@ -174,14 +174,15 @@ class PeakLikelihood:
         """
         from scipy.special import softmax
 
-        by_order = self._assignments(every_log_frequency[:, self.columns], noise)
+        there = every_log_frequency[:, self.columns]
+        by_order = self._assignments(there, noise, self._missed(there, noise))
         weights = softmax([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
         result = np.zeros(self.log_prior.shape)
         for groups, weight in zip(by_order, weights, strict=True):
             for peaks, modes, one in groups:
-                by_mode = np.zeros((len(noise), peaks.size, self.columns.size))
-                np.put_along_axis(by_mode, modes[:, None, :], one.pairs(), axis=2)
-                result[peaks] += np.tensordot(weight, by_mode, axes=1) / len(noise)
+                by_mode = np.zeros((peaks.size, self.columns.size, len(noise)))
+                np.put_along_axis(by_mode, modes[None], one.pairs(), axis=1)
+                result[peaks] += by_mode @ weight / len(noise)
         return result
 
     def log_density_alone(self, reading: int) -> float:
@@ -191,22 +192,20 @@ class PeakLikelihood:
         width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
         return float(self.log_alone[at] - np.log(width))
 
-    def _assignments(self, there: Floats, noise: Floats) -> list[list[tuple[Rows, Rows, Assignments]]]:
+    def _assignments(self, there: Floats, noise: Floats, missed: Floats) -> list[list[tuple[Rows, Rows, Assignments]]]:
         """Of each group of each of `orders`: its peaks, its modes in the order of each draw, what they say together.
 
-        The modes are (n_draws, n) arrays.
+        The modes are (n, n_draws) arrays.
         """
-        missed = self._missed(there, noise)
+        rows = [np.ascontiguousarray(each.T) for each in (there, missed)]
 
         def assigned(peaks: Rows, modes: Rows, log_sign: Floats) -> tuple[Rows, Rows, Assignments]:
-            by_rank = np.argsort(there[:, modes], axis=1)
+            by_rank = np.ascontiguousarray(np.argsort(there[:, modes], axis=1).T)
             order = modes[by_rank]
-            ordered = np.take_along_axis(there, order, axis=1)
-            log_errors = self.errors.at(peaks).log_likelihood_of_each(ordered, noise)
-            known = self.log_prior[np.ix_(peaks, modes)] + log_sign
-            log_prior = np.swapaxes(known.T[by_rank], 1, 2)
-            alone, lonely = self.log_alone[peaks], np.take_along_axis(missed, order, axis=1)
-            return peaks, order, Assignments(log_errors + log_prior, alone, lonely)
+            ordered, lonely = (np.take_along_axis(each, order, axis=0) for each in rows)
+            log_pair = self.errors.at(peaks).log_likelihood_of_each(ordered, noise)
+            log_pair += np.take(self.log_prior[np.ix_(peaks, modes)] + log_sign, by_rank, axis=1)
+            return peaks, order, Assignments(log_pair, self.log_alone[peaks], lonely)
 
         return [[assigned(*group) for group in groups] for groups in self.orders]
 

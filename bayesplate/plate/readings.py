@@ -131,22 +131,22 @@ class ReadingErrors:
 
         Parameters
         ----------
-        predicted : (n_draws, n_modes) array
+        predicted : (n_modes, n_draws) array
             ln f (Hz).
         noise : (n_draws,) array
 
         Returns
         -------
-        (n_draws, n_readings, n_modes) array
+        (n_readings, n_modes, n_draws) array
         """
-        scale = _join(noise, self.own_sd)[:, :, None]
+        scale = _join(noise, self.own_sd).T[:, None, :]
         if not self.rounded.any():
-            z = (self.log_frequency[:, None] - predicted[:, None, :]) / scale
+            z = (self.log_frequency[:, None, None] - predicted) / scale
             return np.asarray(self._density.log(z) - np.log(scale))
-        n_draws, n_modes = predicted.shape
+        n_modes, n_draws = predicted.shape
         each = np.repeat(predicted.reshape(-1, 1), self.frequency.size, axis=1)
-        found = self.log_likelihood(each, np.repeat(noise, n_modes))
-        return np.swapaxes(found.reshape(n_draws, n_modes, -1), 1, 2)
+        found = self.log_likelihood(each, np.tile(noise, n_modes))
+        return np.ascontiguousarray(found.T.reshape(-1, n_modes, n_draws))
 
     def deviance_residuals(self, predicted: Floats, noise: ArrayLike) -> tuple[Floats, Floats]:
         """Signed roots of the deviances, and how they change with the prediction.
