@@ -37,7 +37,8 @@ boards under way and of their finite elements is not there yet.
 HEAD = """# Many boards
 
 Written by `make batch`; do not edit. Simulated cards of one design with constants of their own, six readings each,
-through `bayesplate batch`, with the libraries' threads switched off. Two workers can be twice as fast at best.
+through `bayesplate batch`, with the libraries' threads switched off. Two workers can be twice as fast at best. The Dask
+cluster runs without Dask's statistical profiler, whose record in each worker grows with time, whatever is computed.
 """
 _TICKS = os.sysconf("SC_CLK_TCK")
 _MEGABYTE = 1e6
@@ -225,9 +226,13 @@ def _ways(workers: Sequence[int], *, dask: bool):
 
         @contextmanager
         def cluster():
+            import dask
             from distributed import LocalCluster
 
-            with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as local:
+            with (
+                dask.config.set({"distributed.worker.profile.enabled": False}),
+                LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as local,
+            ):
                 yield ["--dask", local.scheduler_address]
 
         yield "dask-2", cluster()
