@@ -9,8 +9,8 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings sand measured bars coverage trial \
-	benchmarks peers batch
+.PHONY: fit test slow docs lock audit calibration spectra campaigns plans recordings sand measured bars coverage two-setups \
+	trial benchmarks peers batch
 
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
@@ -67,6 +67,10 @@ trial: $(VENV)/tested-with
 
 coverage: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/coverage.py --boards 40 --workers 2 --out results/coverage.jsonl --publish docs/validation
+
+two-setups: $(VENV)/tested-with
+	$(BIN)/python tests/calibration/coverage.py --boards 40 --effect "clamp_rotation, board free too" --workers 2 \
+		--out results/coverage.jsonl --publish docs/validation --page two-setups
 
 benchmarks: $(VENV)/installed
 	$(BIN)/python tests/benchmarks/run.py --publish docs/validation --repeats 3

@@ -33,6 +33,11 @@ POOLED_FROM = 200
 FAMILY_LEVEL = 0.05
 """Chance that a fit that is right leaves any of the bands; each band takes its share."""
 CONSTANTS = ("E_x", "E_y", "G_xy")
+PAGES = {
+    "coverage": "Coverage: how many 90 % intervals hold the planted value of a declared effect",
+    "two-setups": "Coverage: a board clamped and free, with a clamp that gives and whose grip is not known",
+}
+"""Titles of what may be published, by the name of the page and of the command."""
 
 Interval = dict[str, float]
 
@@ -173,6 +178,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True, help="JSON lines; gone on with if it exists")
     parser.add_argument("--base-seed", type=int, default=1)
     parser.add_argument("--publish", type=Path, help="folder for a page of what was found")
+    parser.add_argument("--page", choices=list(PAGES), default="coverage", help="which page it is")
     options = parser.parse_args()
     started = time.perf_counter()
     settings = Settings(base_seed=options.base_seed)
@@ -180,8 +186,8 @@ def main() -> int:
     lines, well = judge(records)
     print("\n".join(lines))
     if options.publish:
-        title = "Coverage: how many 90 % intervals hold the planted value of a declared effect"
-        publish(options.publish, "coverage", title, "make coverage", "\n".join(lines).splitlines())
+        page = "\n".join(lines).splitlines()
+        publish(options.publish, options.page, PAGES[options.page], f"make {options.page}", page)
     print(f"{(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

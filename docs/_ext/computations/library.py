@@ -129,8 +129,14 @@ CHECKS = (
     ),
     (
         "coverage",
-        "python tests/calibration/coverage.py",
+        "make coverage",
         "How often a 90 % interval holds the truth when an effect was planted and declared.",
+    ),
+    (
+        "two-setups",
+        "make two-setups",
+        "The same of boards that are measured clamped and free, where neither how much the clamp gives nor how far it "
+        "grips is known: the free board tells its stiffness, and what is left is the clamp's.",
     ),
     (
         "trial",
