@@ -26,7 +26,7 @@ from bayesplate.errors import CheckpointError
 
 FloatArray = NDArray[np.float64]
 
-FORMAT = 3  # to be raised whenever the same seed would give other draws, so that two programs never share one run
+FORMAT = 4  # to be raised whenever the same seed would give other chunks, so that two programs never share one run
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,13 @@ class Chunk:
     ----------
     draws : (n_ensembles, n_steps, n_walkers, n_dim) array
     log_prob : (n_ensembles, n_steps, n_walkers) array
+    blobs : (n_ensembles, n_steps, n_walkers, n_blobs) array
+        What the density found on the way, as emcee calls it; of no column where none was kept.
     """
 
     draws: FloatArray
     log_prob: FloatArray
+    blobs: FloatArray
 
 
 class Checkpoint:
@@ -268,12 +271,13 @@ def _read_chunk(path: Path, identity: Mapping[str, int]) -> tuple[Chunk | None, 
         if _side(path).read_bytes() != f"{hashlib.sha256(content).hexdigest()}  {path.name}\n".encode():
             return None, "does not match its hash"
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            chunk = Chunk(**{name: arrays[name] for name in shapes})
+            chunk = Chunk(**{name: arrays[name] for name in (*shapes, "blobs")})
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None, "cannot be read or has no hash beside it"
+    shapes["blobs"] = (*shapes["log_prob"], chunk.blobs.shape[-1])
     if any(getattr(chunk, name).shape != shape for name, shape in shapes.items()):
         return None, "has other shapes than this run"
-    if not all(np.isfinite(getattr(chunk, name)).all() for name in shapes):
+    if not all(np.isfinite(one).all() for one in (chunk.draws, chunk.log_prob)):
         return None, "holds numbers that are not finite"
     return chunk, ""
 

@@ -85,7 +85,10 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
     values = problem.parameters.values(flat)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     noise = np.exp(problem.parameters.log_noise(flat))
-    if every_log_frequency is None:
+    if every_log_frequency is None and chains.blobs is not None:
+        found = thin_walker_major(chains.blobs, 0, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
+        every_log_frequency = posterior.by_setup(found.reshape(len(flat), -1))
+    elif every_log_frequency is None:
         distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
         every_log_frequency = [part[which.ravel()] for part in posterior.every_log_frequency(distinct)]
     by_setup = list(every_log_frequency)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bayesplate.posterior.checkpoint import Chunk
 from bayesplate.posterior.moves import ORDERS, CorrectedSteps, Generators, Steps, order_for, walk_order
 from bayesplate.posterior.proposals import Proposal
-from bayesplate.posterior.starting import LogPosterior
+from bayesplate.posterior.starting import Evaluate, LogPosterior
 
 FloatArray = NDArray[np.float64]
 
@@ -69,30 +69,35 @@ def stepping(density: LogPosterior, learnt: Learnt, n_steps: int, n_walkers: int
 
 
 def correcting(
-    surrogate: LogPosterior, density: LogPosterior, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators
+    surrogate: LogPosterior, evaluate: Evaluate, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators
 ) -> CorrectedSteps:
     """The steps of a chunk under a density whose surrogate the walkers walk on."""
     walk = walk_order(learnt.order, learnt.archives.shape[-1])
     walks = Steps(surrogate, learnt.proposal, learnt.archives, walk * n_steps, n_walkers, rngs, len(walk))
-    return CorrectedSteps(walks, density, n_steps, rngs)
+    return CorrectedSteps(walks, evaluate, n_steps, rngs)
 
 
-def crossed(density: LogPosterior, coords: FloatArray) -> tuple[FloatArray, FloatArray]:
+def crossed(evaluate: Evaluate, coords: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Walkers that come from a surrogate, under the density itself; who has none there joins one that has."""
     flat = coords.reshape(-1, coords.shape[-1])
-    log_prob = density(flat)
+    log_prob, blobs = evaluate(flat)
     lost = np.flatnonzero(log_prob == -np.inf)
     found = np.flatnonzero(log_prob > -np.inf)
     if found.size:
         taken = found[np.arange(lost.size) % found.size]
-        flat, log_prob = flat.copy(), log_prob.copy()
-        flat[lost], log_prob[lost] = flat[taken], log_prob[taken]
-    return flat.reshape(coords.shape), log_prob.reshape(coords.shape[:-1])
+        flat, log_prob, blobs = flat.copy(), log_prob.copy(), blobs.copy()
+        flat[lost], log_prob[lost], blobs[lost] = flat[taken], log_prob[taken], blobs[taken]
+    apart = coords.shape[:-1]
+    return flat.reshape(coords.shape), log_prob.reshape(apart), blobs.reshape(*apart, blobs.shape[1])
 
 
 def advance(
-    move: Steps | CorrectedSteps, coords: FloatArray, log_prob: FloatArray, n_steps: int
-) -> tuple[FloatArray, FloatArray]:
+    move: Steps | CorrectedSteps,
+    coords: FloatArray,
+    log_prob: FloatArray,
+    n_steps: int,
+    blobs: FloatArray | None = None,
+) -> Chunk:
     """Advance all ensembles together.
 
     Parameters
@@ -102,18 +107,27 @@ def advance(
     coords : (n_ensembles, n_walkers, n_dim) array
     log_prob : (n_ensembles, n_walkers) array
     n_steps : int
+    blobs : (n_ensembles, n_walkers, n_blobs) array, optional
+        What the density has found where they are; for corrected steps.
 
     Returns
     -------
-    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
-    log_prob : (n_ensembles, n_steps, n_walkers) array
+    Chunk
     """
     import emcee
 
     n_ensembles, n_walkers, n_dim = coords.shape
-    sampler = emcee.EnsembleSampler(n_ensembles * n_walkers, n_dim, move.density, moves=move, vectorize=True)
-    start = emcee.State(coords.reshape(-1, n_dim), log_prob=log_prob.ravel())
+    n_together = n_ensembles * n_walkers
+    sampler = emcee.EnsembleSampler(n_together, n_dim, _never_asked, moves=move, vectorize=True)
+    found = None if blobs is None else blobs.reshape(n_together, blobs.shape[-1])
+    start = emcee.State(coords.reshape(-1, n_dim), log_prob=log_prob.ravel(), blobs=found)
     sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
-    apart = (n_steps, n_ensembles, n_walkers)
-    chain, densities = sampler.get_chain(), sampler.get_log_prob()
-    return np.moveaxis(chain.reshape(*apart, n_dim), 1, 0), np.moveaxis(densities.reshape(apart), 1, 0)
+    chain, densities, kept = sampler.get_chain(), sampler.get_log_prob(), sampler.get_blobs()
+    parts = chain, densities, np.empty((*densities.shape, 0)) if kept is None else kept
+    shape = (n_steps, n_ensembles, n_walkers)
+    return Chunk(*(np.moveaxis(part.reshape(*shape, *part.shape[2:]), 1, 0) for part in parts))
+
+
+def _never_asked(points: FloatArray) -> FloatArray:
+    """What emcee would evaluate by itself: the moves have the density, and know it wherever a walker is."""
+    raise NotImplementedError

@@ -94,6 +94,7 @@ class Inference:
     ----------
     problem : PosedProblem
     chains : Chains
+        Where the walkers walked on a surrogate, with ln f of all modes that the law found at the draws kept.
     convergence : Convergence
     surrogate : Surrogate or None
         What the walkers walked on between two evaluations of the exact law.
@@ -265,10 +266,11 @@ def infer(
         coordinates.start_covariance(problem.covariance),
         settings,
         surrogate=cheap,
+        evaluate=coordinates.evaluation(problem.posterior.evaluate, sum(problem.posterior.n_every)),
         names=problem.parameters.names,
         checkpoint=checkpoint,
         progress=progress,
     )
     log_posterior = chains.log_prob - coordinates.log_jacobian(chains.draws)
-    theta = Chains(coordinates.theta(chains.draws), log_posterior, chains.burn_in)
+    theta = Chains(coordinates.theta(chains.draws), log_posterior, chains.burn_in, chains.blobs)
     return Inference(problem, theta, convergence, surrogate)

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from bayesplate.posterior.proposals import Proposal
-from bayesplate.posterior.starting import LogPosterior
+from bayesplate.posterior.starting import Evaluate, LogPosterior
 
 FloatArray = NDArray[np.float64]
 Generators = Sequence[np.random.Generator]
@@ -178,38 +178,49 @@ class CorrectedSteps:
         min(1, [p(y) / s(y)] / [p(x) / s(x)])
 
     it leaves the density p itself unchanged, however wrong the surrogate is; a wrong one only costs acceptance. The
-    costly density is evaluated once for each walk, for all walkers together.
+    costly density is evaluated once for each walk, for all walkers together, and what it finds stays with the walkers.
 
     Parameters
     ----------
     walks : Steps
         Under the surrogate, in the order of `walk_order`, one walk per step.
-    density : callable, (n_points, n_dim) -> (n_points,) array
+    evaluate : callable, (n_points, n_dim) -> (n_points,) and (n_points, n_blobs) arrays
+        The density, and what it finds on the way.
     n_steps : int
     rngs : sequence of Generator
         One per ensemble, those of the walks.
     """
 
-    def __init__(self, walks: Steps, density: LogPosterior, n_steps: int, rngs: Generators) -> None:
-        self.walks, self.density = walks, density
+    def __init__(self, walks: Steps, evaluate: Evaluate, n_steps: int, rngs: Generators) -> None:
+        self.walks, self.evaluate = walks, evaluate
         self._is_direct = iter([step % DIRECT_EVERY == 0 for step in range(n_steps)])
         n_direct = -(-n_steps // DIRECT_EVERY)
-        order = "I" * n_direct
-        self._direct = Steps(density, walks.proposal, walks.archives, order, walks.n_walkers, rngs)
+        found: list[FloatArray] = []
+
+        def density(points: FloatArray) -> FloatArray:
+            log_prob, blobs = evaluate(points)
+            found.append(blobs.reshape(n_direct, len(points) // n_direct, blobs.shape[1]))
+            return log_prob
+
+        self._direct = Steps(density, walks.proposal, walks.archives, "I" * n_direct, walks.n_walkers, rngs)
+        self._found = iter(found[0])
         self._thresholds = iter(_beside([log_uniform(n_steps * walks.n_walkers, rng) for rng in rngs], walks.n_walkers))
 
     def propose(self, model: Any, state: Any) -> tuple[Any, NDArray[np.bool_]]:
         """One step of emcee's chain."""
         if next(self._is_direct):
-            return self._direct.propose(model, state)
+            state, moved = self._direct.propose(model, state)
+            state.blobs = np.where(moved[:, None], next(self._found), state.blobs)
+            return state, moved
         at_start = self.walks.density(state.coords)
         coords, at_end, moved = self.walks.walked(state.coords, at_start)
-        log_prob = state.log_prob.copy()
+        log_prob, blobs = state.log_prob.copy(), state.blobs.copy()
         if moved.any():
-            log_prob[moved] = self.density(coords[moved])
+            log_prob[moved], blobs[moved] = self.evaluate(coords[moved])
         with np.errstate(invalid="ignore"):
             log_ratio = (log_prob - at_end) - (state.log_prob - at_start)
         accepted = moved & (next(self._thresholds) < log_ratio)
         state.coords = np.where(accepted[:, None], coords, state.coords)
         state.log_prob = np.where(accepted, log_prob, state.log_prob)
+        state.blobs = np.where(accepted[:, None], blobs, state.blobs)
         return state, accepted

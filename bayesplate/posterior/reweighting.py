@@ -76,8 +76,7 @@ def _weights(log_likelihood: Floats, draws: Draws, every: int = 1) -> Floats:
 def _log_likelihood(inference: Inference, theta: Floats, every_log_frequency: Floats) -> Floats:
     """Log probability of every factor of the likelihood where the frequencies are known: (n_some, n) arrays."""
     posterior = inference.problem.posterior
-    ends = np.cumsum(posterior.n_every)[:-1]
-    return posterior.log_likelihood_of(np.split(every_log_frequency, ends, axis=1), theta)
+    return posterior.log_likelihood_of(posterior.by_setup(every_log_frequency), theta)
 
 
 def weighted_mean(values: Floats, weights: Floats) -> float:

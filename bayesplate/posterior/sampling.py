@@ -14,7 +14,7 @@ from bayesplate.posterior.checkpoint import Checkpoint, Chunk
 from bayesplate.posterior.convergence import Convergence, Gate, acceptance_by_walker, assess, burn_in_steps
 from bayesplate.posterior.ensembles import Learnt, advance, correcting, crossed, stepping
 from bayesplate.posterior.moves import CorrectedSteps, Steps
-from bayesplate.posterior.starting import GuardedPosterior, LogPosterior, random_numbers, start_ensembles
+from bayesplate.posterior.starting import Evaluate, GuardedPosterior, LogPosterior, random_numbers, start_ensembles
 from bayesplate.posterior.warm_up import WarmUp
 
 FloatArray = NDArray[np.float64]
@@ -81,11 +81,14 @@ class Chains:
     log_prob : (n_ensembles, n_steps, n_walkers) array
     burn_in : int
         Steps to discard.
+    blobs : (n_ensembles, n_kept_steps, n_walkers, n_blobs) array or None
+        What the density found at the draws that are kept; None where only a part of it was kept, or nothing.
     """
 
     draws: FloatArray
     log_prob: FloatArray
     burn_in: int
+    blobs: FloatArray | None = None
 
     @property
     def kept(self) -> FloatArray:
@@ -140,6 +143,7 @@ def sample(
     settings: SamplerSettings,
     *,
     surrogate: LogPosterior | None = None,
+    evaluate: Evaluate | None = None,
     names: Sequence[str] = (),
     checkpoint: Checkpoint | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -160,6 +164,9 @@ def sample(
     surrogate : callable, optional
         A cheap density near the posterior, on which the walkers then walk between two evaluations of the posterior; it
         serves alone during the warm-up. The draws that are kept follow the posterior itself (`CorrectedSteps`).
+    evaluate : callable, (n_points, n_dim) -> (n_points,) and (n_points, n_blobs) arrays, optional
+        The log posterior once more, with what it finds on the way: behind a surrogate that is kept beside the draws.
+        At least one number for each point; by default the log posterior itself.
     names : sequence of str, optional
         Parameter names for messages.
     checkpoint : Checkpoint, optional
@@ -190,6 +197,14 @@ def sample(
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
     guarded = GuardedPosterior(log_posterior, names)
     cheap = None if surrogate is None else GuardedPosterior(surrogate, names)
+
+    def evaluated(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if evaluate is None:
+            values = guarded(points)
+            return values, values[:, None]
+        found, blobs = evaluate(points)
+        return guarded.checked(found, points), blobs
+
     session = (
         nullcontext(())
         if checkpoint is None
@@ -235,15 +250,16 @@ def sample(
                 learnt = Learnt.of(lesson, centre, covariance, rngs, is_over)
             supply = (learnt, settings.chunk_steps, n_walkers, rngs)
             move: Steps | CorrectedSteps
+            blobs = None
             if cheap is None:
                 move = stepping(guarded, *supply)
             elif not is_over:
                 move = stepping(cheap, *supply)
             else:
-                move = correcting(cheap, guarded, *supply)
+                move, blobs = correcting(cheap, evaluated, *supply), chunks[-1].blobs[:, -1]
                 if len(chunks) == warm_up.first:
-                    coords, log_prob = crossed(guarded, coords)
-            chunk = Chunk(*advance(move, coords, log_prob, settings.chunk_steps))
+                    coords, log_prob, blobs = crossed(evaluated, coords)
+            chunk = advance(move, coords, log_prob, settings.chunk_steps, blobs)
             if checkpoint is not None:
                 checkpoint.append(chunk)
             chunks.append(chunk)
@@ -262,6 +278,11 @@ def _joined(chunks: list[Chunk], n_warm: int, *, is_corrected: bool) -> Chains:
     draws = np.concatenate([chunk.draws for chunk in chunks], axis=1)
     log_prob = np.concatenate([chunk.log_prob for chunk in chunks], axis=1)
     n_steps = draws.shape[1]
-    warm_up = min(n_warm, len(chunks) - 1) * chunks[0].draws.shape[1]
-    burn_in = warm_up + -(-(n_steps - warm_up) // 6) if is_corrected else burn_in_steps(n_steps)
-    return Chains(draws, log_prob, max(warm_up, burn_in))
+    n_warm = min(n_warm, len(chunks) - 1)
+    warm_up = n_warm * chunks[0].draws.shape[1]
+    if not is_corrected:
+        return Chains(draws, log_prob, max(warm_up, burn_in_steps(n_steps)))
+    behind = -(-(n_steps - warm_up) // 6)
+    found = [chunk.blobs for chunk in chunks[n_warm:]]
+    blobs = np.concatenate(found, axis=1)[:, behind:] if all(one.shape[-1] for one in found) else None
+    return Chains(draws, log_prob, warm_up + behind, blobs)

@@ -16,6 +16,8 @@ from bayesplate.errors import BayesplateError, NotConvergedError, NotIdentifiabl
 
 FloatArray = NDArray[np.float64]
 LogPosterior = Callable[[FloatArray], FloatArray]
+Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""A log posterior that tells what it found on the way too, an (n_points, n_blobs) array: emcee's blobs."""
 
 _START_SPREAD = 3.0  # standard errors
 _START_TRIES = 1000
@@ -37,7 +39,11 @@ class GuardedPosterior:
     names: tuple[str, ...]
 
     def __call__(self, theta: FloatArray) -> FloatArray:
-        values = np.asarray(self.log_posterior(theta), dtype=np.float64)
+        return self.checked(self.log_posterior(theta), theta)
+
+    def checked(self, found: FloatArray, theta: FloatArray) -> FloatArray:
+        """What was found at some points, if every value may be one."""
+        values = np.asarray(found, dtype=np.float64)
         if values.shape != theta.shape[:1]:
             raise BayesplateError(f"log posterior: wanted shape {theta.shape[:1]}, got {values.shape}")
         wrong = np.isnan(values) | (values == np.inf)

@@ -136,7 +136,7 @@ class SurrogatePosterior(Posterior):
 
     def every_log_frequency(self, theta: Floats) -> list[Floats]:
         """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
-        return _by_setup(self, self.surrogate.log_frequencies(theta))
+        return self.by_setup(self.surrogate.log_frequencies(theta))
 
 
 def with_surrogate(posterior: Posterior, surrogate: Surrogate) -> SurrogatePosterior:
@@ -227,11 +227,6 @@ def _walked(density: LogPosterior, coordinates: TailCoordinates, theta: Floats, 
     start = coords[:n_walkers]
     archive, proposal = coords[None, :_N_ARCHIVED], Proposal.one_fitted(coords)
     steps = Steps(density, proposal, archive, "ID" * (_N_STEPS // 2), n_walkers, [rng])
-    draws, _ = advance(steps, start[None], density(start)[None], _N_STEPS)
+    draws = advance(steps, start[None], density(start)[None], _N_STEPS).draws
     taken = draws[0, -1 :: -(_N_STEPS // (2 * _N_TAKEN))][:_N_TAKEN]
     return coordinates.theta(taken.reshape(-1, coords.shape[1])[: len(theta)])
-
-
-def _by_setup(posterior: Posterior, log_frequency: Floats) -> list[Floats]:
-    ends = np.cumsum(posterior.n_every)[:-1]
-    return np.split(log_frequency, ends, axis=1)

@@ -11,11 +11,13 @@ all the lighter ones that the prior allows, for below some mass none makes a dif
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayesplate.posterior.starting import Evaluate, LogPosterior
 
 Floats = NDArray[np.float64]
 
@@ -91,15 +93,21 @@ class TailCoordinates:
         """ln |d theta / d y| of (..., n_dim) y: (...) array."""
         return np.asarray(np.log(self.scale * np.cosh(y[..., self.columns])).sum(axis=-1))
 
-    def density(self, log_density: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+    def density(self, log_density: LogPosterior) -> LogPosterior:
         """Log density of y from that of theta, both vectorised: (n_draws, n_dim) -> (n_draws,)."""
+        alone = self.evaluation(lambda theta: (log_density(theta), np.empty((len(theta), 0))), 0)
+        return lambda y: alone(y)[0]
+
+    def evaluation(self, evaluate: Evaluate, n_blobs: int) -> Evaluate:
+        """The same with what is found on the way, `n_blobs` numbers at each point."""
         limit = np.arcsinh(_FARTHEST / self.scale)
 
-        def transformed(y: Floats) -> Floats:
+        def transformed(y: Floats) -> tuple[Floats, Floats]:
             near = np.all(np.abs(y[:, self.columns]) < limit, axis=1)
-            result = np.full(y.shape[0], -np.inf)
+            result, blobs = np.full(y.shape[0], -np.inf), np.full((y.shape[0], n_blobs), np.nan)
             if near.any():
-                result[near] = log_density(self.theta(y[near])) + self.log_jacobian(y[near])
-            return result
+                log_density, blobs[near] = evaluate(self.theta(y[near]))
+                result[near] = log_density + self.log_jacobian(y[near])
+            return result, blobs
 
         return transformed

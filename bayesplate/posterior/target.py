@@ -61,6 +61,24 @@ class Posterior:
             total[inside] += self.log_likelihood(theta[inside]).sum(axis=1)
         return total
 
+    def evaluate(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Log density, and ln f of all modes, setup after setup: (n_draws,) and (n_draws, n_every) arrays.
+
+        Not a number where the prior excludes the draw.
+        """
+        total = self.log_prior(theta)
+        inside = np.isfinite(total)
+        log_frequency = np.full((len(theta), sum(self.n_every)), np.nan)
+        if inside.any():
+            by_setup = self.every_log_frequency(theta[inside])
+            total[inside] += self.log_likelihood_of(by_setup, theta[inside]).sum(axis=1)
+            log_frequency[inside] = np.concatenate(by_setup, axis=1)
+        return total, log_frequency
+
+    def by_setup(self, log_frequency: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Columns of each setup among those of `evaluate`: one (..., n_every) array per setup."""
+        return np.split(log_frequency, np.cumsum(self.n_every)[:-1], axis=-1)
+
     def log_prior(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log prior density: (n_draws,) array."""
         factors = self.log_prior_factors(theta)

@@ -70,6 +70,10 @@ def surrogate(theta):
     return log_posterior(theta - 0.3)
 
 
+def evaluate(theta):
+    return log_posterior(theta), np.exp(theta)
+
+
 @pytest.mark.parametrize("stand_in", [None, surrogate])
 @pytest.mark.parametrize("stopped_at", [30, 60, 90])
 def test_a_run_stopped_in_or_after_its_warm_up_continues_to_the_same_bytes(tmp_path, stand_in, stopped_at):
@@ -77,8 +81,10 @@ def test_a_run_stopped_in_or_after_its_warm_up_continues_to_the_same_bytes(tmp_p
 
     def drawn(max_steps, checkpoint=None):
         target = (log_posterior, np.zeros(2), np.eye(2), settings(max_steps))
-        chains, _ = sample(*target, surrogate=stand_in, checkpoint=checkpoint)
-        return chains.draws.tobytes() + chains.log_prob.tobytes()
+        chains, _ = sample(*target, surrogate=stand_in, evaluate=evaluate, checkpoint=checkpoint)
+        assert (chains.blobs is not None) == (stand_in is not None and max_steps > 60)
+        found = b"" if chains.blobs is None else chains.blobs.tobytes()
+        return chains.draws.tobytes() + chains.log_prob.tobytes() + found
 
     drawn(stopped_at, Checkpoint(tmp_path / "checkpoint", "f"))
     assert drawn(120, Checkpoint(tmp_path / "checkpoint", "f")) == drawn(120)
@@ -194,7 +200,7 @@ def test_another_run_is_refused_and_the_difference_named(folder):
 def test_a_newer_format_is_refused(folder):
     path = folder / "manifest.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"format": 99}))
-    with pytest.raises(CheckpointError, match="differs in its format: wanted 3, got 99"):
+    with pytest.raises(CheckpointError, match="differs in its format: wanted 4, got 99"):
         n_usable_chunks(folder)
 
 

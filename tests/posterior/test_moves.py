@@ -26,6 +26,11 @@ def log_density(points):
     return np.atleast_1d(TARGET.logpdf(points))
 
 
+def evaluate(points):
+    """The log density, and the points themselves as what it finds on the way."""
+    return log_density(points), 2.0 * points
+
+
 def shifted(points):
     """A surrogate that is off by one standard deviation in the first parameter, and twice as wide."""
     return np.atleast_1d(stats.multivariate_normal(MEAN + np.array([SD[0], 0, 0]), 2 * COVARIANCE).logpdf(points))
@@ -107,26 +112,36 @@ def moves_of(which, ensembles):
     """The moves of some of four ensembles, from their own random numbers and archives."""
     draws = np.random.default_rng(0).multivariate_normal(MEAN, COVARIANCE, (N_ENSEMBLES, 20, N_WALKERS))
     rngs = [random_numbers(7, i, 2) for i in ensembles]
-    whole = Learnt.of([Chunk(draws, log_density(draws))], MEAN, COVARIANCE, rngs, True)
+    chunk = Chunk(draws, log_density(draws), np.empty((*draws.shape[:-1], 0)))
+    whole = Learnt.of([chunk], MEAN, COVARIANCE, rngs, True)
     learnt = Learnt(whole.proposal, whole.archives[ensembles])
     if which == "plain":
         return stepping(log_density, learnt, N_STEPS, N_WALKERS, rngs), draws[ensembles, -1]
-    return correcting(shifted, log_density, learnt, N_STEPS, N_WALKERS, rngs), draws[ensembles, -1]
+    return correcting(shifted, evaluate, learnt, N_STEPS, N_WALKERS, rngs), draws[ensembles, -1]
 
 
 @pytest.mark.parametrize("which", ["plain", "corrected"])
 def test_four_ensembles_together_draw_what_each_draws_apart(which):
     def run(ensembles):
         move, coords = moves_of(which, ensembles)
-        return advance(move, coords, log_density(coords.reshape(-1, 3)).reshape(coords.shape[:2]), N_STEPS)
+        log_prob = log_density(coords.reshape(-1, 3)).reshape(coords.shape[:2])
+        return advance(move, coords, log_prob, N_STEPS, 2.0 * coords if which == "corrected" else None)
 
-    draws, log_prob = run([0, 1, 2, 3])
-    assert draws.shape == (N_ENSEMBLES, N_STEPS, N_WALKERS, 3)
+    together = run([0, 1, 2, 3])
+    assert together.draws.shape == (N_ENSEMBLES, N_STEPS, N_WALKERS, 3)
     for i in range(N_ENSEMBLES):
-        alone, alone_log_prob = run([i])
-        np.testing.assert_allclose(draws[i], alone[0], rtol=1e-12)
-        np.testing.assert_allclose(log_prob[i], alone_log_prob[0], rtol=1e-12)
-    assert not np.array_equal(draws[0], draws[1])
+        alone = run([i])
+        np.testing.assert_allclose(together.draws[i], alone.draws[0], rtol=1e-12)
+        np.testing.assert_allclose(together.log_prob[i], alone.log_prob[0], rtol=1e-12)
+    assert not np.array_equal(together.draws[0], together.draws[1])
+
+
+def test_what_the_density_found_stays_with_the_draw_it_was_found_at():
+    move, coords = moves_of("corrected", [0, 1, 2, 3])
+    log_prob = log_density(coords.reshape(-1, 3)).reshape(coords.shape[:2])
+    chunk = advance(move, coords, log_prob, N_STEPS, 2.0 * coords)
+    np.testing.assert_array_equal(chunk.blobs, 2.0 * chunk.draws)
+    assert 0.2 < np.mean(np.any(np.diff(chunk.draws, axis=1), axis=-1)) < 0.99  # some steps are refused
 
 
 def test_a_chunk_of_steps_asks_for_all_its_independent_proposals_in_one_call():

@@ -142,6 +142,14 @@ def test_a_law_that_was_asked_for_serves_alone(problem):
     assert infer(problem, SamplerSettings(seed=5, max_steps=50)).surrogate is not None
 
 
+def test_the_frequencies_kept_with_the_draws_are_those_of_the_law_there(inference):
+    draws = named_draws(inference, seed=1)
+    assert inference.chains.blobs is not None
+    anew = inference.problem.posterior.every_log_frequency(draws.flat)
+    for kept, law in zip(draws.every_log_frequency, anew, strict=True):
+        np.testing.assert_allclose(kept.reshape(law.shape), law, rtol=0, atol=1e-11)
+
+
 def test_with_and_without_a_surrogate_the_posterior_is_the_same(problem, inference):
     """Means and deciles of ln D within four Monte Carlo errors."""
     alone = infer(pose(problem.board, problem.prior, law="exact"), SamplerSettings(seed=6))

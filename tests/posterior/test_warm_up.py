@@ -25,7 +25,8 @@ def chunks(means, tau=1.0, seed=0):
     for step in range(1, n_steps):
         draws[:, step] = keep * draws[:, step - 1] + np.sqrt(1.0 - keep**2) * noise[:, step]
     parts = np.split(draws[..., None], len(means), axis=1)
-    return [Chunk(part, np.full(SHAPE, float(mean))) for part, mean in zip(parts, means, strict=True)]
+    nothing = np.empty((*SHAPE, 0))
+    return [Chunk(part, np.full(SHAPE, float(mean)), nothing) for part, mean in zip(parts, means, strict=True)]
 
 
 def followed(made):
