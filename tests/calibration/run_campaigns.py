@@ -18,10 +18,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from calibration.campaigns import KINDS, CampaignDesign, identity, judge, simulate_one
-from calibration.records import Record, add_to, begin, publish, read_done
-
-BEGUN = Path(__file__).with_name("campaigns-begun.jsonl.gz")
-"""Records of a run that is not whole yet, if there is one: a new file begins with them."""
+from calibration.records import Record, add_to, publish, read_done
 
 
 def run(
@@ -54,8 +51,6 @@ def main() -> int:
     if not set(kinds) <= set(KINDS):
         parser.error(f"--kinds: wanted some of {','.join(KINDS)}, got {given.kinds}")
     design = CampaignDesign(n_boards=given.boards)
-    if design == CampaignDesign():
-        begin(given.out, BEGUN)
     records = run(design, kinds, given.campaigns, given.workers, given.out)
     lines, well = judge(records)
     wanted = len(KINDS) * given.campaigns
