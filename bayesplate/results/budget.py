@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.plate.board import Board
@@ -11,55 +10,56 @@ from bayesplate.plate.sessions import OF_MODES
 from bayesplate.posterior.draws import Draws
 
 LARGE_SHARE = 0.5
+_SAME = 1e-9
+"""Variance of a combination of inputs, beside that of one, below which they say the same."""
 _OF_DISCREPANCIES = ", which more sessions do not narrow: read other modes, or look for what the plate lacks (diagnose)"
 
 
 def input_shares(draws: Draws) -> dict[str, dict[str, float]]:
     """Share of the variance of the logarithm of each modulus that goes with each uncertain input, 0 to 1.
 
-    The squared correlation with the input itself: one centred on zero, a taper, has no logarithm, and that of a
-    positive one hardly differs over its few per cent.
+    Readings that tell of two inputs at once leave them correlated, and the squared correlations with each would add up
+    to more than there is. So the inputs are made uncorrelated first, each moved as little as can be; the squared
+    correlations with those add up to what a regression on all inputs explains, and the readings leave the rest.
+
+    The logarithm of a modulus is taken to be linear in the inputs themselves: one centred on zero, a taper, has no
+    logarithm, and that of a positive one hardly differs over its few per cent.
+
+    References
+    ----------
+    V. Zuber and K. Strimmer, High-dimensional regression and variable selection using CAR scores, Statistical
+    Applications in Genetics and Molecular Biology 10 (2011), doi:10.2202/1544-6115.1730.
     """
-    shares: dict[str, dict[str, float]] = {}
-    for modulus, values in draws.moduli.items():
-        log_modulus = np.log(values).ravel()
-        shares[modulus] = {
-            name: float(np.corrcoef(log_modulus, column.ravel())[0, 1] ** 2) for name, column in draws.inputs.items()
-        }
-    return shares
+    names, n = list(draws.inputs), len(draws.inputs)
+    moduli = [np.log(values).ravel() for values in draws.moduli.values()]
+    correlations = np.atleast_2d(np.corrcoef([*(column.ravel() for column in draws.inputs.values()), *moduli]))
+    variances, directions = np.linalg.eigh(correlations[:n, :n])
+    kept = variances > _SAME * n
+    uncorrelated = (directions[:, kept] / np.sqrt(variances[kept])) @ directions[:, kept].T
+    shares = (uncorrelated @ correlations[:n, n:]) ** 2
+    return {modulus: dict(zip(names, shares[:, i].tolist(), strict=True)) for i, modulus in enumerate(draws.moduli)}
 
 
 def budget(draws: Draws, board: Board) -> dict[str, dict[str, float]]:
     """Share of the variance of the logarithm of each modulus that goes with each row of the budget, 0 to 1.
 
     A row is an uncertain input, as in `input_shares`, or what means nothing but together, an effect's components or the
-    discrepancies of all modes: theirs is the part of the variance that a regression on all of them explains.
+    discrepancies of all modes: theirs is the sum of the shares.
     """
-    together: dict[str, list[str]] = {}
-    for one in board.uncertain:
-        if one.is_component:
-            together.setdefault(one.effect or one.words, []).append(one.name)
-    components = {name for names in together.values() for name in names}
-    shares = input_shares(draws)
-    for modulus, values in draws.moduli.items():
-        kept = {name: share for name, share in shares[modulus].items() if name not in components}
-        shares[modulus] = kept | {
-            effect: _explained(np.log(values).ravel(), np.column_stack([draws.inputs[name].ravel() for name in names]))
-            for effect, names in together.items()
-        }
-    return shares
+    rows = {one.name: (one.effect or one.words) if one.is_component else one.name for one in board.uncertain}
+    result = {}
+    for modulus, by_input in input_shares(draws).items():
+        of_row: dict[str, float] = {}
+        for name, share in by_input.items():
+            row = rows.get(name, name)
+            of_row[row] = of_row.get(row, 0.0) + share
+        result[modulus] = of_row
+    return result
 
 
 def row_words(row: str, board: Board) -> str:
     """What people call a row of the budget."""
     return next((one.words for one in board.uncertain if one.name == row), row.replace("_", " "))
-
-
-def _explained(values: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
-    """Part of the variance of (n,) values that a regression on (n, k) columns explains."""
-    about, centred = values - values.mean(), columns - columns.mean(axis=0)
-    fitted = centred @ np.linalg.lstsq(centred, about, rcond=None)[0]
-    return float(fitted @ fitted / (about @ about))
 
 
 def prior_remarks(draws: Draws, prior: PriorCard) -> list[str]:
