@@ -76,6 +76,7 @@ class Assignments:
 
     @cached_property
     def _missed(self) -> Floats:
+        """m_j, none of them zero: (n_modes, n_draws) array."""
         return np.maximum(self.missed, LEAST)
 
     def _products(self, *, backward: bool = False) -> Floats:

@@ -118,7 +118,8 @@ def advance(
 
     n_ensembles, n_walkers, n_dim = coords.shape
     n_together = n_ensembles * n_walkers
-    sampler = emcee.EnsembleSampler(n_together, n_dim, _never_asked, moves=move, vectorize=True)
+    # The moves have the density, and know it wherever a walker is: emcee has none to evaluate.
+    sampler = emcee.EnsembleSampler(n_together, n_dim, None, moves=move, vectorize=True)
     found = None if blobs is None else blobs.reshape(n_together, blobs.shape[-1])
     start = emcee.State(coords.reshape(-1, n_dim), log_prob=log_prob.ravel(), blobs=found)
     sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
@@ -126,8 +127,3 @@ def advance(
     parts = chain, densities, np.empty((*densities.shape, 0)) if kept is None else kept
     shape = (n_steps, n_ensembles, n_walkers)
     return Chunk(*(np.moveaxis(part.reshape(*shape, *part.shape[2:]), 1, 0) for part in parts))
-
-
-def _never_asked(points: FloatArray) -> FloatArray:
-    """What emcee would evaluate by itself: the moves have the density, and know it wherever a walker is."""
-    raise NotImplementedError

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import sys
 import time
@@ -30,14 +29,6 @@ def read_done(path: Path, identity: Record) -> list[Record]:
     if len(whole) < len(lines):
         path.write_text("".join(whole))
     return [json.loads(line) for line in whole[1:]]
-
-
-def begin(path: Path, begun: Path) -> None:
-    """Begin a file that does not exist with the records of a run that is not whole yet, if they are kept compressed."""
-    if path.exists() or not begun.exists():
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(gzip.decompress(begun.read_bytes()))
 
 
 def add_to(

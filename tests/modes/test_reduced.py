@@ -12,6 +12,7 @@ import ritz
 from bars import meets
 
 from bayesplate.frequencies.laws import ExactLaw, LinearLaw
+from bayesplate.modes import reduced as reduced_module
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
 from bayesplate.modes.plate import Weights
@@ -101,6 +102,27 @@ def test_reported_error_is_the_true_one_where_the_basis_is_poor():
     assert reduced.worst_cents > 0.5
     errors = np.abs(cents(reduced.eigenvalues(together([outside])), [exact]))
     assert reduced.worst_cents == pytest.approx(errors.max(), rel=1e-6)
+
+
+def test_a_poor_basis_is_used_in_the_first_way_that_adds_hardly_anything(monkeypatch):
+    """Of three ways that are not good enough one adds half a semitone, one a millionth of a frequency, one nothing."""
+    board, names = WANTED["cantilever"]
+    plate, found, _ = prepared("cantilever")
+    centre, outside = weights_at(board, np.zeros(3)), weights_at(board, np.array([1.0, -1.0, 1.0]))
+    ways = []
+
+    def three_ways(whole, *_):
+        ways.append(
+            [replace(whole, stiffness=factor * whole.stiffness) for factor in (2.0 ** (1 / 12), 1.0 + 2e-6, 1.0)]
+        )
+        yield from ways[-1]
+
+    monkeypatch.setattr(reduced_module, "_cheapest_first", three_ways)
+    reduced = reduced_order_model(plate, [found[beams].place for beams in names], centre, [], [outside])
+    assert reduced.worst_cents > reduced_module.ACCEPTED_CENTS
+    worst = [block for block in reduced.blocks if any(block is tried[1] for tried in ways)]
+    assert worst  # classes whose basis is good enough, or good but for that, take another way
+    assert not any(block is tried[2] for block in reduced.blocks for tried in ways)
 
 
 @pytest.mark.parametrize("name", WANTED)

@@ -27,7 +27,7 @@ def log_density(points):
 
 
 def evaluate(points):
-    """The log density, and the points themselves as what it finds on the way."""
+    """The log density, and twice the points as what it finds on the way."""
     return log_density(points), 2.0 * points
 
 
@@ -141,7 +141,9 @@ def test_what_the_density_found_stays_with_the_draw_it_was_found_at():
     log_prob = log_density(coords.reshape(-1, 3)).reshape(coords.shape[:2])
     chunk = advance(move, coords, log_prob, N_STEPS, 2.0 * coords)
     np.testing.assert_array_equal(chunk.blobs, 2.0 * chunk.draws)
-    assert 0.2 < np.mean(np.any(np.diff(chunk.draws, axis=1), axis=-1)) < 0.99  # some steps are refused
+    moved = np.any(np.diff(chunk.draws, axis=1), axis=-1)
+    assert moved.any()
+    assert not moved.all()
 
 
 def test_a_chunk_of_steps_asks_for_all_its_independent_proposals_in_one_call():

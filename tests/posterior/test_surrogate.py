@@ -147,6 +147,7 @@ def test_the_frequencies_kept_with_the_draws_are_those_of_the_law_there(inferenc
     assert inference.chains.blobs is not None
     anew = inference.problem.posterior.every_log_frequency(draws.flat)
     for kept, law in zip(draws.every_log_frequency, anew, strict=True):
+        # The rounding of eigenvalues, by how far the highest of a basis lies above those wanted.
         np.testing.assert_allclose(kept.reshape(law.shape), law, rtol=0, atol=1e-11)
 
 

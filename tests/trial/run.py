@@ -3,9 +3,8 @@
 Plants boards with the independent generator, cell by cell of `cells`, judges each as `diagnose` would, and writes what
 came out to docs/validation/trial.json and trial.md; beside them the records of a whole trial, compressed, or their
 digest. An interrupted run goes on where it stopped if it is given the same file; if the code has changed since, one
-board of each cell is judged again, and must come out as it did. What was judged of a trial that is not whole is kept
-in begun.jsonl.gz, with which a new file begins. Exit code 0: every bar met; 1: some are missed, and stay there as
-missed; 2: usage.
+board of each cell is judged again, and must come out as it did. Exit code 0: every bar met; 1: some are missed, and
+stay there as missed; 2: usage.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one board a core; before numpy 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration.records import add_to, begin, read_done
+from calibration.records import add_to, read_done
 from trial.cells import CELLS, Cell, identity, jobs
 from trial.judge import Record, judge_one
 from trial.page import write
@@ -30,8 +29,6 @@ from trial.page import write
 BASE_SEED = 7
 """Boards of seeds 1 to 6 were looked at, or begun with, while rules and sizes could still change."""
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "validation"
-BEGUN = Path(__file__).with_name("begun.jsonl.gz")
-"""Records of a trial that is not whole yet, if there is one: a new file begins with them."""
 SAME = 1e-3
 """Probabilities that agree to this are the same: refactoring and other processors change the last digits."""
 
@@ -105,8 +102,6 @@ def main() -> int:
     parser.add_argument("--only-summary", action="store_true", help="judge no board, sum up those in the file")
     options = parser.parse_args()
     started = time.perf_counter()
-    if options.base_seed == BASE_SEED:
-        begin(options.out, BEGUN)
     records = run(
         CELLS,
         options.out,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import math
 import multiprocessing
@@ -12,14 +11,13 @@ import time
 
 import numpy as np
 import pytest
-from calibration.records import begin
 from generator.boards import plant
 from scipy import stats
 from trial.amplitudes import MEANINGS, quantiles
 from trial.cells import CELLS, KINDS, NOISES, SENSORS, Cell, identity, jobs
 from trial.counts import Share, mean, median
 from trial.judge import judge_one, plant_board
-from trial.run import BASE_SEED, BEGUN, run
+from trial.run import BASE_SEED, run
 from trial.shared import baseline_of_card, control_of
 from trial.summary import CONDITIONS
 
@@ -151,31 +149,6 @@ def test_a_board_depends_neither_on_the_workers_nor_on_the_order(few, tmp_path):
     assert without_time(sorted(again, key=lambda r: (order[r["cell"]], r["index"]))) == without_time(few)
     other_seed = judge_one(FEW[0], BASE_SEED + 1, 0)
     assert other_seed["truth"]["constants"] != few[0]["truth"]["constants"]
-
-
-def test_a_new_file_begins_with_what_was_judged_before_and_one_that_is_there_stays(few, tmp_path):
-    """The records are kept compressed; a run that is given them judges only what they lack."""
-    kept, out, begun = (tmp_path / name for name in ("kept.jsonl", "out.jsonl", "begun.jsonl.gz"))
-    run(FEW, kept, workers=1, quiet=True, most=0)
-    with kept.open("a") as file:
-        file.writelines(json.dumps(record) + "\n" for record in few)
-    begun.write_bytes(gzip.compress(kept.read_bytes()))
-    begin(out, begun)
-
-    assert run(FEW, out, only_read=True) == few
-    out.write_text("mine")
-    begin(out, begun)
-    assert out.read_text() == "mine"
-    begin(tmp_path / "none.jsonl", tmp_path / "missing.gz")
-    assert not (tmp_path / "none.jsonl").exists()
-
-
-@pytest.mark.skipif(not BEGUN.exists(), reason="no trial is begun")
-def test_the_trial_that_is_begun_is_of_these_cells_and_this_seed():
-    """Records of other boards would be refused; those of another search are judged again."""
-    first = json.loads(gzip.decompress(BEGUN.read_bytes()).splitlines()[0])
-    wanted = json.loads(json.dumps(identity(CELLS, BASE_SEED)))
-    assert {**first, "code": wanted["code"]} == wanted
 
 
 def test_a_killed_run_goes_on_to_the_same_records(few, tmp_path):
