@@ -18,14 +18,32 @@ from bayesplate.plate.setup import Setup
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
-Group = tuple[Rows, Rows, Floats]
-"""Peaks and modes that keep their order, and ln of the probability that a mode has the sign of a peak."""
 
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""
 _DRAWS_AT_ONCE = 1024
 """Enough for the arithmetic to be done in compiled code; thousands at once would hold gigabytes."""
 _SIGNS = {"+": 1, "-": -1, "": 0}
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """Peaks and modes that keep their order: all, or those that may be of one sign.
+
+    Attributes
+    ----------
+    peaks : (n_own,) array of int
+    modes : (n_of,) array of int
+    log_sign : (n_own, n_of) array
+        ln of the probability that a mode has the sign of a peak.
+    taking : (n_tried, n_own) array of bool
+        Which of the peaks are of this sign, for every sign that those of unknown sign may have.
+    """
+
+    peaks: Rows
+    modes: Rows
+    log_sign: Floats
+    taking: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +75,8 @@ class PeakLikelihood:
         ln of the probability of each peak if it is no mode.
     missed : (n_modes,) array
         Probability that a mode below the highest peak left none.
-    orders : tuple of tuple of Group
-        Peaks and modes that keep their order: all, or those of one sign and those of the other; in the latter case once
-        for every sign that the peaks of unknown sign may have.
+    orders : tuple of Order
+        One, or one per sign: each as many times as there are signs that the peaks of unknown sign may have.
     shared : (n_shared,) array of int
         Modes that are in the orders of both signs.
     log_highest : float
@@ -74,7 +91,7 @@ class PeakLikelihood:
     log_prior: Floats
     log_alone: Floats
     missed: Floats
-    orders: tuple[tuple[Group, ...], ...]
+    orders: tuple[Order, ...]
     shared: Rows
     log_highest: float
 
@@ -112,9 +129,9 @@ class PeakLikelihood:
         highest = max([*setup.measured, *setup.unlabelled])
         wide = np.where(errors.rounded, errors.resolution, errors.frequency) / highest
         orders = tuple(_orders(signs, columns.size, residues))
-        is_split = len(orders[0]) > 1
+        is_split = len(orders) > 1
         log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
-        in_both = np.isin(np.arange(columns.size), orders[0][0][1]) & np.isin(np.arange(columns.size), orders[0][-1][1])
+        in_both = np.intersect1d(orders[0].modes, orders[-1].modes) if is_split else np.empty(0, dtype=np.intp)
         log_alone = np.log(setup.spurious * len(errors.frequency) * wide) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
@@ -126,7 +143,7 @@ class PeakLikelihood:
             log_alone=log_alone,
             missed=1.0 - seen,
             orders=orders,
-            shared=np.flatnonzero(in_both & is_split),
+            shared=in_both,
             log_highest=float(np.log(highest)),
         )
 
@@ -158,8 +175,8 @@ class PeakLikelihood:
         from scipy.special import logsumexp
 
         missed = self._missed(there, noise)
-        by_order = self._assignments(there, noise, missed)
-        total = logsumexp([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
+        summed = [one.log_sums(order.taking) for order, _, one in self._assignments(there, noise, missed)]
+        total = logsumexp(sum(summed), axis=0)
         # A mode in two orders was counted as missed in one of them at least.
         return np.asarray(total - np.log(np.maximum(missed[:, self.shared], LEAST)).sum(axis=1))
 
@@ -175,14 +192,14 @@ class PeakLikelihood:
         from scipy.special import softmax
 
         there = every_log_frequency[:, self.columns]
-        by_order = self._assignments(there, noise, self._missed(there, noise))
-        weights = softmax([sum(one.log_sum() for _, _, one in groups) for groups in by_order], axis=0)
+        every = self._assignments(there, noise, self._missed(there, noise))
+        weights = softmax(sum(one.log_sums(order.taking) for order, _, one in every), axis=0)
         result = np.zeros(self.log_prior.shape)
-        for groups, weight in zip(by_order, weights, strict=True):
-            for peaks, modes, one in groups:
-                by_mode = np.zeros((peaks.size, self.columns.size, len(noise)))
-                np.put_along_axis(by_mode, modes[None], one.pairs(), axis=1)
-                result[peaks] += by_mode @ weight / len(noise)
+        for order, modes, one in every:
+            for taken, weight in zip(order.taking, weights, strict=True):
+                by_mode = np.zeros((int(taken.sum()), self.columns.size, len(noise)))
+                np.put_along_axis(by_mode, modes[None], one.of(taken).pairs(), axis=1)
+                result[order.peaks[taken]] += by_mode @ weight / len(noise)
         return result
 
     def log_density_alone(self, reading: int) -> float:
@@ -192,22 +209,21 @@ class PeakLikelihood:
         width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
         return float(self.log_alone[at] - np.log(width))
 
-    def _assignments(self, there: Floats, noise: Floats, missed: Floats) -> list[list[tuple[Rows, Rows, Assignments]]]:
-        """Of each group of each of `orders`: its peaks, its modes in the order of each draw, what they say together.
+    def _assignments(self, there: Floats, noise: Floats, missed: Floats) -> list[tuple[Order, Rows, Assignments]]:
+        """Each of `orders`, its modes in the order of each draw, and what its peaks say of them.
 
         The modes are (n, n_draws) arrays.
         """
         rows = [np.ascontiguousarray(each.T) for each in (there, missed)]
-
-        def assigned(peaks: Rows, modes: Rows, log_sign: Floats) -> tuple[Rows, Rows, Assignments]:
-            by_rank = np.ascontiguousarray(np.argsort(there[:, modes], axis=1).T)
-            order = modes[by_rank]
-            ordered, lonely = (np.take_along_axis(each, order, axis=0) for each in rows)
-            log_pair = self.errors.at(peaks).log_likelihood_of_each(ordered, noise)
-            log_pair += np.take(self.log_prior[np.ix_(peaks, modes)] + log_sign, by_rank, axis=1)
-            return peaks, order, Assignments(log_pair, self.log_alone[peaks], lonely)
-
-        return [[assigned(*group) for group in groups] for groups in self.orders]
+        found = []
+        for order in self.orders:
+            by_rank = np.ascontiguousarray(np.argsort(there[:, order.modes], axis=1).T)
+            modes = order.modes[by_rank]
+            ordered, lonely = (np.take_along_axis(each, modes, axis=0) for each in rows)
+            log_pair = self.errors.at(order.peaks).log_likelihood_of_each(ordered, noise)
+            log_pair += np.take(self.log_prior[np.ix_(order.peaks, order.modes)] + order.log_sign, by_rank, axis=1)
+            found.append((order, modes, Assignments(log_pair, self.log_alone[order.peaks], lonely)))
+        return found
 
     def _missed(self, there: Floats, noise: Floats) -> Floats:
         """Probability that each mode left no peak: (n_draws, n_modes) array."""
@@ -226,8 +242,8 @@ def _signs(setup: Setup, doubtful: Rows) -> list[str]:
     return [*(peak.sign for peak in setup.peaks), *(setup.readings[i].sign for i in doubtful)]
 
 
-def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[tuple[Group, ...]]:
-    """Those of one sign apart, for every sign of the peaks of which it is not known; or all together."""
+def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Order]:
+    """Those that may be of one sign, for every sign of the peaks of which it is not known; or all together."""
     unsigned = np.flatnonzero(signs == 0)
     peaks, modes = np.arange(signs.size), np.arange(n_modes)
     log_sign = np.zeros((3, n_modes))
@@ -236,13 +252,13 @@ def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[tupl
         with np.errstate(divide="ignore"):
             log_sign[[1, -1]] = np.log(sign_probabilities(residues))
     if unsigned.size > _MOST_UNSIGNED or unsigned.size == signs.size or not is_known:
-        yield ((peaks, modes, log_sign[signs]),)
+        yield Order(peaks, modes, log_sign[signs], np.ones((1, signs.size), dtype=np.bool_))
         return
-    for tried in product((1, -1), repeat=unsigned.size):
-        every = signs.copy()
-        every[unsigned] = tried
-        members = [(np.flatnonzero(every == sign), np.flatnonzero(log_sign[sign] > -np.inf)) for sign in (1, -1)]
-        yield tuple((own, of, log_sign[every[own]][:, of]) for own, of in members)
+    tried = np.repeat(signs[None], 2**unsigned.size, axis=0)
+    tried[:, unsigned] = list(product((1, -1), repeat=unsigned.size))
+    for sign in (1, -1):
+        own, of = np.flatnonzero((signs == sign) | (signs == 0)), np.flatnonzero(log_sign[sign] > -np.inf)
+        yield Order(own, of, np.repeat(log_sign[sign, of][None], own.size, axis=0), tried[:, own] == sign)
 
 
 def _log_labels(setup: Setup, readings: Rows, labels: Sequence[Label | None]) -> Floats:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+import ritz
 from benchmarks import timing
 
 LINEAR_BOARD, EXACT_BOARD = "fiemme-spruce-clamped", "finnish-spruce-cantilever"
@@ -18,6 +19,9 @@ WITH_EFFECTS = ("spruce-free-2R", ("transverse_shear", "attached_mass"))
 SEEDS = (1, 2, 3)
 BATCH = 4096
 FEW_BOARDS, MANY_BOARDS = 5, 100
+FEW_MODES, MANY_MODES = 6, 12
+FEW_CANDIDATES = ("attached_mass", "poisson_ratio", "grain_angle")
+ACCURACY = 1e-4
 
 HEAD = """# Benchmarks
 
@@ -56,6 +60,10 @@ def ratios(repeats: int) -> Iterator[Ratio]:
     for law, limit in (("linear", 2000.0), ("exact", 100.0)):
         per_draw = timing.law(exact, law, BATCH) / BATCH
         yield Ratio(f"full solves in the time of one, {law} law per draw", solve / per_draw, limit, at_least=True)
+    for name, plate in (("clamped", ritz.FIEMME), ("free", ritz.FREE_SPRUCE)):
+        ours, theirs = timing.to_accuracy(plate, ACCURACY)
+        what = f"twelve modes within {100 * ACCURACY:g} % from nothing, beside Ritz in Legendre polynomials, {name}"
+        yield Ratio(what, ours / theirs, 1.0, at_least=False)
     board, effects = WITH_EFFECTS
     sampled = {
         f"linear law, {LINEAR_BOARD}": (timing.posed(LINEAR_BOARD, "linear"), 10.0),
@@ -84,6 +92,12 @@ def ratios(repeats: int) -> Iterator[Ratio]:
         yield Ratio(f"cold process in units, `{shown}`{words}", cold / unit, limit, at_least=False)
     cold = timing.whole_fit(EXACT_BOARD, *options, repeats=repeats, what="diagnose")
     yield Ratio(f"cold process in units, `diagnose {EXACT_BOARD} --no-report`", cold / unit, 8.0, at_least=False)
+    n_few, few = timing.search(MANY_MODES, FEW_CANDIDATES)
+    n_all, every = timing.search(MANY_MODES)
+    what = f"search for effects, cost of one of {n_all} candidates, beside one of {n_few}"
+    yield Ratio(what, (every / n_all) / (few / n_few), 1.5, at_least=False)
+    what = f"search for effects, {n_all} candidates, {MANY_MODES} modes beside {FEW_MODES}"
+    yield Ratio(what, every / timing.search(FEW_MODES)[1], MANY_MODES / FEW_MODES, at_least=False)
 
     (alone, few), (_, many) = timing.boards(FEW_BOARDS), timing.boards(MANY_BOARDS)
     what = f"campaign of {FEW_BOARDS} simulated boards, in fits of one"

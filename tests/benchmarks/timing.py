@@ -8,12 +8,17 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import ritz
 from made_campaigns import MASS, write_campaign
 from numpy.typing import NDArray
 
+from bayesplate.cards import load_named, read_board_text
+from bayesplate.diagnosis.evidence.joint import full_search
+from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes import line
@@ -25,7 +30,7 @@ from bayesplate.plate.setup import Ends
 from bayesplate.posterior.convergence import autocorrelation_time, burn_in_steps
 from bayesplate.posterior.inference import PosedProblem, infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.workflow.prepare import prepare
+from bayesplate.workflow.prepare import prepare, prepared_card
 
 N_MODES = 12
 PLAIN_WALKERS, PLAIN_STEPS = 32, 3000
@@ -126,6 +131,46 @@ def assembly(problem: PosedProblem, repeats: int = 5) -> float:
         thin_plate(ends_x, ends_y, n_x, n_y)
 
     return best(run, repeats)
+
+
+def to_accuracy(plate: ritz.Plate, error: float) -> tuple[float, float]:
+    """The lowest twelve modes of a plate to a relative error, each way on the least that has it: seconds of the finite
+    elements, matrices included, and of the Ritz method in Legendre polynomials, which is independent of them.
+
+    Of plates without a singular corner the most polynomials give them to some 1e-8.
+    """
+    reference = ritz.frequencies(plate, N_MODES, n=26)
+    weights = Weights(plate.unit_weights, np.ones(1))
+
+    def elements(per_side: int) -> NDArray[np.float64]:
+        line.line.cache_clear()
+        thin_plate.cache_clear()
+        found = solve(thin_plate(*plate.ends, *mesh(weights, per_side)), weights, N_MODES)
+        return np.sqrt(found.eigenvalues) / (2.0 * np.pi)
+
+    def polynomials(n: int) -> NDArray[np.float64]:
+        return ritz.frequencies(plate, N_MODES, n=n)
+
+    def time_of(solved: Callable[[int], NDArray[np.float64]], sizes: Sequence[int]) -> float:
+        size = next(size for size in sizes if np.abs(np.log(solved(size) / reference)).max() <= error)
+        return best(lambda: solved(size), 5)
+
+    return time_of(elements, range(8, 81, 2)), time_of(polynomials, range(8, 26))
+
+
+def search(n_modes: int, tried: Sequence[str] | None = None) -> tuple[int, float]:
+    """Candidates of a search on a simulated free board of so many modes that lacks nothing, and its time, s."""
+    from generator.boards import plant
+    from generator.designs import DESIGNS
+
+    text = plant(np.random.default_rng(1), DESIGNS["free-12"], [], 1.0, 5.0, name="free").card_text()
+    card = read_board_text(text, "free")
+    prepared = prepared_card(card, load_named(card), [])
+    (setup,) = prepared.board.setups
+    board = replace(prepared.board, setups=(replace(setup, readings=setup.readings[:n_modes]),))
+    baseline = baseline_of(pose(board, prepared.prior))
+    ground, _ = full_search(baseline, tried)  # what it assembles is there for the runs that count
+    return len(ground.candidates), best(lambda: full_search(baseline, tried), 2)
 
 
 def twelve_modes(problem: PosedProblem, repeats: int = 7) -> float:

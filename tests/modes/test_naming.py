@@ -69,10 +69,13 @@ def test_every_label_is_found_however_many_modes_lie_below_it():
         assert navier * (1 - 1e-9) <= found[i, j].eigenvalue <= 1.01 * navier
 
 
-@pytest.mark.parametrize(("ratio", "cents"), [(1.0, 6.0), (4.0, 12.0)])
+@pytest.mark.parametrize(("ratio", "cents"), [(1.02, 6.0), (4.0, 12.0)])
 @pytest.mark.parametrize("end", ["clamped", "free"])
 def test_the_production_mesh_resolves_the_highest_labels(end, ratio, cents):
-    """Against twice as many elements, whose own error is sixteen times smaller: what `HIGHEST_ORDER` promises."""
+    """Against twice as many elements, whose own error is sixteen times smaller: what `HIGHEST_ORDER` promises.
+
+    Not exactly alike both ways: there (9,5) and (5,9) are the sum and the difference of two modes, which resemble both.
+    """
     bending = np.array([ratio**-0.5, ratio**0.5])
     weights = Weights(np.array([*bending, 0.3 * bending.min(), 1.6]), np.ones(1))
     shape = mesh(weights)
