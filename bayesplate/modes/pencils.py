@@ -182,7 +182,7 @@ def stepped_modes(
 
 
 class _Step(NamedTuple):
-    """Vectors after a step, (n_draws, r, n_kept), shifted stiffness and mass on them, and the shift, (n_draws, 1, 1)."""
+    """Vectors after a step, (n_draws, r, n_kept); shifted stiffness and mass on them; the shift, (n_draws, 1, 1)."""
 
     vectors: Floats
     shifted: Floats

@@ -21,7 +21,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration import again, joint, oracle
+from calibration import again, bare, joint, oracle
 from calibration.layouts import EFFECTS
 from calibration.mutants import FITTED
 from calibration.records import Record, add_to, read_done
@@ -55,6 +55,11 @@ SECTIONS = {
         "Ranks of two sessions",
         "One board clamped twice, under the linear law: the discrepancies of its modes from the plate, of a scale that "
         "is drawn too, are in both sessions.",
+    ),
+    "bare": (
+        "Ranks with bare peaks",
+        "Four modes have a label, of twelve others each leaves a peak without one or none: one linear law, so that "
+        "nothing but the sum over assignments and the sampler can be wrong. A wrong posterior is to be found out.",
     ),
     "oracle": (
         "Closed forms",
@@ -134,6 +139,12 @@ def parts(sets: int, simulations: int, steps: int, ranked: int) -> dict[str, Par
         for name, design in MODELS.items()
     }
     return models | {
+        "bare": Part(
+            bare.simulate_one,
+            bare.identity(),
+            [({"simulation": i}, (i,)) for i in range(ranked)],
+            lambda records: judge(list(records), {bare.HALF_NOISE: ranked}),
+        ),
         "oracle": Part(oracle.check_one, oracle.identity(), of_sets, oracle.judge),
         "boards": Part(again.simulate_again, again.identity(), of_boards, again.judge),
         "joint": Part(joint.check_one, joint.identity(), chains, joint.judge),
@@ -200,17 +211,21 @@ def judge(records: list[dict[str, Any]], wanted: Mapping[str, int] = MUTANTS) ->
     return paragraphs, well
 
 
-def page(found: dict[str, list[str]]) -> str:
-    """What was found as a page of the documentation; a part that was not run says so and nothing else."""
-    lines = [f"# {TITLE}", "", "Written by `make calibration`; do not edit.", ""]
+def page(found: dict[str, list[str]], before: str = "") -> str:
+    """What was found as a page of the documentation.
+
+    Of a part that was not run the page says what it said before; one that never was says so and nothing else.
+    """
+    head = f"# {TITLE}\n\nWritten by `make calibration`; do not edit. Each part stands as it was last run.\n"
+    kept = dict(block.split("\n", 1) for block in before.split("\n## ")[1:])
+    parts_of_page = [head]
     for name, (title, what) in SECTIONS.items():
-        told = (
-            ["```text", *"\n".join(found[name]).splitlines(), "```"]
-            if name in found
-            else ["Not run with this version."]
-        )
-        lines += [f"## {title}", "", what, "", *told, ""]
-    return "\n".join(lines)
+        if name in found:
+            told = "\n".join(["```text", *"\n".join(found[name]).splitlines(), "```"])
+        else:
+            told = kept.get(title, "").removeprefix(f"\n{what}\n").strip() or "Not run with this version."
+        parts_of_page.append(f"## {title}\n\n{what}\n\n{told}\n")
+    return "\n".join(parts_of_page)
 
 
 def main() -> int:
@@ -262,7 +277,9 @@ def main() -> int:
         print(f"{SECTIONS[name][0]}\n" + "\n".join(lines))
     if arguments["publish"]:
         arguments["publish"].mkdir(parents=True, exist_ok=True)
-        (arguments["publish"] / "calibration.md").write_text(page(found), encoding="utf-8")
+        told = arguments["publish"] / "calibration.md"
+        before = told.read_text(encoding="utf-8") if told.exists() else ""
+        told.write_text(page(found, before), encoding="utf-8")
     print(f"{'calibrated' if well else 'NOT CALIBRATED'}, {(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

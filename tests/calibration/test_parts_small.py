@@ -7,8 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from calibration import again, joint, oracle
+from calibration import again, bare, joint, oracle
 from calibration.run import SECTIONS, Part, page, parts
+from calibration.table import is_calibrated, is_caught, rows
 from scipy import stats
 
 N_STEPS = 200
@@ -100,6 +101,16 @@ def test_closed_forms_are_judged_by_fifty_sets_their_means_and_the_wrong_draws()
     assert not oracle.judge([{**right[0], "differs": ["mean of parameter 1"]}, *right[1:]])[1]
 
 
+def test_ranks_with_bare_peaks_are_uniform_and_half_of_the_noise_is_found_out():
+    records = [bare.simulate_one(i) for i in range(12)]
+    assert [one for one in records if "error" in one] == []
+    assert sum(one["peaks"] for one in records) > 12 * 3
+    of = {name: rows([one["ranks"][name] for one in records]) for name in records[0]["ranks"]}
+
+    assert is_calibrated(of["production"]), of["production"]
+    assert is_caught(bare.HALF_NOISE, of[bare.HALF_NOISE])
+
+
 @pytest.fixture(scope="module")
 def at_clamped():
     return [again.simulate_again("fiemme-spruce-clamped", i, "linear") for i in range(6)]
@@ -164,6 +175,10 @@ def test_the_page_tells_of_a_part_that_was_not_run():
     text = page({"oracle": ["noise known, 50 data sets: agree"]})
 
     assert text.count("Not run with this version.") == len(SECTIONS) - 1
+    assert page({}, text) == text  # of what is not run again the page keeps what it said
+    again_run = page({"oracle": ["else"], "joint": ["more"]}, text)
+    assert "agree" not in again_run
+    assert again_run.count("Not run with this version.") == len(SECTIONS) - 2
     assert "noise known, 50 data sets: agree" in text
     assert text.index("## Closed forms") < text.index("noise known") < text.index("## At the paper's boards")
     assert set(parts(1, 1, 1, 1)) == set(SECTIONS) - {"ranks"}

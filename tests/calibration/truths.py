@@ -159,9 +159,9 @@ def draw_truth(design: Design, rng: np.random.Generator) -> Truth:
     return Truth(values, noises, read, ranks)
 
 
-def noises_of(design: Design, rng: np.random.Generator) -> tuple[float, ...]:
+def noises_of(design: Design, rng: np.random.Generator, noise: Quantity = DEFAULT_NOISE) -> tuple[float, ...]:
     """One draw of the noise of each setup."""
-    return tuple(float(DEFAULT_NOISE.value(rng.standard_normal())) for _ in design.setups)
+    return tuple(float(noise.value(rng.standard_normal())) for _ in design.setups)
 
 
 def _frequencies(design: Design, values: Mapping[str, float]) -> tuple[Hertz, tuple[int, ...]]:
@@ -217,10 +217,11 @@ def make_problem(design: Design, truth: Truth, belief: Callable[[Board], Board] 
     prior = load_prior(design.prior)
     if design.law != "fixed-linear":
         return pose(board, prior, law=None if design.law == "auto" else "exact")
-    return _under_the_fixed_law(reference(design), board, prior)
+    return under_the_fixed_law(reference(design), board, prior)
 
 
-def _under_the_fixed_law(reference: PosedProblem, board: Board, prior: PriorCard) -> PosedProblem:
+def under_the_fixed_law(reference: PosedProblem, board: Board, prior: PriorCard) -> PosedProblem:
+    """A board under the linear law of another problem."""
     posterior = Posterior(board, prior, reference.posterior.models, "linear")
     parameters = posterior.parameters
     columns = parameters.fitted_columns
