@@ -31,7 +31,7 @@ Bools = NDArray[np.bool_]
 LEAST = 1e-3
 """Probability that a mode left no peak, at least: no ratio is beyond all numbers then."""
 _MANY = 1e30
-"""A sum is divided by its largest number once that exceeds this: a product with one more ratio is a number still."""
+"""A draw's sums are divided by the largest once it exceeds this: times one more ratio it is a number still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +135,8 @@ def _cumulated(rows: Floats) -> Floats:
 
 
 def _scaled(row: Floats, log_scale: Floats, largest: Floats) -> tuple[Floats, Floats]:
-    """A row over its largest number, at all draws, where that is large at any."""
+    """A row over its largest number at the draws where that is large; the others do not depend on it."""
     if largest.max(initial=1.0) < _MANY:
         return row, log_scale
-    log_scale = log_scale + np.log(largest)  # before what it is a part of is divided by it
-    row /= largest.copy()
-    return row, log_scale
+    scale = np.where(largest < _MANY, 1.0, largest)
+    return row / scale, log_scale + np.log(scale)

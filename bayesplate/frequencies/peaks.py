@@ -76,7 +76,7 @@ class PeakLikelihood:
     missed : (n_modes,) array
         Probability that a mode below the highest peak left none.
     orders : tuple of Order
-        One, or one per sign: each as many times as there are signs that the peaks of unknown sign may have.
+        One of all, or one per sign.
     shared : (n_shared,) array of int
         Modes that are in the orders of both signs.
     log_highest : float
@@ -131,7 +131,7 @@ class PeakLikelihood:
         orders = tuple(_orders(signs, columns.size, residues))
         is_split = len(orders) > 1
         log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
-        in_both = np.intersect1d(orders[0].modes, orders[-1].modes) if is_split else np.empty(0, dtype=np.intp)
+        shared = np.intersect1d(orders[0].modes, orders[1].modes) if is_split else np.empty(0, dtype=np.intp)
         log_alone = np.log(setup.spurious * len(errors.frequency) * wide) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
@@ -143,7 +143,7 @@ class PeakLikelihood:
             log_alone=log_alone,
             missed=1.0 - seen,
             orders=orders,
-            shared=in_both,
+            shared=shared,
             log_highest=float(np.log(highest)),
         )
 

@@ -14,7 +14,6 @@ from dataclasses import asdict, replace
 from functools import lru_cache
 
 import numpy as np
-from calibration.layouts import EDGES
 from calibration.records import Record
 from calibration.sbc import posterior_draws, ranks_among
 from calibration.truths import Design, Truth, noises_of, prior_values, reference, under_the_fixed_law
@@ -40,6 +39,7 @@ HALF_NOISE = "noise fixed at half"
 """A wrong posterior that is to be found out."""
 _NO_SPURIOUS = 1e-9
 _FAR_UP = 2.0
+"""Times the highest reading of the other calibrations: the modes up to there are found."""
 
 
 @lru_cache(maxsize=1)
@@ -79,8 +79,7 @@ def problem_of(setup: Setup) -> PosedProblem:
     """The fit of a board in a setup under the one linear law."""
     first = reference(DESIGN)
     board = replace(first.board, setups=(setup,))
-    posterior = Posterior(board, first.prior, (every_mode().labelled_as(setup),), "linear")
-    return under_the_fixed_law(replace(first, posterior=posterior), board, first.prior)
+    return under_the_fixed_law(first, Posterior(board, first.prior, (every_mode().labelled_as(setup),), "linear"))
 
 
 def simulate_one(index: int) -> Record:
@@ -112,4 +111,4 @@ def simulate_one(index: int) -> Record:
 def identity() -> Record:
     """What a file of ranks must agree in before more are added to it."""
     stated = {"sure": [list(one) for one in SURE], "noise": [NOISE.median, NOISE.log_sd], "missed": MISSED}
-    return {"format": 1, "design": asdict(DESIGN), **stated, "edges": EDGES["free"]}
+    return {"format": 1, "design": asdict(DESIGN), **stated}

@@ -223,7 +223,7 @@ def page(found: dict[str, list[str]], before: str = "") -> str:
         if name in found:
             told = "\n".join(["```text", *"\n".join(found[name]).splitlines(), "```"])
         else:
-            told = kept.get(title, "").removeprefix(f"\n{what}\n").strip() or "Not run with this version."
+            told = "".join(kept.get(title, "").partition("```text\n")[1:]).strip() or "Not run with this version."
         parts_of_page.append(f"## {title}\n\n{what}\n\n{told}\n")
     return "\n".join(parts_of_page)
 

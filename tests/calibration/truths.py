@@ -217,20 +217,20 @@ def make_problem(design: Design, truth: Truth, belief: Callable[[Board], Board] 
     prior = load_prior(design.prior)
     if design.law != "fixed-linear":
         return pose(board, prior, law=None if design.law == "auto" else "exact")
-    return under_the_fixed_law(reference(design), board, prior)
+    first = reference(design)
+    return under_the_fixed_law(first, Posterior(board, prior, first.posterior.models, "linear"))
 
 
-def under_the_fixed_law(reference: PosedProblem, board: Board, prior: PriorCard) -> PosedProblem:
-    """A board under the linear law of another problem."""
-    posterior = Posterior(board, prior, reference.posterior.models, "linear")
-    parameters = posterior.parameters
+def under_the_fixed_law(first: PosedProblem, posterior: Posterior) -> PosedProblem:
+    """Another board's posterior, under the linear law of a problem that was posed."""
+    board, parameters = posterior.board, posterior.parameters
     columns = parameters.fitted_columns
-    centre = reference.centre.copy()
+    centre = first.centre.copy()
     centre[parameters.n_dim - len(parameters.inputs) - 1] = np.log(board.setups[0].noise.median)
     predict = predictor(board, posterior.models, "linear", centre)
     scales = reading_scales(board)
     centre[columns] = refit(predict, log_measured(board), scales, centre[columns], parameters.fitted_bounds)
     weighted = sensitivities(predict, scales, centre[columns])
-    covariance = reference.covariance.copy()
+    covariance = first.covariance.copy()
     covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
-    return replace(reference, board=board, posterior=posterior, centre=centre, covariance=covariance)
+    return replace(first, board=board, posterior=posterior, centre=centre, covariance=covariance)
