@@ -111,9 +111,11 @@ def answers_table(diagnosis: Diagnosis) -> Table:
 
 
 def sizes_table(diagnosis: Diagnosis) -> Table | None:
-    """Every size of every explanation that was fitted again; None if none was."""
-    rows = []
+    """Every size of every explanation that was fitted again, named where there are several; None if none was."""
+    rows: list[tuple[str, ...]] = []
+    are_several = len(diagnosis.finalists) > 1
     for one in diagnosis.finalists:
+        explanation = (" and ".join(map(effect_name, one.effects)),) if are_several else ()
         for owner, effects in one.sizes.items():
             where = "" if owner == "board" else f", {owner}"
             for effect, parameters in effects.items():
@@ -121,8 +123,8 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
                     factor, unit = unit_of_people(spread.unit)
                     size = f"{plus_minus(spread, factor)} {unit}".rstrip()
                     range_ = MISSING if spread.sd == 0.0 else f"{interval(spread, factor)} {unit}".rstrip()
-                    rows.append((f"{effect_name(effect)}{where}", parameter, size, range_))
-    columns = ("effect", "size", "mean ± sd", "90 % interval")
+                    rows.append((*explanation, f"{effect_name(effect)}{where}", parameter, size, range_))
+    columns = (*(["fitted with"] if are_several else []), "effect", "size", "mean ± sd", "90 % interval")
     return Table("Sizes of what was fitted again", columns, tuple(rows)) if rows else None
 
 

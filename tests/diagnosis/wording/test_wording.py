@@ -225,6 +225,17 @@ def test_the_sizes_of_what_was_fitted_again():
     assert sizes_table(DIAGNOSES["none needed"]) is None
 
 
+def test_where_two_explanations_were_fitted_each_size_says_in_which_it_was():
+    """The same effect alone and beside another has two sizes, which nobody could tell apart otherwise."""
+    (alone,) = NAMED.finalists
+    both = replace(alone, effects=(*alone.effects, "air_loading"))
+    table = sizes_table(replace(NAMED, finalists=(both, alone)))
+
+    assert table.columns[:2] == ("fitted with", "effect")
+    assert [row[0] for row in table.rows] == ["membrane tension and air loading", "membrane tension"]
+    assert {row[1] for row in table.rows} == {"membrane tension, clamped"}
+
+
 def test_errors_before_and_after_or_as_they_are():
     both, alone = errors_table(NAMED), errors_table(DIAGNOSES["none needed"])
 
