@@ -29,22 +29,21 @@ class Journal:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._places: dict[str, tuple[int, int]] = {}
+        self._places: dict[str, int] = {}
         with writing(path):
-            self._stream = path.open("a+b", buffering=0)
+            self._stream = path.open("ab", buffering=0)
+            self._lines = path.open("rb")
             self._read()
 
     def _read(self) -> None:
         """Where each row stands; the last line of a killed run, and any other that is damaged, are none."""
-        self._stream.seek(0)
         end = 0
-        with self.path.open("rb") as stream:
-            for line in stream:
-                if line.endswith(b"\n"):
-                    key = _key_of(line)
-                    if key is not None:
-                        self._places[key] = (end, len(line))
-                    end += len(line)
+        for line in self._lines:
+            if line.endswith(b"\n"):
+                key = _key_of(line)
+                if key is not None:
+                    self._places[key] = end
+                end += len(line)
         self._stream.truncate(end)
 
     def __contains__(self, key: str) -> bool:
@@ -52,9 +51,8 @@ class Journal:
 
     def row(self, key: str) -> BoardRow:
         """The row of a key that is there."""
-        start, length = self._places[key]
-        self._stream.seek(start)
-        return BoardRow.from_json(json.loads(self._stream.read(length))["row"])
+        self._lines.seek(self._places[key])
+        return BoardRow.from_json(json.loads(self._lines.readline())["row"])
 
     def append(self, key: str, row: BoardRow) -> None:
         """Add a row; raises UnwritableError at a full disk."""
@@ -64,7 +62,7 @@ class Journal:
             if self._stream.write(line) != len(line):
                 self._stream.truncate(start)
                 raise OSError("no space left")
-            self._places[key] = (start, len(line))
+            self._places[key] = start
 
     def rows(self, keys: Iterable[str]) -> Iterator[BoardRow]:
         """The rows of keys, in their order."""
@@ -87,6 +85,7 @@ class Journal:
     def close(self) -> None:
         """Let go of the file."""
         self._stream.close()
+        self._lines.close()
 
 
 def _line(key: str, row: BoardRow) -> bytes:

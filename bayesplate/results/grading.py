@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,13 +111,12 @@ def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:
     Grading
     """
     names: list[str] = []
-    means: list[Floats] = []
-    covariances: list[Floats] = []
+    means, covariances = array("d"), array("d")
     for row in rows:
         if row.joint is not None:
             names.append(row.name)
-            means.append(np.array(row.joint.log_mean))
-            covariances.append(np.array(row.joint.log_covariance))
+            means.extend(row.joint.log_mean)
+            covariances.extend(chain.from_iterable(row.joint.log_covariance))
     n = len(names)
     log_mean, log_covariance = np.reshape(means, (n, 7)), np.reshape(covariances, (n, 7, 7))
     meets, meets_all = _meets(log_mean, log_covariance, request.limits)

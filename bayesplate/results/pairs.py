@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,13 +17,13 @@ Rows = NDArray[np.intp]
 
 _NEAREST = 12
 """Partners that are looked at for each board."""
-_AT_ONCE = 200_000
-"""Pairs that are looked at together, so that the memory does not grow with the number of boards."""
+_AT_ONCE = 1_000
+"""Pairs whose probability is computed together, so that the memory hardly grows with the number of boards."""
 LEAST_PROBABILITY = 0.05
 """Pairs that match with less are not proposed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Pair:
     """Two boards, by their places, and the probability that they match."""
 
@@ -57,37 +58,51 @@ def proposed_pairs(log_mean: Floats, log_covariance: Floats, percent: Mapping[st
     along = np.stack([FIGURES[name].direction for name in percent])
     width = np.log1p(np.array(list(percent.values())) / 100.0)
     mean = log_mean @ along.T
-    covariance = along @ log_covariance @ along.T
-    first, second = _candidates(mean, np.diagonal(covariance, axis1=1, axis2=2), width)
-    found = box_probability(mean[first] - mean[second], covariance[first] + covariance[second], -width, width)
-    order = np.lexsort((second, first, -found))
+    covariance = np.einsum("ai,nij,bj->nab", along, log_covariance, along)
+    either = _candidates(mean, np.diagonal(covariance, axis1=1, axis2=2), width)
+    found = np.empty(len(either))
+    for start in range(0, len(either), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        a, b = np.divmod(either[some], len(mean))
+        found[some] = box_probability(mean[a] - mean[b], covariance[a] + covariance[b], -width, width)
     pairs, taken = [], np.zeros(len(mean), dtype=bool)
-    for i in order:
-        a, b = int(first[i]), int(second[i])
-        if found[i] >= LEAST_PROBABILITY and not taken[a] and not taken[b]:
-            pairs.append(Pair(a, b, float(found[i])))
-            taken[[a, b]] = True
+    may_match = found >= LEAST_PROBABILITY
+    either, found = either[may_match], found[may_match]
+    for i in np.argsort(-found, kind="stable"):
+        first, second = divmod(int(either[i]), len(mean))
+        if not taken[first] and not taken[second]:
+            pairs.append(Pair(first, second, float(found[i])))
+            taken[[first, second]] = True
     return tuple(pairs)
 
 
-def _candidates(mean: Floats, variance: Floats, width: Floats) -> tuple[Rows, Rows]:
-    """For each board its likeliest partners if the constants were independent: two arrays of places, first < second."""
-    from scipy.special import ndtr
+def _candidates(mean: Floats, variance: Floats, width: Floats) -> Rows:
+    """The likeliest partners of each board if the constants were independent: n first + second, each pair once.
+
+    Only boards that may match at all are looked at: that a figure of two of them is between two limits is no more
+    probable than that it is below the upper one. Along the first figure those boards are neighbours.
+    """
+    from scipy.special import ndtr, ndtri
 
     n = len(mean)
-    first, second = [], []
-    step = max(1, _AT_ONCE // n)
-    for start in range(0, n, step):
-        rows = np.arange(start, min(start + step, n))
-        apart = mean[rows, None, :] - mean[None]
-        sd = np.sqrt(np.maximum(variance[rows, None, :] + variance[None], 1e-24))
+    farthest = -ndtri(LEAST_PROBABILITY)  # standard deviations beyond the width
+    order = np.argsort(mean[:, 0], kind="stable")
+    mean, variance = mean[order], variance[order]
+    reach = width[0] + farthest * np.sqrt(variance[:, 0] + variance[:, 0].max())
+    starts = np.searchsorted(mean[:, 0], mean[:, 0] - reach)
+    ends = np.searchsorted(mean[:, 0], mean[:, 0] + reach, side="right")
+    either = array("q")
+    for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        apart = np.abs(mean[start:end] - mean[i])
+        sd = np.sqrt(np.maximum(variance[start:end] + variance[i], 1e-24))
+        may_match = np.all(apart <= width + farthest * sd, axis=1)
+        may_match[i - start] = False
+        apart, sd = apart[may_match], sd[may_match]
         within = ndtr((width - apart) / sd) - ndtr((-width - apart) / sd)
-        together = np.log(np.maximum(within, 1e-300)).sum(axis=2)
-        together[np.arange(rows.size), rows] = -np.inf
-        n_nearest = min(_NEAREST, n - 1)
-        nearest = np.argsort(-together, axis=1, kind="stable")[:, :n_nearest]
-        first.append(np.repeat(rows, n_nearest))
-        second.append(nearest.ravel())
-    a, b = np.concatenate(first), np.concatenate(second)
-    ordered = np.unique(np.stack([np.minimum(a, b), np.maximum(a, b)], axis=1), axis=0)
-    return ordered[:, 0], ordered[:, 1]
+        together = np.log(np.maximum(within, 1e-300)).sum(axis=1)
+        nearest = np.flatnonzero(may_match)[np.argsort(-together, kind="stable")[:_NEAREST]]
+        own, other = order[i], order[start + nearest]
+        either.frombytes((n * np.minimum(own, other) + np.maximum(own, other)).tobytes())
+    ordered = np.frombuffer(either, dtype=np.int64)
+    ordered.sort()
+    return ordered[np.diff(ordered, prepend=-1) > 0]

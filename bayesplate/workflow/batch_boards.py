@@ -21,7 +21,7 @@ _OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Entry:
     """Where one board of a batch is to be found; small, for there may be very many.
 
@@ -66,16 +66,19 @@ class Folder:
     """
 
     def __init__(self, path: Path) -> None:
-        self._paths = sorted(path.glob("*.toml"), key=lambda one: one.name)
-        self._inside = os.path.realpath(path)
+        self._path, self._inside = path, os.path.realpath(path)
+        self._files = sorted(file.name for file in path.glob("*.toml"))
         entries, aside = [], []
-        for at, file in enumerate(self._paths):
+        alike: dict[tuple[str, ...], tuple[str, ...]] = {}
+        for at, name in enumerate(self._files):
+            file = path / name
             content = _content_of(file) if self._is_inside(file) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
             if is_other or content.keys() == {"setup"}:
                 aside.append(plain(file.name))
             else:
-                entries.append(Entry(plain(file.stem), at, _alike(content)))
+                shared = _alike(content)
+                entries.append(Entry(plain(file.stem), at, alike.setdefault(shared, shared)))
         if not entries:
             raise InputError(Fault(plain(str(path)), "a folder with board cards (NAME.toml)", "none in it"))
         self.entries: Sequence[Entry] = entries
@@ -83,7 +86,7 @@ class Folder:
 
     def card(self, entry: Entry) -> BoardCard:
         """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
-        path = self._paths[entry.at]
+        path = self._path / self._files[entry.at]
         if not self._is_inside(path):
             wanted, remedy = "a card in the folder of the batch", "copy the card"
             raise InputError(Fault(plain(path.name), wanted, "a link that leads out of it", remedy))

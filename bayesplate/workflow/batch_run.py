@@ -56,7 +56,7 @@ class Run:
 
     def fitted(self, by: Workers, journal: Journal, progress: Callable[[Progress], None] | None) -> list[str]:
         """Fit the boards that the journal does not hold; the keys of all, in the order of their names."""
-        keys: dict[int, str] = {}
+        keys = [""] * len(self.boards.entries)
         done = _Done(len(self.boards.entries), progress)
 
         def write(at: int, key: str, row: BoardRow) -> None:
@@ -82,7 +82,7 @@ class Run:
             for (at, key, entry, card_sha256, seed), future in answers:
                 row = _answer(entry, future)
                 write(at, key, row if row.is_fitted else replace(row, card_sha256=card_sha256, seed=seed))
-        return [keys[at] for at in range(len(self.boards.entries))]
+        return keys
 
     def _is_done(self, key: str, entry: Entry, journal: Journal) -> bool:
         if key not in journal:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -129,6 +131,50 @@ def test_pairs_do_not_depend_on_how_many_are_looked_at_together(monkeypatch, val
     assert proposed_pairs(mean, covariance, {"E_x": 10.0, "E_y": 10.0}) == whole
     assert len(whole) > 10
     assert len({i for pair in whole for i in (pair.first, pair.second)}) == 2 * len(whole)
+
+
+def test_no_pair_that_may_match_is_passed_over():
+    """The same pairs as by all boards beside all, in small lots that differ much and are known badly."""
+    rng = np.random.default_rng(3)
+    width = np.full(2, np.log(1.1))
+    least = 1.0
+    for _ in range(30):
+        mean, root = 0.2 * rng.standard_normal((12, 7)), 0.1 * rng.standard_normal((12, 7, 7))
+        covariance = root @ root.transpose(0, 2, 1) / 7.0
+        first, second = np.triu_indices(12, 1)
+        apart, both = mean[first] - mean[second], covariance[first] + covariance[second]
+        found = box_probability(apart[:, :2], both[:, :2, :2], -width, width)
+        expected, taken = [], set()
+        for i in np.argsort(-found, kind="stable"):
+            pair = (int(first[i]), int(second[i]))
+            if found[i] >= 0.05 and not taken & set(pair):
+                expected.append(pair)
+                taken |= set(pair)
+                least = min(least, found[i])
+
+        pairs = proposed_pairs(mean, covariance, {"E_x": 10.0, "E_y": 10.0})
+
+        assert [(pair.first, pair.second) for pair in pairs] == expected
+    assert least < 0.06
+
+
+def test_pairs_take_memory_in_proportion_to_the_boards():
+    """All of them beside all would take the square: 32 MB for each figure of two thousand."""
+    rng = np.random.default_rng(3)
+    mean = 0.1 * rng.standard_normal((2000, 7))
+    covariance = np.broadcast_to(1e-4 * np.eye(7), (2000, 7, 7))
+
+    def peak(n: int) -> int:
+        tracemalloc.start()
+        try:
+            proposed_pairs(mean[:n], covariance[:n], {"E_x": 10.0, "E_y": 10.0})
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    peak(200)
+
+    assert peak(2000) - peak(200) < 1800 * 1000
 
 
 def test_limits_are_met_with_the_share_of_the_draws_that_lie_within(values):
