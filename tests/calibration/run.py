@@ -21,7 +21,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration import again, bare, joint, oracle
+from calibration import again, bare, joint, oracle, together
 from calibration.layouts import EFFECTS
 from calibration.mutants import FITTED
 from calibration.records import Record, add_to, read_done
@@ -60,6 +60,12 @@ SECTIONS = {
         "Ranks with bare peaks",
         "Four modes have a label, of twelve others each leaves a peak without one or none: one linear law, so that "
         "nothing but the sum over assignments and the sampler can be wrong. A wrong posterior is to be found out.",
+    ),
+    "campaign": (
+        "Ranks of a campaign",
+        "Three boards with constants of their own and one stiffness of the threads that they hang from: what they "
+        "share, and a board under what all teach. One linear law is both the truth and the fit. A wrong campaign, in "
+        "which every board counts twice, is to be found out by what is shared.",
     ),
     "oracle": (
         "Closed forms",
@@ -144,6 +150,12 @@ def parts(sets: int, simulations: int, steps: int, ranked: int) -> dict[str, Par
             bare.identity(),
             [({"simulation": i}, (i,)) for i in range(ranked)],
             lambda records: judge(list(records), {bare.HALF_NOISE: ranked}),
+        ),
+        "campaign": Part(
+            together.simulate_one,
+            together.identity(),
+            [({"simulation": i}, (i,)) for i in range(ranked)],
+            lambda records: judge(list(records), {together.TWICE: ranked}),
         ),
         "oracle": Part(oracle.check_one, oracle.identity(), of_sets, oracle.judge),
         "boards": Part(again.simulate_again, again.identity(), of_boards, again.judge),

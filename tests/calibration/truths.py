@@ -147,9 +147,9 @@ def prior_values(design: Design, prior: PriorCard, rng: np.random.Generator) -> 
             return values | {name: float(value) for name, value in zip(RIGIDITIES, found, strict=True)}
 
 
-def draw_truth(design: Design, rng: np.random.Generator) -> Truth:
-    """Draw constants, inputs and noise from the prior, and readings from them."""
-    values = prior_values(design, load_prior(design.prior), rng)
+def draw_truth(design: Design, rng: np.random.Generator, given: Mapping[str, float] | None = None) -> Truth:
+    """Draw constants, inputs and noise from the prior but for those that are given, and readings from them."""
+    values = prior_values(design, load_prior(design.prior), rng) | dict(given or {})
     noises = noises_of(design, rng)
     hertz, ranks = _frequencies(design, values)
     read = {
