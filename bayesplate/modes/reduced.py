@@ -315,8 +315,10 @@ def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Itera
         last = slice(size - max(round(_SHARED * size), n_condensed), None)
         parts = [replace(whole, stiffness=whole.stiffness[:, last, last], masses=whole.masses[:, last, last]), whole]
         for part in parts if len(whole.masses) else [whole]:
-            if part.stiffness.shape[-1] > 2 * n_stepped:
-                yield replace(_on_modes(part, centre), n_kept=n_stepped)
+            fewer = [n for n in sorted({n_condensed, n_stepped}) if part.stiffness.shape[-1] > 2 * n]
+            if fewer:
+                turned = _on_modes(part, centre)
+                yield from (replace(turned, n_kept=n) for n in fewer)
             elif part is not whole:
                 yield part
     yield whole
