@@ -1,11 +1,14 @@
 """Measured boards with the effects that their reports suggest: two free half-tops with a sensor of unknown mass.
 
 In the open data the accelerometer's mass is not stated, and the boards are thick enough to shear. An exact thin plate
-misses both boards by some ten cents; shear and a sensor of two or three grams at the place that the card states halve
-that, without a prior that knows the board.
+misses the nine labelled readings of both boards by some ten cents; shear and a sensor of two or three grams at the
+place that the card states halve that, without a prior that knows the board. The peaks without a label, with which
+other numbers are found (`docs/validation/spruce-half-tops.md`), are left out.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,12 +31,18 @@ PLAUSIBLE = (1e-3, 5e-3)
 ACCEPTED_CENTS = 0.1
 
 
+def labelled(card, effects):
+    """A board with its labelled readings alone, and its prior."""
+    prepared = prepare(card, effects)
+    setups = tuple(replace(setup, peaks=()) for setup in prepared.board.setups)
+    return replace(prepared.board, setups=setups), prepared.prior
+
+
 def centre_of(card, effects):
     """The problem, its residual rms (cents) and the values at the centre of the posterior's region."""
-    prepared = prepare(card, effects)
-    problem = pose(prepared.board, prepared.prior, law="exact")
+    problem = pose(*labelled(card, effects), law="exact")
     theta = problem.centre[None, :]
-    residuals = log_measured(prepared.board) - np.concatenate(problem.posterior.log_frequencies(theta), axis=1)[0]
+    residuals = log_measured(problem.board) - np.concatenate(problem.posterior.log_frequencies(theta), axis=1)[0]
     return problem, float(np.sqrt(np.mean(cents(residuals) ** 2))), problem.parameters.values(theta)
 
 
@@ -52,11 +61,10 @@ def test_shear_and_the_sensor_explain_half_of_the_residuals_and_neither_does_alo
 
 @pytest.mark.parametrize("card", MOST)
 def test_a_fit_with_both_effects_converges_and_halves_the_residuals(card):
-    thin = fit(card, effects=[]).summary.error.in_sample_rms_cents
-    summary = fit(card, effects=BOTH).summary
+    thin, summary = (fit(labelled(card, effects)[0], effects=effects).summary for effects in ([], BOTH))
 
     assert summary.converged
-    assert summary.error.in_sample_rms_cents <= MOST[card] * thin
+    assert summary.error.in_sample_rms_cents <= MOST[card] * thin.error.in_sample_rms_cents
     assert summary.error.exact_law_worst_cents <= ACCEPTED_CENTS
     mass = summary.effects["free"]["attached_mass"]["mass"]
     assert PLAUSIBLE[0] < mass.q50 < PLAUSIBLE[1]
