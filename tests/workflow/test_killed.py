@@ -84,7 +84,7 @@ def test_killed_at_any_moment_and_resumed_the_files_are_the_same(tmp_path, argum
     """That the kills hit a run in progress is the negative control: what they leave is never the whole."""
     n_of = killed(tmp_path / "whole", 0, *arguments)
     whole = files_in(tmp_path / "whole")
-    assert n_of > 20
+    assert n_of >= n
 
     for moment in moments(n, n_of, seed=n):
         folder = tmp_path / f"killed-{moment}"
