@@ -206,6 +206,9 @@ def judge(records: list[dict[str, Any]], wanted: Mapping[str, int] = MUTANTS) ->
         f"started anew: {sum(r['attempts'] > 1 for r in good)}; linear law: {sum(r['law'] == 'linear' for r in good)}; "
         f"median {sorted(r['seconds'] for r in good)[len(good) // 2]:.1f} s"
     )
+    same = [r["ranks"]["production"] for r in good if not r["relabelled"]]
+    if same and len(same) < len(good):
+        paragraphs.append(f"  of those not relabelled, {len(same)}, family-wise p {family_p_value(rows(same)):.3f}")
     for mutant, fewest in wanted.items():
         ranks = [r["ranks"][mutant] for r in good if mutant in r["ranks"]]
         if len(ranks) < fewest:
