@@ -59,7 +59,8 @@ class Moments:
         """What the interpreter tells of each call to the system."""
         is_change = event in CHANGES or (event == "open" and isinstance(arguments[2], int) and arguments[2] & WRITES)
         is_nothing = event == "os.remove" and os.path.isabs(arguments[0]) and not os.path.lexists(arguments[0])
-        if is_change and not is_nothing and self.is_inside(str(arguments[0])) and self.reached():
+        is_file = is_change and not isinstance(arguments[0], int)  # which a pipe to a worker is
+        if is_file and not is_nothing and self.is_inside(str(arguments[0])) and self.reached():
             if event == "open" and arguments[2] & os.O_TRUNC:
                 os.close(os.open(arguments[0], arguments[2]))  # the file is there, and nothing in it yet
             end()

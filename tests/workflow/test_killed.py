@@ -81,18 +81,23 @@ def moments(n: int, n_of: int, seed: int) -> list[int]:
     indirect=["arguments"],
 )
 def test_killed_at_any_moment_and_resumed_the_files_are_the_same(tmp_path, arguments, n):
-    """That the kills hit a run in progress is the negative control: what they leave is never the whole."""
-    n_of = killed(tmp_path / "whole", 0, *arguments)
-    whole = files_in(tmp_path / "whole")
-    assert n_of >= n
+    """That the kills hit a run in progress is the negative control: what they leave is not the whole.
 
-    for moment in moments(n, n_of, seed=n):
+    At the last moments it is: all that is left to do then is to remove folders.
+    """
+    n_of = killed(tmp_path / "whole", 0, *arguments)
+    whole, n_whole = files_in(tmp_path / "whole"), 0
+    assert n_of > 10
+
+    chosen = moments(min(n, n_of), n_of, seed=n)
+    for moment in chosen:
         folder = tmp_path / f"killed-{moment}"
         assert killed(folder, moment, *arguments) == -signal.SIGKILL
         left = files_in(folder)
         go_on(folder, *arguments)
-        assert left != whole or moment == n_of, moment
+        n_whole += left == whole
         assert files_in(folder) == whole, moment
+    assert n_whole <= max(1, len(chosen) // 5)
 
 
 def test_a_checkpoint_that_is_removed_is_that_of_a_shorter_run_until_it_is_none(tmp_path, monkeypatch):
