@@ -8,15 +8,11 @@ the centre are near those of every draw already. Let each take along, of every o
 that first-order perturbation gives, omega_i^2 = K_ii / M_ii of the draw; the Ritz values on the modes so corrected are
 those of the whole basis to the fourth order of the perturbation, at a quarter of the cost of all its eigenvalues.
 
-Where the draws lie too far from the centre for that, as with shear moduli that are known to a factor only, the others q
-follow the kept modes as the whole stiffness among them lets them,
-
-    K_qq X_q = omega^2 M_qk - K_qk,
-
-which asks for one solution of equations instead of all eigenvalues: static condensation (Guyan, AIAA Journal 3, 1965,
-380), with the inertia that the kept ones have by themselves, omega^2 M_kk = K_kk. Where the mass is one that spans what
-a step of inverse iteration from the kept modes spans: the wanted modes the better, the more modes beyond them take part
-(Bathe and Wilson, Numerical Methods in Finite Element Analysis, 1976, chapter 12).
+Where the draws lie too far from the centre for that, as with shear moduli that are known to a factor only, one step of
+inverse iteration from the same modes goes further: x = K^-1 M x_centre, which asks for one solution of equations
+instead of all eigenvalues, and spans those wanted the better, the more modes beyond them take part (Bathe and Wilson,
+Numerical Methods in Finite Element Analysis, 1976, chapter 12). Where the mass is one, K^-1 on the first vectors spans
+what they do with all others following them statically (Guyan, AIAA Journal 3, 1965, 380), at half of the operations.
 """
 
 from __future__ import annotations
@@ -182,39 +178,40 @@ def stepped_modes(
     """
     step = _step(stiffness, mass, n_kept, n_rigid)
     values, vectors = pencil_modes(step.shifted, step.mass, 0.0, n_modes)
-    return values - step.shift[:, 0], np.concatenate([vectors, step.followed @ vectors], axis=1)
+    return values - step.shift[:, 0], step.vectors @ vectors
 
 
 class _Step(NamedTuple):
-    """What of the others follows the first vectors, (n_draws, r - n_kept, n_kept); shifted stiffness and mass on them
-    together; the shift, (n_draws, 1, 1).
-    """
+    """Vectors after a step, (n_draws, r, n_kept); shifted stiffness and mass on them; the shift, (n_draws, 1, 1)."""
 
-    followed: Floats
+    vectors: Floats
     shifted: Floats
     mass: Floats
     shift: Floats
 
 
 def _step(stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int) -> _Step:
-    kept, rest = slice(None, n_kept), slice(n_kept, None)
-    small_stiffness, pushes = stiffness[:, kept, kept], -stiffness[:, rest, kept]
-    # The shift is the draw's own, so that eigenvalues are homogeneous in the stiffness.
-    shift = stiffness[:, n_rigid, n_rigid, None, None]
     if mass is None:
-        followed = _solutions(stiffness[:, rest, rest], pushes)
-        small_mass = np.eye(n_kept) + np.swapaxes(followed, -1, -2) @ followed
-    else:
-        shift = shift / mass[:, n_rigid, n_rigid, None, None]
-        inertia = mass[:, rest, kept] @ _solutions(mass[:, kept, kept], small_stiffness)
-        followed = _solutions(stiffness[:, rest, rest], pushes + inertia)
-        across = np.swapaxes(followed, -1, -2)
-        coupling = across @ mass[:, rest, kept]
-        small_mass = mass[:, kept, kept] + coupling + np.swapaxes(coupling, -1, -2)
-        small_mass = small_mass + across @ (mass[:, rest, rest] @ followed)
-        small_stiffness = small_stiffness + across @ inertia
-    small_stiffness = small_stiffness + stiffness[:, kept, rest] @ followed
-    return _Step(followed, small_stiffness + shift * small_mass, small_mass, shift)
+        return _step_of_one(stiffness, n_kept, n_rigid)
+    # The shift is the draw's own, so that eigenvalues are homogeneous in the stiffness.
+    shift = np.asarray(stiffness[:, n_rigid, n_rigid] / mass[:, n_rigid, n_rigid])[:, None, None]
+    loads = mass[:, :, :n_kept]
+    vectors = _solutions(stiffness + shift * mass, loads)
+    lengths = np.sqrt((vectors**2).sum(axis=1, keepdims=True))
+    vectors, loads = vectors / lengths, loads / lengths
+    across = np.swapaxes(vectors, -1, -2)
+    return _Step(vectors, across @ loads, across @ (mass @ vectors), shift)
+
+
+def _step_of_one(stiffness: Floats, n_kept: int, n_rigid: int) -> _Step:
+    """The same where the mass is one: the others follow the first vectors as the shifted stiffness moves them."""
+    kept, rest = slice(None, n_kept), slice(n_kept, None)
+    shift = np.asarray(stiffness[:, n_rigid, n_rigid])[:, None, None]
+    one, others = np.eye(n_kept), np.eye(stiffness.shape[-1] - n_kept)
+    followed = -_solutions(stiffness[:, rest, rest] + shift * others, stiffness[:, rest, kept])
+    shifted = stiffness[:, kept, kept] + shift * one + stiffness[:, kept, rest] @ followed
+    vectors = np.concatenate([np.broadcast_to(one, (len(stiffness), n_kept, n_kept)), followed], axis=1)
+    return _Step(vectors, shifted, one + np.swapaxes(followed, -1, -2) @ followed, shift)
 
 
 def _solutions(matrices: Floats, loads: Floats) -> Floats:

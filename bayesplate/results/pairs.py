@@ -103,6 +103,4 @@ def _candidates(mean: Floats, variance: Floats, width: Floats) -> Rows:
         nearest = np.flatnonzero(may_match)[np.argsort(-together, kind="stable")[:_NEAREST]]
         own, other = order[i], order[start + nearest]
         either.frombytes((n * np.minimum(own, other) + np.maximum(own, other)).tobytes())
-    ordered = np.frombuffer(either, dtype=np.int64)
-    ordered.sort()
-    return ordered[np.diff(ordered, prepend=-1) > 0]
+    return np.unique(np.frombuffer(either, dtype=np.int64))

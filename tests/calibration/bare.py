@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 from calibration.records import Record
-from calibration.sbc import posterior_draws, ranks_among
+from calibration.sbc import posterior_draws, random_lines, ranks_among
 from calibration.truths import Design, Truth, noises_of, prior_values, reference, under_the_fixed_law
 from made_boards import NARROW, peaks_of
 from numpy.typing import NDArray
@@ -85,9 +85,7 @@ def problem_of(setup: Setup) -> PosedProblem:
 def simulate_one(index: int) -> Record:
     """One simulation: its ranks and those of the mutant, and how many peaks have no label."""
     started = time.perf_counter()
-    for_truth, for_draws, for_mutants = (
-        np.random.default_rng(s) for s in np.random.SeedSequence([DESIGN.base_seed, 12, index]).spawn(3)
-    )
+    for_truth, for_draws, for_mutants = random_lines(DESIGN.base_seed, 12, index)
     record: Record = {"simulation": index}
     try:
         truth, problem = draw(for_truth)

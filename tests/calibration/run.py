@@ -21,7 +21,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # one simulation a core; before numpy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from calibration import again, bare, joint, oracle, together
+from calibration import again, bare, campaign_ranks, joint, oracle
 from calibration.layouts import EFFECTS
 from calibration.mutants import FITTED
 from calibration.records import Record, add_to, read_done
@@ -152,10 +152,10 @@ def parts(sets: int, simulations: int, steps: int, ranked: int) -> dict[str, Par
             lambda records: judge(list(records), {bare.HALF_NOISE: ranked}),
         ),
         "campaign": Part(
-            together.simulate_one,
-            together.identity(),
+            campaign_ranks.simulate_one,
+            campaign_ranks.identity(),
             [({"simulation": i}, (i,)) for i in range(ranked)],
-            lambda records: judge(list(records), {together.TWICE: ranked}),
+            lambda records: judge(list(records), {campaign_ranks.TWICE: ranked}),
         ),
         "oracle": Part(oracle.check_one, oracle.identity(), of_sets, oracle.judge),
         "boards": Part(again.simulate_again, again.identity(), of_boards, again.judge),

@@ -107,9 +107,18 @@ def posterior_draws(problem: PosedProblem, design: Design, rng: np.random.Genera
         )
         inference = infer(problem, settings)
         if inference.convergence.passed:
-            pooled = inference.chains.pooled
-            return pooled[rng.choice(len(pooled), N_DRAWS, replace=False)], attempt
+            return ranked_draws(inference.chains.pooled, rng), attempt
     raise BayesplateError("; ".join(inference.convergence.reasons))
+
+
+def random_lines(*seed: int) -> list[np.random.Generator]:
+    """Random numbers of one simulation: for its truth, its draws, and its mutants."""
+    return [np.random.default_rng(one) for one in np.random.SeedSequence(seed).spawn(3)]
+
+
+def ranked_draws(draws: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """`N_DRAWS` of many draws, at random: (N_DRAWS, n_dim) array."""
+    return draws[rng.choice(len(draws), N_DRAWS, replace=False)]
 
 
 def prior_draws(problem: PosedProblem, design: Design, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -138,9 +147,7 @@ def simulate_one(design: Design, index: int, mutants: Sequence[str] = ()) -> dic
         simulation, ranks by "production" and mutant, seconds, law, attempts, relabelled; or simulation and error.
     """
     started = time.perf_counter()
-    for_truth, for_draws, for_mutants = (
-        np.random.default_rng(s) for s in np.random.SeedSequence([design.base_seed, index]).spawn(3)
-    )
+    for_truth, for_draws, for_mutants = random_lines(design.base_seed, index)
     record: dict[str, Any] = {"simulation": index}
     try:
         truth = draw_truth(design, for_truth)

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from calibration import again, bare, joint, oracle, together
+from calibration import again, bare, campaign_ranks, joint, oracle
 from calibration.run import SECTIONS, Part, page, parts
 from calibration.table import is_calibrated, is_caught, rows
 from scipy import stats
@@ -112,13 +112,13 @@ def test_ranks_with_bare_peaks_are_uniform_and_half_of_the_noise_is_found_out():
 
 
 def test_ranks_of_a_campaign_are_uniform_and_boards_that_count_eight_times_are_found_out():
-    records = [together.simulate_one(i, times=8) for i in range(10)]
+    records = [campaign_ranks.simulate_one(i, times=8) for i in range(10)]
     assert [one for one in records if "error" in one] == []
     of = {name: rows([one["ranks"][name] for one in records]) for name in records[0]["ranks"]}
 
     assert {"shared", "E_x", "held_out"} <= {row.name for row in of["production"]}
     assert is_calibrated(of["production"]), of["production"]
-    assert is_caught(together.TWICE, of[together.TWICE])
+    assert is_caught(campaign_ranks.TWICE, of[campaign_ranks.TWICE])
 
 
 @pytest.fixture(scope="module")

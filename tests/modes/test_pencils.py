@@ -14,15 +14,12 @@ EIGENVALUES = np.concatenate([np.zeros(N_RIGID), np.arange(1.0, R - N_RIGID + 1.
 
 
 def coupled(size, seed, with_mass=True):
-    """Pencils at that distance from the centre: relative changes of energy; rigid motions have none of stiffness.
-
-    The mass changes by a third of what the stiffness does: of a board it is known better by far.
-    """
+    """Pencils at that distance from the centre: relative changes of energy; rigid motions have none."""
     rng = np.random.default_rng(seed)
     scale = np.sqrt(EIGENVALUES)
     changes = [(c + np.swapaxes(c, 1, 2)) / np.sqrt(8 * R) for c in rng.standard_normal((2, N_DRAWS, R, R))]
     stiffness = np.diag(EIGENVALUES) + size * scale[:, None] * changes[0] * scale
-    return stiffness, np.eye(R) + size / 3.0 * changes[1] if with_mass else None
+    return stiffness, np.eye(R) + size * changes[1] if with_mass else None
 
 
 def exact(stiffness, mass):

@@ -3,7 +3,7 @@
 In the open data the accelerometer's mass is not stated, and the boards are thick enough to shear. An exact thin plate
 misses the nine labelled readings of both boards by some ten cents; shear and a sensor of two or three grams at the
 place that the card states halve that, without a prior that knows the board. The peaks without a label, with which
-other numbers are found (`docs/validation/spruce-half-tops.md`), are left out.
+other numbers are found (`docs/validation/closing-the-loop.md`), are left out.
 """
 
 from __future__ import annotations

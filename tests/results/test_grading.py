@@ -159,7 +159,11 @@ def test_no_pair_that_may_match_is_passed_over():
 
 
 def test_pairs_take_memory_in_proportion_to_the_boards():
-    """All of them beside all would take the square: 32 MB for each figure of two thousand."""
+    """Of each board twelve partners in five arrays of eight bytes, and as many numbers again of its figures.
+
+    All beside all would take the square: 32 MB for each figure of two thousand.
+    """
+    of_a_board = 2 * 12 * 5 * 8
     rng = np.random.default_rng(3)
     mean = 0.1 * rng.standard_normal((2000, 7))
     covariance = np.broadcast_to(1e-4 * np.eye(7), (2000, 7, 7))
@@ -172,9 +176,9 @@ def test_pairs_take_memory_in_proportion_to_the_boards():
         finally:
             tracemalloc.stop()
 
-    peak(200)
+    peak(200)  # what is imported and kept
 
-    assert peak(2000) - peak(200) < 1800 * 1000
+    assert peak(2000) - peak(200) < 1800 * of_a_board
 
 
 def test_limits_are_met_with_the_share_of_the_draws_that_lie_within(values):

@@ -12,15 +12,15 @@ from dataclasses import asdict
 
 import numpy as np
 from calibration.records import Record
-from calibration.sbc import MOST_STEPS, N_DRAWS, held_out, ranks_among
+from calibration.sbc import MOST_STEPS, held_out, random_lines, ranked_draws, ranks_among
 from calibration.truths import Design, Truth, draw_truth, make_problem, reference
-from numpy.typing import NDArray
 
 from bayesplate.campaigns.boards import Member
 from bayesplate.campaigns.learning import Learnt, learn
 from bayesplate.campaigns.shared import Shared
 from bayesplate.campaigns.together import Together, walk
 from bayesplate.errors import BayesplateError
+from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.convergence import Convergence, Gate
 from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer
@@ -28,21 +28,28 @@ from bayesplate.posterior.sampling import Chains, SamplerSettings
 
 DESIGN = Design(law="fixed-linear", resolution=0.0, effect="support_stiffness")
 N_BOARDS = 3
+ESS_OF_A_BOARD = 2000
+"""Independent draws of a board alone: some hundreds are left where the other boards have told what is shared."""
 TWICE = "every board counted twice"
 """A wrong campaign that is to be found out."""
 
 
-def shared() -> tuple[Shared, ...]:
-    """The one number that all boards have in common."""
-    (parameter,) = (one for one in reference(DESIGN).board.parameters if one.is_of_effect)
-    return (Shared(parameter.effect, parameter.key, parameter.prior, parameter.unit),)
+def of_boards() -> Parameter:
+    """The parameter of each board that is the same of all."""
+    (found,) = (one for one in reference(DESIGN).board.parameters if one.is_of_effect)
+    return found
+
+
+def shared() -> Shared:
+    """The number that all boards have in common."""
+    one = of_boards()
+    return Shared(one.effect, one.key, one.prior, one.unit)
 
 
 def draw(rng: np.random.Generator) -> list[Truth]:
     """A truth for each board, what is shared being that of the first one."""
-    (name,) = (one.name for one in reference(DESIGN).board.parameters if one.is_of_effect)
     first = draw_truth(DESIGN, rng)
-    given = {name: first.values[name]}
+    given = {of_boards().name: first.values[of_boards().name]}
     return [first, *(draw_truth(DESIGN, rng, given) for _ in range(N_BOARDS - 1))]
 
 
@@ -54,11 +61,11 @@ def settings(rng: np.random.Generator, gate: Gate | None = None) -> SamplerSetti
 
 def learnt_from(truths: list[Truth], rng: np.random.Generator) -> Learnt:
     """Every board fitted alone, and what they teach together."""
-    members, gate = [], Gate(tau_count_min=DESIGN.gate_taus, ess_min=2000)
+    members, gate = [], Gate(tau_count_min=DESIGN.gate_taus, ess_min=ESS_OF_A_BOARD)
     for truth in truths:
         inference = infer(make_problem(DESIGN, truth), settings(rng, gate))
         _require(inference.convergence)
-        members.append(Member(inference, named_draws(inference, int(rng.integers(2**31))), shared()))
+        members.append(Member(inference, named_draws(inference, int(rng.integers(2**31))), (shared(),)))
     learnt = learn(members, settings(rng))
     _require(learnt.convergence)
     return learnt
@@ -75,14 +82,8 @@ def repeated(learnt: Learnt, times: int, rng: np.random.Generator) -> Chains:
 
 def rank_of_shared(chains: Chains, truth: Truth, rng: np.random.Generator) -> int:
     """Rank of what is shared among as many draws as are ranked."""
-    (one,) = shared()
-    (name,) = (each.name for each in one.parameters(reference(DESIGN).board))
-    true = float(one.prior.standard(np.asarray(truth.values[name])))
-    return int(np.sum(_some(chains.pooled, rng)[:, 0] < true))
-
-
-def _some(draws: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    return draws[rng.choice(len(draws), N_DRAWS, replace=False)]
+    true = float(shared().prior.standard(np.asarray(truth.values[of_boards().name])))
+    return int(np.sum(ranked_draws(chains.pooled, rng)[:, 0] < true))
 
 
 def _require(convergence: Convergence) -> None:
@@ -101,16 +102,14 @@ def simulate_one(index: int, times: int = 2) -> Record:
         How often the mutant counts every board.
     """
     started = time.perf_counter()
-    for_truth, for_draws, for_mutants = (
-        np.random.default_rng(s) for s in np.random.SeedSequence([DESIGN.base_seed, 13, index]).spawn(3)
-    )
+    for_truth, for_draws, for_mutants = random_lines(DESIGN.base_seed, 13, index)
     record: Record = {"simulation": index}
     try:
         truths = draw(for_truth)
         learnt = learnt_from(truths, for_draws)
         inference, draws, effective = learnt.board(0, for_draws, int(for_draws.integers(2**31)))
         unread = held_out(DESIGN, inference.problem)
-        of_board = ranks_among(inference.problem, truths[0], _some(draws.flat, for_draws), unread)
+        of_board = ranks_among(inference.problem, truths[0], ranked_draws(draws.flat, for_draws), unread)
         ranks = {"production": {**of_board, "shared": rank_of_shared(learnt.chains, truths[0], for_draws)}}
         often = repeated(learnt, times, for_mutants)
         ranks[TWICE] = {"shared": rank_of_shared(often, truths[0], for_mutants)}
