@@ -157,7 +157,7 @@ def pairs_picture(graded: Grading) -> Picture:
     """The proposed pairs: by how much the constants of the partner differ, and the tolerance."""
     shown = graded.pairs[:_MOST_PAIRS]
     names = [name for name in MODULI if name in graded.request.match_percent] or list(MODULI)
-    figure, (panel,) = stacked([0.42 * len(shown) + 0.1], left=_LEFT, bottom=0.8)
+    figure, (panel,) = stacked([0.42 * len(shown) + 0.1], left=_LEFT, right=0.5, bottom=0.8)
     for row, pair in enumerate(shown):
         both = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
@@ -177,8 +177,8 @@ def pairs_picture(graded: Grading) -> Picture:
     ]
     _named_rows(panel, titles)
     for row, pair in enumerate(shown):
-        panel.annotate(percent(pair.probability), (1.0, row), xycoords=("axes fraction", "data"), ha="right",
-                       va="center", fontsize=SMALL, weight="bold")  # fmt: skip
+        panel.annotate(percent(pair.probability), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
+                       va="center", fontsize=SMALL, weight="bold", annotation_clip=False)  # fmt: skip
     panel.set_xlabel("constants of the partner over the board's, %", fontsize=SMALL)
     legend_below(figure, [_handle(*_COLOURS[name], in_figure(name)) for name in names], 3)
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)

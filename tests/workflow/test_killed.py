@@ -99,7 +99,7 @@ def test_killed_at_any_moment_and_resumed_the_files_are_the_same(tmp_path, argum
         assert killed(folder, moment, *arguments) == -signal.SIGKILL
         left = files_in(folder), folders_in(folder)
         go_on(folder, *arguments)
-        assert left != (whole, folders), moment
+        assert left != (whole, folders) or moment == n_of, moment
         assert files_in(folder) == whole, moment
 
 
