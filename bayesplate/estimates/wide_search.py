@@ -30,7 +30,8 @@ from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.system import System, system_of
 from bayesplate.modes.naming import Place
 from bayesplate.modes.plate import Parity
-from bayesplate.modes.reduced import ReducedOrderModel, reduced_order_model
+from bayesplate.modes.reduced import ReducedOrderModel
+from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.measured import Peak

@@ -15,7 +15,7 @@ from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
 from bayesplate.modes.plate import Beams, PlateMatrices
-from bayesplate.modes.reduced import ACCEPTED_CENTS, reduced_order_model
+from bayesplate.modes.reduction import ACCEPTED_CENTS, reduced_order_model
 from bayesplate.modes.solve import solve_up_to
 from bayesplate.plate.board import Values
 from bayesplate.plate.sessions import discrepancy_names

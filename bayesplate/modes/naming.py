@@ -70,15 +70,44 @@ def name_shapes(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parit
     list of (tuple of int, float)
         In the order of the modes.
     """
-    from scipy.optimize import linear_sum_assignment
+    parts = beam_parts(plate, shapes, parity)
+    products, named = list(parts), name_parts(np.stack(list(parts.values()), axis=1))
+    return [(products[column], correlation) for column, correlation in named]
 
+
+def beam_parts(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity) -> dict[Beams, NDArray[np.float64]]:
+    """What deflections of a class have of each product of beam functions: (n_shapes,) arrays, of its elastic products.
+
+    Parameters
+    ----------
+    plate : PlateMatrices
+    shapes : (n_shapes, n_dof_x, n_dof_y) array
+    parity : Parity
+    """
     beams_x = plate.line_x.beams.T @ plate.line_x.mass
     beams_y = plate.line_y.beams.T @ plate.line_y.mass
     correlations = beams_x @ shapes @ beams_y.T
     products = [beams for beams in _elastic_products(plate) if plate.parity(beams) == parity]
-    shares = np.stack([correlations[:, i, j] ** 2 for i, j in products], axis=1)
-    rows, columns = linear_sum_assignment(shares, maximize=True)
-    return [(products[c], float(np.sqrt(shares[r, c]))) for r, c in zip(rows, columns, strict=True)]
+    return {(i, j): correlations[:, i, j] for i, j in products}
+
+
+def name_parts(parts: NDArray[np.float64]) -> list[tuple[int, float]]:
+    """Product and correlation of each mode, each product given to one mode only.
+
+    Parameters
+    ----------
+    parts : (n_modes, n_products) array
+        What each mode has of each product, 1 being the whole of it.
+
+    Returns
+    -------
+    list of (int, float)
+        Which product, and the size of its part.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    rows, columns = linear_sum_assignment(parts**2, maximize=True)
+    return [(int(c), float(np.abs(parts[r, c]))) for r, c in zip(rows, columns, strict=True)]
 
 
 def name_modes(modes: Modes) -> list[tuple[Beams, float]]:

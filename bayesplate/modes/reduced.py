@@ -1,18 +1,17 @@
 """The reduced-order model: all stiffness and mass terms projected on the modes at the estimate and at points around it.
 
 Its eigenvalues are the exact frequencies to a few hundredths of a cent, thousands of times faster than a full solve;
-its diagonal at the centre is the linear law. It is checked against full solves it has not seen when it is built.
+its diagonal at the centre is the linear law. `bayesplate.modes.reduction` builds it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.naming import Place
+from bayesplate.modes.naming import Place, name_parts
 from bayesplate.modes.pencils import (
     condensed_eigenvalues,
     pencil_eigenvalues,
@@ -20,27 +19,13 @@ from bayesplate.modes.pencils import (
     stepped_eigenvalues,
     stepped_modes,
 )
-from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
-from bayesplate.modes.solve import ClassModes, solve_class
+from bayesplate.modes.plate import Beams, Parity, Weights
 from bayesplate.modes.threads import in_threads
 
-_SPARE = 2
-_RESISTS = 1e-6
-_LOWEST_SHARE = 1e-7
-ACCEPTED_CENTS = 0.1
-_FEW = 9
-"""Training points that are always solved, all of them."""
-_STEADY = 0.05
-_WHOLE = 40
+SPARE = 2
+"""Modes above the highest wanted one of a class that the basis is made for too."""
+WHOLE = 40
 """Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
-_HARDLY_MORE = 1.1
-"""Error of a cheap way to use a basis over that of the whole basis, where the latter is above what is accepted."""
-_BEYOND = 10
-"""Modes above the wanted ones that are kept from it."""
-_LARGE, _LARGE_PENCIL = 80, 60
-"""Vectors from which on a step from the modes at the centre pays, without and with masses."""
-_SHARED = 2 / 3
-"""Share of them that is tried before the whole: the last ones, which are what the modes have most in common."""
 _BATCH, _SMALL_BATCH = 16, 512
 """Draws whose large or small matrices are held at once: those of a whole posterior would not fit any cache."""
 
@@ -56,6 +41,10 @@ class ReducedBlock:
         Projected stiffness terms.
     masses : (n_masses, r, r) array
         Projected mass terms; none where the mass hardly varies over the region and the basis is orthonormal in it.
+    parts : (r, n_products) array
+        What each vector has of the products of beam functions that name modes.
+    products : tuple of (int, int)
+        Their orders along x and y.
     n_rigid : int
         Rigid motions in the basis: the lowest eigenvalues, which are left out.
     shift : float, s^-2
@@ -70,6 +59,8 @@ class ReducedBlock:
     parity: Parity
     stiffness: NDArray[np.float64]
     masses: NDArray[np.float64]
+    parts: NDArray[np.float64]
+    products: tuple[Beams, ...]
     n_rigid: int = 0
     shift: float = 1.0
     n_kept: int = 0
@@ -80,7 +71,7 @@ class ReducedBlock:
 
         All r - n_rigid of them, or n_kept - n_rigid where the others are condensed.
         """
-        is_large = self.stiffness.shape[-1] > _WHOLE
+        is_large = self.stiffness.shape[-1] > WHOLE
         starts = range(0, max(len(weights.stiffness), 1), _BATCH if is_large else _SMALL_BATCH)
         parts = [Weights(*(w[start : start + starts.step] for w in weights)) for start in starts]
         found = in_threads(self._eigenvalues, parts) if is_large else [self._eigenvalues(part) for part in parts]
@@ -112,6 +103,19 @@ class ReducedBlock:
         else:
             values, vectors = pencil_modes(*pencil, self.shift, n_wanted)
         return values[:, self.n_rigid :], vectors[:, :, self.n_rigid :]
+
+    def ranks(self, weights: Weights, n_modes: int) -> NDArray[np.intp]:
+        """Which of the lowest elastic modes each of `products` names, at many draws.
+
+        Returns
+        -------
+        (n_draws, n_products) array of int
+            From 0; `n_modes` where it names none of them.
+        """
+        found = np.full((len(weights.stiffness), len(self.products)), n_modes, dtype=np.intp)
+        for row, vectors in zip(found, self.modes(weights, n_modes)[1], strict=True):
+            row[[product for product, _ in name_parts(vectors.T @ self.parts)]] = np.arange(vectors.shape[1])
+        return found
 
     def energies(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What each term has of the lowest modes of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays.
@@ -163,6 +167,20 @@ class ReducedOrderModel:
             values[:, columns] = block.eigenvalues(weights)[:, [self.places[i].rank for i in columns]]
         return values
 
+    def ranks(self, weights: Weights) -> dict[Beams, NDArray[np.intp]]:
+        """Rank in its class of the mode that each product of beam functions names, at many draws.
+
+        Returns
+        -------
+        dict of (n_draws,) array of int
+            By the orders along x and y; those that name none of the lowest modes have the highest rank of all.
+        """
+        found: dict[Beams, NDArray[np.intp]] = {}
+        for block in self.blocks:
+            highest = max(place.rank for place in self.places if place.parity == block.parity)
+            found |= dict(zip(block.products, block.ranks(weights, highest + 1 + SPARE).T, strict=True))
+        return found
+
     def energies(self, weights: Weights) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What each term has of each wanted mode of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays."""
         stiffness, mass = (np.empty((len(self.places), part.shape[1])) for part in weights)
@@ -172,170 +190,3 @@ class ReducedOrderModel:
             own = block.energies(weights, max(ranks) + 1)
             stiffness[columns], mass[columns] = (part[ranks] for part in own)
         return stiffness, mass
-
-
-def reduced_order_model(
-    plate: PlateMatrices,
-    places: Sequence[Place],
-    centre: Weights,
-    around: Iterable[Weights],
-    held_out: Sequence[Weights],
-    accepted_cents: float = ACCEPTED_CENTS,
-) -> ReducedOrderModel:
-    """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
-
-    Of many points around the first half will do if the error at the held-out ones stays below what is accepted. While
-    it does not, the second half joins the basis, then half of the held-out points. The check is
-    made at those that did not join: they lie as far out as the others, and none was chosen for its error, so that it is
-    an honest sample of the error over the region.
-
-    Parameters
-    ----------
-    plate : PlateMatrices
-    places : sequence of Place
-        The modes wanted.
-    centre : Weights
-        At the estimate.
-    around, held_out : sequences of Weights
-        At least one is held out.
-    accepted_cents : float
-
-    Returns
-    -------
-    ReducedOrderModel
-    """
-    ranks: dict[Parity, int] = {}
-    for place in places:
-        ranks[place.parity] = max(ranks.get(place.parity, 0), place.rank + 1)
-    training = [centre, *around]
-    blocks = []
-    worst = 0.0
-    for parity, n_modes in ranks.items():
-        block, error = _reduce(plate.block(parity), n_modes, training, held_out, accepted_cents)
-        blocks.append(block)
-        worst = max(worst, error)
-    return ReducedOrderModel(tuple(places), tuple(blocks), worst)
-
-
-def _reduce(
-    block: Block, n_modes: int, training: list[Weights], held_out: Sequence[Weights], accepted_cents: float
-) -> tuple[ReducedBlock, float]:
-    def solved(points: Sequence[Weights]) -> tuple[list[Weights], list[ClassModes]]:
-        found = list(zip(points, in_threads(lambda one: _modes_of(block, one, n_modes + _SPARE), points), strict=True))
-        kept = [(weights, modes) for weights, modes in found if modes is not None]
-        return [weights for weights, _ in kept], [modes for _, modes in kept]
-
-    n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
-    first = solve_class(block, training[0], n_modes + _SPARE)
-    trained = [first, *solved(training[1:n_first])[1]]
-    held_out, checks = solved(held_out)
-    if not checks:
-        raise np.linalg.LinAlgError("none of the points that were held out is a plate")
-    # A second mass or a support lets elastic modes carry some rigid motion; otherwise they are orthogonal to it.
-    rigid = trained[0].rigid[:, : block.n_rigid if block.n_masses > 1 or _is_supported(block, trained[0]) else 0]
-    exact = np.stack([solution.eigenvalues[:n_modes] for solution in checks])
-    is_steady = _is_steady([*training, *held_out])
-    together = Weights(*(np.stack(w) for w in zip(*held_out, strict=True)))
-    n_solved = n_first
-    rounds = (n_first, 0), (len(training), 0), (len(training), len(held_out) // 2)
-    for n_trained, n_joined in dict.fromkeys(rounds):
-        trained += solved(training[n_solved:n_trained])[1]
-        n_solved = max(n_solved, n_trained)
-        elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
-        whole = _project(block, rigid, elastic, trained[0], training[0], is_steady)
-        ways = []
-        for reduced in _cheapest_first(whole, training[0], n_modes):
-            ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
-            ways.append((reduced, 600.0 * float(np.abs(np.log2(ratios)).max())))
-            if ways[-1][1] <= accepted_cents:
-                return ways[-1]
-    # Where the basis itself is not that good, the first way that adds hardly anything to its error will do.
-    return next((way for way in ways if way[1] <= _HARDLY_MORE * ways[-1][1]), ways[-1])
-
-
-def _modes_of(block: Block, weights: Weights, n_modes: int) -> ClassModes | None:
-    """The modes at one point; None where it is no plate.
-
-    An expansion to second order in fields need not be positive where several of them are far out at once.
-    """
-    try:
-        return solve_class(block, weights, n_modes)
-    except np.linalg.LinAlgError:
-        return None
-
-
-def _is_supported(block: Block, solution: ClassModes) -> bool:
-    """Whether a stiffness term resists the rigid motions."""
-    if not block.n_rigid:
-        return False
-    every = (block.project(block.terms, vectors) for vectors in (solution.rigid, solution.vectors))
-    resists, bends = (np.abs(terms).max(axis=(1, 2)) for terms in every)
-    return bool((resists > _RESISTS * bends).any())
-
-
-def _project(
-    block: Block,
-    rigid: NDArray[np.float64],
-    elastic: NDArray[np.float64],
-    centre: ClassModes,
-    weights: Weights,
-    is_steady: bool,
-) -> ReducedBlock:
-    """Orthonormalise in energy, dropping directions that the vectors hardly span, and project the terms.
-
-    What the vectors have most in common comes last.
-    """
-    vectors = np.concatenate([rigid, elastic], axis=1)
-    highest = float(centre.eigenvalues[-1])
-    norm = block.stiffness(weights) + highest * block.mass(weights)
-    gram = vectors.T @ (norm @ vectors)
-    scale = 1.0 / np.sqrt(np.diagonal(gram))
-    shares, directions = np.linalg.eigh(scale[:, None] * gram * scale)
-    kept = shares > _LOWEST_SHARE * shares[-1]
-    basis = (vectors * scale) @ (directions[:, kept] / np.sqrt(shares[kept]))
-    masses = block.project_masses(basis)
-    if is_steady:
-        steady = np.tensordot(weights.mass, masses, axes=1)
-        basis = basis @ np.linalg.inv(np.linalg.cholesky(steady)).T
-        masses = masses[:0]
-    stiffness = block.project(block.terms, basis)
-    return ReducedBlock(block.parity, stiffness, masses, rigid.shape[1], float(centre.eigenvalues[0]))
-
-
-def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Iterator[ReducedBlock]:
-    """Ways to find the modes of a draw on a basis: of a large one first from the modes at the centre; then as it is.
-
-    A part of a basis that is orthonormal in the mass would not span what its vectors have in common.
-    """
-    size = whole.stiffness.shape[-1]
-    n_condensed, n_stepped = (whole.n_rigid + n for n in (n_modes + _BEYOND, 2 * n_modes))
-    if size > max(_WHOLE, 2 * n_condensed):
-        yield replace(_on_modes(whole, centre), n_kept=n_condensed, is_condensed=True)
-    if size > (_LARGE_PENCIL if len(whole.masses) else _LARGE):
-        last = slice(size - max(round(_SHARED * size), n_condensed), None)
-        parts = [replace(whole, stiffness=whole.stiffness[:, last, last], masses=whole.masses[:, last, last]), whole]
-        for part in parts if len(whole.masses) else [whole]:
-            fewer = [n for n in sorted({n_condensed, n_stepped}) if part.stiffness.shape[-1] > 2 * n]
-            if fewer:
-                turned = _on_modes(part, centre)
-                yield from (replace(turned, n_kept=n) for n in fewer)
-            elif part is not whole:
-                yield part
-    yield whole
-
-
-def _on_modes(block: ReducedBlock, centre: Weights) -> ReducedBlock:
-    """The same basis turned to its modes at the centre, in the order of their frequencies."""
-    from scipy.linalg import eigh
-
-    stiffness = np.tensordot(centre.stiffness, block.stiffness, axes=1)
-    mass = np.tensordot(centre.mass, block.masses, axes=1) if len(block.masses) else None
-    modes = eigh(stiffness, mass)[1]
-    turned = [modes.T @ terms @ modes for terms in (block.stiffness, block.masses)]
-    return replace(block, stiffness=turned[0], masses=turned[1])
-
-
-def _is_steady(points: Sequence[Weights]) -> bool:
-    """Whether all mass weights stay within a few per cent of those of the first point."""
-    first = points[0].mass
-    return all(np.all(np.abs(point.mass - first) <= _STEADY * np.abs(first)) for point in points)

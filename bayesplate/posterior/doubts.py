@@ -58,8 +58,7 @@ def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
     log_widening : float
         ln of the noise that the residuals want, over the median of its prior.
     """
-    widest = max(setup.noise.log_sd for setup in board.setups)
-    if not log_widening >= max(np.log(LARGE_NOISE), LARGE_NOISE_SDS * widest):
+    if not is_too_wide(board, log_widening):
         return ()
     levels = ", ".join(
         f"{100.0 * setup.noise.median * np.exp(log_widening):.2g} % where about {100.0 * setup.noise.median:.2g} % is "
@@ -71,6 +70,12 @@ def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:
         "not trust the constants before a label, a size or an edge is corrected, or an effect is found (bayesplate "
         "diagnose)",
     )
+
+
+def is_too_wide(board: Board, log_widening: float) -> bool:
+    """Whether a noise of so many times its prior's median, by the logarithm, is far above what is expected."""
+    widest = max(setup.noise.log_sd for setup in board.setups)
+    return bool(log_widening >= max(np.log(LARGE_NOISE), LARGE_NOISE_SDS * widest))
 
 
 def _stray(search: SlipSearch, slip: Slip) -> str:

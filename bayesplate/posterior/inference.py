@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
-from bayesplate.errors import InputError
+from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.identifiability import (
     Identifiability,
@@ -28,7 +28,7 @@ from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
-from bayesplate.posterior.doubts import slip_remarks
+from bayesplate.posterior.doubts import is_too_wide, slip_remarks
 from bayesplate.posterior.first_labels import propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
@@ -36,10 +36,13 @@ from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sam
 from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior, linear_suffices
+from bayesplate.posterior.veerings import veering_remarks, with_doubts
 
 Floats = NDArray[np.float64]
 
 _N_CHECKS = 256
+_N_NAMED = 64
+"""Of these checks, on which modes are named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,8 @@ class PosedProblem:
         Normal approximation of the posterior, for the starts.
     is_forced : bool
         Whether the law was asked for: then no surrogate stands for it between its evaluations.
+    veerings : tuple of str
+        What is in doubt about labels near a veering, a sentence per setup.
     """
 
     board: Board
@@ -68,6 +73,7 @@ class PosedProblem:
     centre: NDArray[np.float64]
     covariance: NDArray[np.float64]
     is_forced: bool = False
+    veerings: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> Parameters:
@@ -79,7 +85,7 @@ class PosedProblem:
         """What is unusual about the constants and the readings, before anything is sampled: a sentence each."""
         constants = unusual(self.board, self.prior, self.estimate.rigidities)
         is_sure = not any(self.posterior.peaks)  # otherwise the assignments say what a label may be
-        return (*constants, *(slip_remarks(self.posterior, self.centre) if is_sure else ()))
+        return (*constants, *self.veerings, *(slip_remarks(self.posterior, self.centre) if is_sure else ()))
 
     def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""
@@ -127,6 +133,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     Returns
     -------
     PosedProblem
+        Of the board with labels in doubt that may name another mode near a veering (`bayesplate.posterior.veerings`).
 
     Raises
     ------
@@ -138,6 +145,31 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     faults = coefficient_faults(board)
     if faults:
         raise InputError(faults)
+    problem, draws = _posed(board, prior, law, robust)
+    if problem.posterior.law == "linear":  # which follows the shapes
+        return problem
+    named = problem.parameters.values(np.concatenate([problem.centre[None], draws[:_N_NAMED]]))
+    doubted = with_doubts(problem.board, problem.posterior.models, named)
+    if doubted is problem.board:
+        return problem
+    try:
+        again, _ = _posed(doubted, prior, law, robust)
+    except NotIdentifiableError:
+        return problem
+    if _scatters(again) and _scatters(problem):  # something else is wrong, and makes wrong plates look plausible
+        return problem
+    return replace(again, veerings=veering_remarks(problem.board, doubted))
+
+
+def _scatters(problem: PosedProblem) -> bool:
+    """Whether the readings scatter about the plate far beyond what the prior of the noise lets expect."""
+    medians = [setup.noise.median for setup in problem.board.setups]
+    log_noise = problem.parameters.log_noise(problem.centre[None])[0]
+    return is_too_wide(problem.board, float(np.max(log_noise - np.log(medians))))
+
+
+def _posed(board: Board, prior: PriorCard, law: LawName | None, robust: bool) -> tuple[PosedProblem, Floats]:
+    """The problem as the labels are, and (n_draws, n_dim) plausible plates: of the widened normal approximation."""
     proposed = propose_labels(board, prior)
     board = with_discrepancies(proposed.board)
     require_labels(board)
@@ -147,12 +179,8 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     approximation = laplace_approximation(board, estimate, robust, proposed.spread)
     require_identifiable(board, _identifiable_at(board, approximation, estimate))
     is_forced = law is not None
+    draws = _plausible(board, approximation)
     if law is None:
-        draws = np.random.default_rng(0).multivariate_normal(approximation.centre, approximation.covariance, _N_CHECKS)
-        draws[:, :N_RIGIDITIES] += (_widening(board) - 1.0) * (draws - approximation.centre)[:, :N_RIGIDITIES]
-        parameters, columns = Parameters(board), Parameters(board).fitted_columns
-        limits = parameters.fitted_bounds
-        draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
         errors = linearisation_errors(board, approximation.models, draws)
         medians = [setup.noise.median for setup in board.setups]
         n_every = [len(model.every_place) for model in approximation.models]
@@ -160,9 +188,20 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     posterior = Posterior(board, prior, approximation.models, law, robust)
     require_reachable(posterior, approximation.centre, approximation.covariance)
     require_possible_noise(posterior, approximation.centre)
-    return PosedProblem(
+    problem = PosedProblem(
         board, prior, estimate, found, posterior, approximation.centre, approximation.covariance, is_forced
     )
+    return problem, draws
+
+
+def _plausible(board: Board, approximation: LaplaceApproximation) -> Floats:
+    """Draws of the normal approximation, wider because the noise is not known, within the limits of the inputs."""
+    draws = np.random.default_rng(0).multivariate_normal(approximation.centre, approximation.covariance, _N_CHECKS)
+    draws[:, :N_RIGIDITIES] += (_widening(board) - 1.0) * (draws - approximation.centre)[:, :N_RIGIDITIES]
+    parameters, columns = Parameters(board), Parameters(board).fitted_columns
+    limits = parameters.fitted_bounds
+    draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
+    return np.asarray(draws)
 
 
 def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noise: Floats) -> Inference:

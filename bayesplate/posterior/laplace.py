@@ -16,7 +16,7 @@ from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, are_twins, setup_model, with_exact, with_exact_of, with_others
 from bayesplate.frequencies.peaks import takes_part
 from bayesplate.frequencies.predictor import Predictor
-from bayesplate.modes.reduced import ACCEPTED_CENTS
+from bayesplate.modes.reduction import ACCEPTED_CENTS
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd

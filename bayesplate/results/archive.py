@@ -134,6 +134,8 @@ def _place(
     plain = tuple(extra)
     sampled = ("chain", "draw", *plain)
     used = sampled if may_be_sampled and value.ndim == len(sampled) else plain
+    if name in used:
+        raise ValueError(f"archive {name}: wanted a name that none of its dimensions {used} has")
     unknown = [dim for dim in used if dim not in axes]
     if unknown:
         raise ValueError(f"archive {name}: wanted coords for {', '.join(unknown)}, got none")

@@ -60,7 +60,7 @@ def posterior_archive(inference: Inference, draws: Draws, attributes: Mapping[st
         groups={
             "posterior": {**draws.rigidities, **draws.moduli, "noise": draws.noise, **draws.inputs},
             "log_prior": {name: values.reshape(draws.log_posterior.shape) for name, values in factors.items()},
-            "log_likelihood": {"frequency" if all_sure else "factor": draws.log_likelihood},
+            "log_likelihood": {"frequency" if all_sure else "readings_and_peaks": draws.log_likelihood},
             "posterior_predictive": {"frequency": draws.predictive},
             "sample_stats": {
                 "lp": draws.log_posterior,
@@ -79,7 +79,7 @@ def posterior_archive(inference: Inference, draws: Draws, attributes: Mapping[st
         dims={
             "noise": ["setup"],
             "frequency": ["reading"],
-            "factor": ["factor"],
+            "readings_and_peaks": ["factor"],
             "tau": ["parameter"],
             "rhat": ["parameter"],
             "ess": ["parameter"],

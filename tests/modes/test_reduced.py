@@ -12,11 +12,11 @@ import ritz
 from bars import meets
 
 from bayesplate.frequencies.laws import ExactLaw, LinearLaw
-from bayesplate.modes import reduced as reduced_module
+from bayesplate.modes import reduction
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
 from bayesplate.modes.plate import Weights
-from bayesplate.modes.reduced import reduced_order_model
+from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.modes.solve import solve_class
 from bayesplate.modes.thin import thin_plate
 
@@ -117,9 +117,9 @@ def test_a_poor_basis_is_used_in_the_first_way_that_adds_hardly_anything(monkeyp
         )
         yield from ways[-1]
 
-    monkeypatch.setattr(reduced_module, "_cheapest_first", three_ways)
+    monkeypatch.setattr(reduction, "_cheapest_first", three_ways)
     reduced = reduced_order_model(plate, [found[beams].place for beams in names], centre, [], [outside])
-    assert reduced.worst_cents > reduced_module.ACCEPTED_CENTS
+    assert reduced.worst_cents > reduction.ACCEPTED_CENTS
     worst = [block for block in reduced.blocks if any(block is tried[1] for tried in ways)]
     assert worst  # classes whose basis is good enough, or good but for that, take another way
     assert not any(block is tried[2] for block in reduced.blocks for tried in ways)
@@ -141,6 +141,22 @@ def test_model_is_exact_at_the_centre(name):
 
     # Directions of less than 1e-8 of the basis are dropped, so that even a training point is not met to rounding.
     assert np.abs(cents(reduced.eigenvalues(centre), expected)).max() < 0.01
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_modes_of_draws_are_named_as_those_of_full_solves(name):
+    """The rank of every name at points around; some of them lie beyond a veering."""
+    board, names = WANTED[name]
+    plate, found, reduced = prepared(name)
+    points = [weights_at(board, p) for p in np.random.default_rng(8).uniform(-1.0, 1.0, (12, 3))]
+    ranks = reduced.ranks(together(points))
+
+    for i, point in enumerate(points):
+        places = {beams: one.place for beams, one in find(plate, point, names).items()}
+        for beams, place in places.items():
+            own = [one.place.rank for one in found.values() if one.place.parity == place.parity]
+            if place.is_certain and place.rank <= max(own):
+                assert ranks[beams][i] == place.rank
 
 
 @pytest.mark.parametrize("name", WANTED)

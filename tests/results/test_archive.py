@@ -120,6 +120,14 @@ def test_a_failed_write_leaves_the_old_archive(path):
     assert [file.name for file in path.parent.iterdir()] == [path.name]
 
 
+def test_a_variable_with_the_name_of_its_dimension_is_refused(tmp_path):
+    """ArviZ would leave its group out."""
+    changed = content()
+    changed["dims"]["frequency"], changed["coords"]["frequency"] = ["frequency"], changed["coords"].pop("mode")
+    with pytest.raises(ValueError, match="archive frequency: wanted a name that none of its dimensions"):
+        write_archive(tmp_path / "posterior.nc", Archive(**changed))
+
+
 def test_a_dimension_without_labels_is_refused(tmp_path):
     changed = content()
     del changed["coords"]["mode"]

@@ -160,6 +160,14 @@ def test_peaks_are_assigned_to_modes(free):
     )
 
 
+def test_the_archive_of_a_board_with_peaks_holds_what_each_factor_says(free):
+    """Readings whose label is sure, and all the others of a setup together."""
+    group = arviz.from_netcdf(str(free.folder / "posterior.nc"), engine="h5netcdf")["log_likelihood"]
+
+    assert group["readings_and_peaks"].dims == ("chain", "draw", "factor")
+    assert group["factor"].values.tolist() == ["free peaks"]
+
+
 def test_peaks_narrow_the_constants(tmp_path):
     """Sixteen peaks in place of nine labels: at the expected noise the constants are known better."""
     (shipped,) = (load_board(name).path for name in card_names("boards") if name == "spruce-free-2R")

@@ -1,0 +1,223 @@
+"""How a reduced-order model is built: which points are solved, which vectors span the basis, how it is used cheapest.
+
+It is checked against full solves that it has not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.modes.naming import Place, beam_parts
+from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
+from bayesplate.modes.reduced import SPARE, WHOLE, ReducedBlock, ReducedOrderModel
+from bayesplate.modes.solve import ClassModes, solve_class
+from bayesplate.modes.threads import in_threads
+
+ACCEPTED_CENTS = 0.1
+_RESISTS = 1e-6
+_LOWEST_SHARE = 1e-7
+_FEW = 9
+"""Training points that are always solved, all of them."""
+_STEADY = 0.05
+_HARDLY_MORE = 1.1
+"""Error of a cheap way to use a basis over that of the whole basis, where the latter is above what is accepted."""
+_BEYOND = 10
+"""Modes above the wanted ones that are kept from it."""
+_LARGE, _LARGE_PENCIL = 80, 60
+"""Vectors from which on a step from the modes at the centre pays, without and with masses."""
+_SHARED = 2 / 3
+"""Share of them that is tried before the whole: the last ones, which are what the modes have most in common."""
+
+
+def reduced_order_model(
+    plate: PlateMatrices,
+    places: Sequence[Place],
+    centre: Weights,
+    around: Iterable[Weights],
+    held_out: Sequence[Weights],
+    accepted_cents: float = ACCEPTED_CENTS,
+) -> ReducedOrderModel:
+    """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
+
+    Of many points around the first half will do if the error at the held-out ones stays below what is accepted. While
+    it does not, the second half joins the basis, then half of the held-out points. The check is
+    made at those that did not join: they lie as far out as the others, and none was chosen for its error, so that it is
+    an honest sample of the error over the region.
+
+    Parameters
+    ----------
+    plate : PlateMatrices
+    places : sequence of Place
+        The modes wanted.
+    centre : Weights
+        At the estimate.
+    around, held_out : sequences of Weights
+        At least one is held out.
+    accepted_cents : float
+
+    Returns
+    -------
+    ReducedOrderModel
+    """
+    ranks: dict[Parity, int] = {}
+    for place in places:
+        ranks[place.parity] = max(ranks.get(place.parity, 0), place.rank + 1)
+    training = [centre, *around]
+    blocks = []
+    worst = 0.0
+    for parity, n_modes in ranks.items():
+        block, error = _reduce(plate, parity, n_modes, training, held_out, accepted_cents)
+        blocks.append(block)
+        worst = max(worst, error)
+    return ReducedOrderModel(tuple(places), tuple(blocks), worst)
+
+
+def _reduce(
+    plate: PlateMatrices,
+    parity: Parity,
+    n_modes: int,
+    training: list[Weights],
+    held_out: Sequence[Weights],
+    accepted_cents: float,
+) -> tuple[ReducedBlock, float]:
+    block = plate.block(parity)
+
+    def solved(points: Sequence[Weights]) -> tuple[list[Weights], list[ClassModes]]:
+        found = list(zip(points, in_threads(lambda one: _modes_of(block, one, n_modes + SPARE), points), strict=True))
+        kept = [(weights, modes) for weights, modes in found if modes is not None]
+        return [weights for weights, _ in kept], [modes for _, modes in kept]
+
+    n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
+    first = solve_class(block, training[0], n_modes + SPARE)
+    trained = [first, *solved(training[1:n_first])[1]]
+    held_out, checks = solved(held_out)
+    if not checks:
+        raise np.linalg.LinAlgError("none of the points that were held out is a plate")
+    # A second mass or a support lets elastic modes carry some rigid motion; otherwise they are orthogonal to it.
+    rigid = trained[0].rigid[:, : block.n_rigid if block.n_masses > 1 or _is_supported(block, trained[0]) else 0]
+    exact = np.stack([solution.eigenvalues[:n_modes] for solution in checks])
+    is_steady = _is_steady([*training, *held_out])
+    together = Weights(*(np.stack(w) for w in zip(*held_out, strict=True)))
+    n_solved = n_first
+    rounds = (n_first, 0), (len(training), 0), (len(training), len(held_out) // 2)
+    for n_trained, n_joined in dict.fromkeys(rounds):
+        trained += solved(training[n_solved:n_trained])[1]
+        n_solved = max(n_solved, n_trained)
+        elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
+        whole = _project(plate, block, rigid, elastic, trained[0], training[0], is_steady)
+        ways = []
+        for reduced in _cheapest_first(whole, training[0], n_modes):
+            ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
+            ways.append((reduced, 600.0 * float(np.abs(np.log2(ratios)).max())))
+            if ways[-1][1] <= accepted_cents:
+                return ways[-1]
+    # Where the basis itself is not that good, the first way that adds hardly anything to its error will do.
+    return next((way for way in ways if way[1] <= _HARDLY_MORE * ways[-1][1]), ways[-1])
+
+
+def _modes_of(block: Block, weights: Weights, n_modes: int) -> ClassModes | None:
+    """The modes at one point; None where it is no plate.
+
+    An expansion to second order in fields need not be positive where several of them are far out at once.
+    """
+    try:
+        return solve_class(block, weights, n_modes)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _is_supported(block: Block, solution: ClassModes) -> bool:
+    """Whether a stiffness term resists the rigid motions."""
+    if not block.n_rigid:
+        return False
+    every = (block.project(block.terms, vectors) for vectors in (solution.rigid, solution.vectors))
+    resists, bends = (np.abs(terms).max(axis=(1, 2)) for terms in every)
+    return bool((resists > _RESISTS * bends).any())
+
+
+def _project(
+    plate: PlateMatrices,
+    block: Block,
+    rigid: NDArray[np.float64],
+    elastic: NDArray[np.float64],
+    centre: ClassModes,
+    weights: Weights,
+    is_steady: bool,
+) -> ReducedBlock:
+    """Orthonormalise in energy, dropping directions that the vectors hardly span, and project the terms.
+
+    What the vectors have most in common comes last.
+    """
+    vectors = np.concatenate([rigid, elastic], axis=1)
+    highest = float(centre.eigenvalues[-1])
+    norm = block.stiffness(weights) + highest * block.mass(weights)
+    gram = vectors.T @ (norm @ vectors)
+    scale = 1.0 / np.sqrt(np.diagonal(gram))
+    shares, directions = np.linalg.eigh(scale[:, None] * gram * scale)
+    kept = shares > _LOWEST_SHARE * shares[-1]
+    basis = (vectors * scale) @ (directions[:, kept] / np.sqrt(shares[kept]))
+    masses = block.project_masses(basis)
+    if is_steady:
+        steady = np.tensordot(weights.mass, masses, axes=1)
+        basis = basis @ np.linalg.inv(np.linalg.cholesky(steady)).T
+        masses = masses[:0]
+    stiffness = block.project(block.terms, basis)
+    parts = beam_parts(plate, block.spread(basis), block.parity)
+    return ReducedBlock(
+        block.parity,
+        stiffness,
+        masses,
+        np.stack(list(parts.values()), axis=1),
+        tuple(parts),
+        rigid.shape[1],
+        float(centre.eigenvalues[0]),
+    )
+
+
+def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Iterator[ReducedBlock]:
+    """Ways to find the modes of a draw on a basis: of a large one first from the modes at the centre; then as it is.
+
+    A part of a basis that is orthonormal in the mass would not span what its vectors have in common.
+    """
+    size = whole.stiffness.shape[-1]
+    n_condensed, n_stepped = (whole.n_rigid + n for n in (n_modes + _BEYOND, 2 * n_modes))
+    if size > max(WHOLE, 2 * n_condensed):
+        yield replace(_on_modes(whole, centre), n_kept=n_condensed, is_condensed=True)
+    if size > (_LARGE_PENCIL if len(whole.masses) else _LARGE):
+        last = slice(size - max(round(_SHARED * size), n_condensed), None)
+        fewer = replace(
+            whole,
+            stiffness=whole.stiffness[:, last, last],
+            masses=whole.masses[:, last, last],
+            parts=whole.parts[last],
+        )
+        parts = [fewer, whole]
+        for part in parts if len(whole.masses) else [whole]:
+            kept = [n for n in sorted({n_condensed, n_stepped}) if part.stiffness.shape[-1] > 2 * n]
+            if kept:
+                turned = _on_modes(part, centre)
+                yield from (replace(turned, n_kept=n) for n in kept)
+            elif part is not whole:
+                yield part
+    yield whole
+
+
+def _on_modes(block: ReducedBlock, centre: Weights) -> ReducedBlock:
+    """The same basis turned to its modes at the centre, in the order of their frequencies."""
+    from scipy.linalg import eigh
+
+    stiffness = np.tensordot(centre.stiffness, block.stiffness, axes=1)
+    mass = np.tensordot(centre.mass, block.masses, axes=1) if len(block.masses) else None
+    modes = eigh(stiffness, mass)[1]
+    turned = [modes.T @ terms @ modes for terms in (block.stiffness, block.masses)]
+    return replace(block, stiffness=turned[0], masses=turned[1], parts=modes.T @ block.parts)
+
+
+def _is_steady(points: Sequence[Weights]) -> bool:
+    """Whether all mass weights stay within a few per cent of those of the first point."""
+    first = points[0].mass
+    return all(np.all(np.abs(point.mass - first) <= _STEADY * np.abs(first)) for point in points)

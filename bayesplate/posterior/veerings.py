@@ -1,0 +1,104 @@
+"""Labels that may be another mode's because two modes of one class exchange their shapes nearby: a veering.
+
+In the likelihood a label means the rank of its mode in its class at the estimate. Where the frequencies of two modes
+come close to each other within the posterior, the label names one of them on this side of the veering and the other on
+the far side, and which side the board lies on is not known. That does no harm where both modes were read and the higher
+reading is the higher mode's: the frequencies are in the right order whatever the shapes are called. Otherwise the label
+is one that may be wrong, with the share of plausible plates in which it names another mode; it takes part like any
+other doubtful one (`bayesplate.frequencies.peaks`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.frequencies.model import SetupModel
+from bayesplate.modes.plate import Beams, Weights
+from bayesplate.plate.board import Board, Values
+from bayesplate.plate.setup import Setup
+
+
+def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> Board:
+    """The board, where each sure label that may be another mode's is as sure as plausible plates agree on its mode.
+
+    Parameters
+    ----------
+    board : Board
+    models : sequence of SetupModel
+        Of its setups, with the exact law.
+    values : dict of (n_draws,) array
+        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters: of the estimate, then of plausible plates.
+
+    Returns
+    -------
+    Board
+        The same one where no label may.
+    """
+    doubts = [_confidences(model, values) for model in models]
+    if not any(doubts):
+        return board
+    setups = []
+    for setup, confidences in zip(board.setups, doubts, strict=True):
+        readings = (replace(one, confidence=confidences.get(one.beams, one.confidence)) for one in setup.readings)
+        setups.append(replace(setup, readings=tuple(readings)))
+    return replace(board, setups=tuple(setups))
+
+
+def veering_remarks(before: Board, doubted: Board) -> tuple[str, ...]:
+    """A sentence per setup whose labels came into doubt between two boards: what it is about, and how sure they are."""
+    sentences = []
+    for setup, again in zip(before.setups, doubted.setups, strict=True):
+        pairs = zip(setup.readings, again.readings, strict=True)
+        new = [f"{one.label} {100.0 * one.confidence:.0f} %" for was, one in pairs if one.confidence != was.confidence]
+        if new:
+            sentences.append(
+                f"setup {setup.name}: near this plate modes of one kind exchange their shapes (a veering), so that a "
+                f"label may be the neighbour's; taken as right with a probability of: {', '.join(new)}"
+            )
+    return tuple(sentences)
+
+
+def _confidences(model: SetupModel, values: Values) -> dict[Beams, float]:
+    """How sure each label is that may be another mode's: the share of plates that agree with the estimate."""
+    sure = {one.beams: one.frequency.mean for one in model.setup.readings if one.is_sure}
+    if not sure:
+        return {}
+    ranks = _ranks(model, values)
+    found = {}
+    for beams, hertz in sure.items():
+        others = [one for one in ranks if one != beams and _are_of_one_class(model.setup, one, beams)]
+        is_above = np.array([ranks[one] > ranks[beams] for one in others]).reshape(len(others), ranks[beams].size)
+        has_changed = is_above != is_above[:, :1]
+        in_order = [one in sure and (sure[one] >= hertz if above else sure[one] <= hertz)
+                    for one, above in zip(others, is_above[:, 0], strict=True)]  # fmt: skip
+        if has_changed[~np.array(in_order, dtype=bool)].any():
+            found[beams] = 1.0 - float(has_changed.any(axis=0).mean())
+    return found
+
+
+def _ranks(model: SetupModel, values: Values) -> dict[Beams, NDArray[np.intp]]:
+    """Rank of the mode that each product of beam functions names, at those draws that are a plate."""
+    assert model.exact is not None
+    reduced, weights = model.exact.reduced, model.system.weights(values)
+    try:
+        return reduced.ranks(weights)
+    except np.linalg.LinAlgError:
+        found = []
+        for i in range(len(weights.stiffness)):
+            with suppress(np.linalg.LinAlgError):
+                found.append(reduced.ranks(Weights(*(part[i : i + 1] for part in weights))))
+        return {beams: np.concatenate([one[beams] for one in found]) for beams in found[0]}
+
+
+def _are_of_one_class(setup: Setup, one: Beams, other: Beams) -> bool:
+    """Whether products of beam functions are even and odd alike: modes of other classes cross, and mix hardly.
+
+    That holds where an effect breaks the symmetry, too.
+    """
+    both = zip(one, other, (setup.ends_x, setup.ends_y), strict=True)
+    return all((a - b) % 2 == 0 for a, b, (first, last) in both if first == last)

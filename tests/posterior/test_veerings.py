@@ -1,0 +1,148 @@
+"""Labels near a veering: in doubt where they may be the neighbour's, sure where it makes no difference."""
+
+from __future__ import annotations
+
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import made_boards
+import numpy as np
+import pytest
+import ritz
+from calibration.sbc import random_lines
+from calibration.truths import Design, draw_truth, make_problem
+from scipy import stats
+from scipy.optimize import minimize
+
+from bayesplate.cards import load_prior
+from bayesplate.posterior.inference import PosedProblem, pose
+from bayesplate.posterior.veerings import with_doubts
+
+AT_THE_VEERING, BESIDE_IT = 0.0632, 0.08
+"""E_y / E_x at which (2,0) and (0,2), of one class, have half of each other's shape; and where they have little."""
+FIRST, SECOND = (2, 0), (0, 2)
+LABELS = ((1, 1), FIRST, SECOND, (2, 1), (1, 2), (3, 0), (2, 2))
+EXCHANGED = 71
+"""A simulation of the calibration whose estimate lies on the other side of a veering than its truth."""
+
+
+@cache
+def plate(ratio: float) -> tuple[ritz.Plate, dict[tuple[int, int], float]]:
+    """A free plate, and its frequencies by the shapes."""
+    material = 11e9, ratio * 11e9, 0.67e9, 0.4
+    made = ritz.Plate.from_moduli(*material, rho=406.0, h=2.8e-3, L_x=0.36, L_y=0.18, edges=ritz.ALL_FREE)
+    return made, dict(ritz.simulate(made, LABELS))
+
+
+def posed(ratio: float, changed: dict[tuple[int, int], float | None]) -> PosedProblem:
+    made, hertz = plate(ratio)
+    read = {label: f for label, f in (hertz | changed).items() if f is not None}
+    board = made_boards.board_of(made, [made_boards.setup_of(ritz.ALL_FREE, read)])
+    return pose(board, load_prior("weakly-informative"), law="exact")
+
+
+def in_doubt(problem: PosedProblem) -> dict[tuple[int, int], float]:
+    readings = (reading for setup in problem.board.setups for reading in setup.readings)
+    return {tuple(one.stated or one.label): one.confidence for one in readings if not one.is_sure}
+
+
+def test_labels_of_modes_that_were_both_read_in_their_order_are_sure():
+    """Which of the two shapes is called which makes no difference to their frequencies."""
+    problem = posed(AT_THE_VEERING, {})
+
+    assert in_doubt(problem) == {}
+    assert problem.veerings == ()
+
+
+def test_one_of_two_modes_at_a_veering_is_in_doubt_and_told():
+    problem = posed(AT_THE_VEERING, {SECOND: None})
+
+    assert list(in_doubt(problem)) == [FIRST]
+    assert 0.5 < in_doubt(problem)[FIRST] < 0.95
+    assert any(f"(2,0) {100 * in_doubt(problem)[FIRST]:.0f} %" in sentence for sentence in problem.doubts)
+
+
+def test_beside_the_veering_it_is_sure():
+    assert in_doubt(posed(BESIDE_IT, {SECOND: None})) == {}
+
+
+@pytest.mark.parametrize(
+    ("label", "factor", "left_out"), [((2, 1), 2.0, ()), ((2, 1), 10.0, (SECOND,)), ((3, 0), 1.25, ())]
+)
+def test_a_misread_frequency_puts_no_label_in_doubt(label, factor, left_out):
+    """It makes the estimate wrong, and the plates that look plausible with it; what is misread is told instead."""
+    _, hertz = plate(AT_THE_VEERING)
+    problem = posed(AT_THE_VEERING, {label: factor * hertz[label], **dict.fromkeys(left_out)})
+
+    assert in_doubt(problem) == {}
+    assert any("the readings scatter about the fitted plate" in sentence for sentence in problem.doubts)
+
+
+def test_a_truth_on_the_other_side_of_the_veering_is_as_likely_as_it_should_be(monkeypatch):
+    """Twice the log of the greatest density over that of the truth is a chi-square; with sure labels it is no such."""
+    design = Design(edges="both")
+    truth = draw_truth(design, random_lines(design.base_seed, EXCHANGED)[0])
+    doubted = make_problem(design, truth)
+    monkeypatch.setattr("bayesplate.posterior.inference.with_doubts", lambda board, *_: board)
+    sure = make_problem(design, truth)
+
+    def distance(problem: PosedProblem) -> float:
+        at_truth = float(problem.posterior(truth.theta(problem))[0])
+        best = minimize(
+            lambda x: -float(problem.posterior(x[None])[0]),
+            problem.centre,
+            method="Nelder-Mead",
+            options={"maxfev": 300},  # what it leaves to be found makes no distance larger
+        )
+        return 2.0 * (max(-best.fun, at_truth) - at_truth)
+
+    limit = stats.chi2.ppf(0.999, doubted.parameters.n_dim)
+    assert set(in_doubt(doubted)) == {FIRST, SECOND, (3, 1)}
+    assert in_doubt(sure) == {}
+    assert distance(doubted) < limit < distance(sure)
+
+
+def named_apart(ranks: dict[tuple[int, int], list[int]], hertz: dict[tuple[int, int], float], ends_y=("free", "free")):
+    """The confidences where products of beam functions name these ranks: at the estimate, then at other plates."""
+    ends = {"x0": "free", "x1": "free", "y0": ends_y[0], "y1": ends_y[1]}
+    board = made_boards.board_of(plate(BESIDE_IT)[0], [made_boards.setup_of(ends, hertz)])
+    every = {beams: np.array(one) for beams, one in ranks.items()}
+    model: Any = SimpleNamespace(
+        setup=board.setups[0],
+        exact=SimpleNamespace(reduced=SimpleNamespace(ranks=lambda _: every)),
+        system=SimpleNamespace(weights=lambda _: None),
+    )
+    found = with_doubts(board, [model], {})
+    return {one.beams: one.confidence for one in found.setups[0].readings if not one.is_sure}
+
+
+def test_the_confidence_is_the_share_of_plates_that_agree():
+    ranks = {(2, 0): [0, 0, 0, 1, 1], (0, 2): [1, 1, 1, 0, 2], (2, 2): [2, 2, 2, 2, 0]}
+    assert named_apart(ranks, {(2, 0): 100.0}) == {(2, 0): pytest.approx(3 / 5)}
+
+
+EXCHANGES = {(2, 0): [0, 0, 1, 0], (0, 2): [1, 1, 0, 1]}
+
+
+@pytest.mark.parametrize(
+    ("hertz", "n_doubted"),
+    [
+        ({(2, 0): 100.0, (0, 2): 101.0}, 0),
+        ({(2, 0): 100.0, (0, 2): 100.0}, 0),
+        ({(2, 0): 101.0, (0, 2): 100.0}, 2),
+        ({(2, 0): 100.0}, 1),
+        ({(0, 2): 100.0}, 1),
+    ],
+)
+def test_two_readings_are_in_doubt_where_their_order_is_not_that_of_the_modes(hertz, n_doubted):
+    assert len(named_apart(EXCHANGES, hertz)) == n_doubted
+
+
+def test_modes_of_different_classes_cross_and_leave_labels_sure():
+    """(1,2) is odd along x, (2,2) even: they hardly mix. Along y nothing is even where the edges differ."""
+    crossing = {(2, 2): [0, 1], (1, 2): [1, 0]}
+    assert named_apart(crossing, {(2, 2): 100.0}) == {}
+    clamped = {(2, 2): [0, 1], (2, 1): [1, 0]}
+    assert named_apart(clamped, {(2, 2): 100.0}) == {}
+    assert named_apart(clamped, {(2, 2): 100.0}, ("clamped", "free")) == {(2, 2): 0.5}
