@@ -75,12 +75,12 @@ class Moments:
 
         whole = board_journal.Journal.append
 
-        def append(journal: Any, key: str, row: Any) -> None:
+        def append(journal: Any, key: str, row: Any) -> int:
             if self.reached():
                 line = board_journal._line(key, row)
                 journal._stream.write(line[: len(line) * self.last // 7 % len(line)])
                 end()
-            whole(journal, key, row)
+            return whole(journal, key, row)
 
         board_journal.Journal.append = append  # type: ignore[method-assign]
 

@@ -19,7 +19,7 @@ from bayesplate.results.folder import writing
 
 
 class Journal:
-    """Rows of boards on disk, by key; in memory is only where they stand.
+    """Rows of boards on disk; in memory is only where those of earlier runs stand, by their keys.
 
     Parameters
     ----------
@@ -46,35 +46,35 @@ class Journal:
                 end += len(line)
         self._stream.truncate(end)
 
-    def __contains__(self, key: str) -> bool:
-        return key in self._places
+    def place(self, key: str) -> int | None:
+        """Where the row of a key stands; None where no earlier run left one."""
+        return self._places.get(key)
 
-    def row(self, key: str) -> BoardRow:
-        """The row of a key that is there."""
-        self._lines.seek(self._places[key])
-        return BoardRow.from_json(json.loads(self._lines.readline())["row"])
+    def row(self, place: int) -> BoardRow:
+        """The row that stands there."""
+        return BoardRow.from_json(json.loads(self._line(place))["row"])
 
-    def append(self, key: str, row: BoardRow) -> None:
-        """Add a row; raises UnwritableError at a full disk."""
+    def append(self, key: str, row: BoardRow) -> int:
+        """Add a row, and return where it stands; raises UnwritableError at a full disk."""
         line = _line(key, row)
         with writing(self.path):
             start = os.fstat(self._stream.fileno()).st_size
             if self._stream.write(line) != len(line):
                 self._stream.truncate(start)
                 raise OSError("no space left")
-            self._places[key] = start
+        return start
 
-    def rows(self, keys: Iterable[str]) -> Iterator[BoardRow]:
-        """The rows of keys, in their order."""
-        return (self.row(key) for key in keys)
+    def rows(self, places: Iterable[int]) -> Iterator[BoardRow]:
+        """The rows that stand there, in this order."""
+        return (self.row(place) for place in places)
 
-    def keep(self, keys: Iterable[str]) -> None:
-        """Write the journal anew with the rows of these keys alone, in their order; it is closed then."""
+    def keep(self, places: Iterable[int]) -> None:
+        """Write the journal anew with these rows alone, in this order; it is closed then."""
         partial = self.path.with_name(self.path.name + ".partial")
         with writing(self.path):
             try:
                 with partial.open("wb") as stream:
-                    stream.writelines(_line(key, self.row(key)) for key in keys)
+                    stream.writelines(self._line(place) for place in places)
                     stream.flush()
                     os.fsync(stream.fileno())
                 os.replace(partial, self.path)
@@ -86,6 +86,10 @@ class Journal:
         """Let go of the file."""
         self._stream.close()
         self._lines.close()
+
+    def _line(self, place: int) -> bytes:
+        self._lines.seek(place)
+        return self._lines.readline()
 
 
 def _line(key: str, row: BoardRow) -> bytes:

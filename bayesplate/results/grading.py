@@ -62,7 +62,8 @@ class Grading:
     names : tuple of str
     log_mean : (n, 7) array
         Of the names of `JOINT`.
-    log_covariance : (n, 7, 7) array
+    log_covariance : (n, 7, 7) array of float32
+        Half as large, for there may be very many boards; draws do not tell as many digits.
     meets : dict of (n,) array
         Probability of each limit by the name of its figure.
     meets_all : (n,) array or None
@@ -111,7 +112,7 @@ def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:
     Grading
     """
     names: list[str] = []
-    means, covariances = array("d"), array("d")
+    means, covariances = array("d"), array("f")
     for row in rows:
         if row.joint is not None:
             names.append(row.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.batch_summary import FORMAT, BatchSummary, Failure
 from bayesplate.results.board_journal import Journal
+from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.board_table import TableKind, require_table_kind, write_table
 from bayesplate.results.folder import OutputFolder, json_text, run_of_its_own, write_text
 from bayesplate.results.grading import Grading, GradingRequest, grade
@@ -142,11 +143,11 @@ def batch(
     journal = Journal(folder.path / JOURNAL)
     try:
         with _interruptions_told():
-            keys = run.fitted(by, journal, progress)
-        written = write_table(folder.path, table, journal.rows(keys))
-        graded = grade(journal.rows(keys), grading or GradingRequest())
-        summary = _summary(run, seed, journal, keys)
-        journal.keep(dict.fromkeys(keys))
+            places = run.fitted(by, journal, progress)
+        written = write_table(folder.path, table, journal.rows(places))
+        graded = grade(journal.rows(places), grading or GradingRequest())
+        summary = _summary(run, seed, journal.rows(places))
+        journal.keep(dict.fromkeys(places))
     finally:
         journal.close()
     write_text(folder.path / BATCH, json_text(summary))
@@ -180,11 +181,11 @@ def _interruptions_told() -> Iterator[None]:
         raise RunInterrupted("interrupted; --resume goes on with the boards that are left") from None
 
 
-def _summary(run: Run, seed: int, journal: Journal, keys: Sequence[str]) -> BatchSummary:
-    failures, n_fitted = [], 0
-    for row in journal.rows(keys):
+def _summary(run: Run, seed: int, rows: Iterable[BoardRow]) -> BatchSummary:
+    failures, n, n_fitted = [], 0, 0
+    for row in rows:
+        n += 1
         n_fitted += row.is_fitted
         if not row.is_fitted:
             failures.append(Failure(row.name, row.outcome, row.message))
-    n = len(keys)
     return BatchSummary(FORMAT, seed, run.versions, n, n_fitted, n - n_fitted, tuple(failures), tuple(run.boards.aside))

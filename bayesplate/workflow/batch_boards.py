@@ -67,10 +67,10 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self._path, self._inside = path, os.path.realpath(path)
-        self._files = sorted(file.name for file in path.glob("*.toml"))
+        self._strange: dict[int, str] = {}  # files whose name is not the board's
         entries, aside = [], []
         alike: dict[tuple[str, ...], tuple[str, ...]] = {}
-        for at, name in enumerate(self._files):
+        for at, name in enumerate(sorted(file.name for file in path.glob("*.toml"))):
             file = path / name
             content = _content_of(file) if self._is_inside(file) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
@@ -79,6 +79,8 @@ class Folder:
             else:
                 shared = _alike(content)
                 entries.append(Entry(plain(file.stem), at, alike.setdefault(shared, shared)))
+                if f"{entries[-1].name}.toml" != name:
+                    self._strange[at] = name
         if not entries:
             raise InputError(Fault(plain(str(path)), "a folder with board cards (NAME.toml)", "none in it"))
         self.entries: Sequence[Entry] = entries
@@ -86,7 +88,7 @@ class Folder:
 
     def card(self, entry: Entry) -> BoardCard:
         """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
-        path = self._path / self._files[entry.at]
+        path = self._path / self._strange.get(entry.at, f"{entry.name}.toml")
         if not self._is_inside(path):
             wanted, remedy = "a card in the folder of the batch", "copy the card"
             raise InputError(Fault(plain(path.name), wanted, "a link that leads out of it", remedy))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import closing
@@ -54,15 +55,19 @@ class Run:
     report: bool
     versions: Mapping[str, str] = field(default_factory=versions)
 
-    def fitted(self, by: Workers, journal: Journal, progress: Callable[[Progress], None] | None) -> list[str]:
-        """Fit the boards that the journal does not hold; the keys of all, in the order of their names."""
-        keys = [""] * len(self.boards.entries)
+    def fitted(self, by: Workers, journal: Journal, progress: Callable[[Progress], None] | None) -> array[int]:
+        """Fit the boards that the journal does not hold; where all their rows stand, in the order of their names."""
+        places = array("q", bytes(8 * len(self.boards.entries)))
+        refused: dict[str, int] = {}  # rows of boards of one name are alike
         done = _Done(len(self.boards.entries), progress)
 
         def write(at: int, key: str, row: BoardRow) -> None:
-            keys[at] = key
-            if key not in journal or journal.row(key) != row:
-                journal.append(key, row)
+            place = refused.get(key, journal.place(key))
+            if place is None or journal.row(place) != row:
+                place = journal.append(key, row)
+            if not row.is_fitted:
+                refused[key] = place
+            places[at] = place
             done.tell(row.is_fitted)
 
         def calls() -> Iterator[tuple[tuple[int, str, Entry, str, int], Call]]:
@@ -73,8 +78,8 @@ class Run:
                 posed = self._posed(entry, twice)
                 if isinstance(posed, BoardRow):
                     write(at, _hash("refused", posed.to_json()), posed)
-                elif self._is_done(posed.key, entry, journal):
-                    write(at, posed.key, journal.row(posed.key))
+                elif (row := self._done(posed.key, entry, journal)) is not None:
+                    write(at, posed.key, row)
                 else:
                     yield (at, posed.key, entry, posed.card_sha256, posed.seed), posed.call
 
@@ -82,14 +87,16 @@ class Run:
             for (at, key, entry, card_sha256, seed), future in answers:
                 row = _answer(entry, future)
                 write(at, key, row if row.is_fitted else replace(row, card_sha256=card_sha256, seed=seed))
-        return keys
+        return places
 
-    def _is_done(self, key: str, entry: Entry, journal: Journal) -> bool:
-        if key not in journal:
-            return False
-        row = journal.row(key)
+    def _done(self, key: str, entry: Entry, journal: Journal) -> BoardRow | None:
+        """The row of an earlier run, where there is one and the board need not be computed again."""
+        place = journal.place(key)
+        if place is None:
+            return None
+        row = journal.row(place)
         is_there = not self.folders or not row.is_fitted or (self.folder / BOARDS / entry.name / SUMMARY).is_file()
-        return row.outcome not in _AGAIN and is_there
+        return row if row.outcome not in _AGAIN and is_there else None
 
     def _posed(self, entry: Entry, twice: frozenset[str]) -> _Posed | BoardRow:
         """What is to be computed of a board, or the row that says why nothing is."""
