@@ -97,13 +97,13 @@ def spectra(models: Sequence[SetupModel], values: Values) -> dict[str, tuple[Mod
 
 
 def doubtful_labels(models: Sequence[SetupModel]) -> tuple[str, ...]:
-    """One sentence per labelled mode whose shape does not clearly fit its label."""
+    """One sentence per mode with a sure label that its shape does not clearly fit."""
     return tuple(
-        f"setup {model.setup.name}: the shape of mode {label} fits its label only to {place.correlation:.2f}; "
+        f"setup {model.setup.name}: the shape of mode {reading.label} fits its label only to {place.correlation:.2f}; "
         "it may be its neighbour at a veering"
         for model in models
-        for label, place in zip(model.setup.labels, model.places, strict=True)
-        if place.correlation < CERTAIN
+        for reading, place in zip(model.setup.readings, model.places, strict=True)
+        if reading.is_sure and place.correlation < CERTAIN
     )
 
 

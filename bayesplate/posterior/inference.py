@@ -146,7 +146,7 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
     if faults:
         raise InputError(faults)
     problem, draws = _posed(board, prior, law, robust)
-    if problem.posterior.law == "linear":  # which follows the shapes
+    if law == "linear":  # as it was asked for: it follows the shapes, not the ranks
         return problem
     named = problem.parameters.values(np.concatenate([problem.centre[None], draws[:_N_NAMED]]))
     doubted = with_doubts(problem.board, problem.posterior.models, named)

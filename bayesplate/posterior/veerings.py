@@ -58,7 +58,8 @@ def veering_remarks(before: Board, doubted: Board) -> tuple[str, ...]:
         if new:
             sentences.append(
                 f"setup {setup.name}: near this plate modes of one kind exchange their shapes (a veering), so that a "
-                f"label may be the neighbour's; taken as right with a probability of: {', '.join(new)}"
+                "figure may be the neighbour's; before the fit the label is taken as right with a probability of: "
+                f"{', '.join(new)}; a reading of the neighbour too, or another look at both figures, settles it"
             )
     return tuple(sentences)
 

@@ -16,6 +16,7 @@ from scipy import stats
 from scipy.optimize import minimize
 
 from bayesplate.cards import load_prior
+from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.veerings import with_doubts
 
@@ -35,11 +36,11 @@ def plate(ratio: float) -> tuple[ritz.Plate, dict[tuple[int, int], float]]:
     return made, dict(ritz.simulate(made, LABELS))
 
 
-def posed(ratio: float, changed: dict[tuple[int, int], float | None]) -> PosedProblem:
+def posed(ratio: float, changed: dict[tuple[int, int], float | None], law: LawName | None = None) -> PosedProblem:
     made, hertz = plate(ratio)
     read = {label: f for label, f in (hertz | changed).items() if f is not None}
     board = made_boards.board_of(made, [made_boards.setup_of(ritz.ALL_FREE, read)])
-    return pose(board, load_prior("weakly-informative"), law="exact")
+    return pose(board, load_prior("weakly-informative"), law=law)
 
 
 def in_doubt(problem: PosedProblem) -> dict[tuple[int, int], float]:
@@ -61,6 +62,12 @@ def test_one_of_two_modes_at_a_veering_is_in_doubt_and_told():
     assert list(in_doubt(problem)) == [FIRST]
     assert 0.5 < in_doubt(problem)[FIRST] < 0.95
     assert any(f"(2,0) {100 * in_doubt(problem)[FIRST]:.0f} %" in sentence for sentence in problem.doubts)
+
+
+def test_it_is_in_doubt_under_either_law_but_one_that_was_asked_to_follow_the_shapes():
+    assert posed(AT_THE_VEERING, {SECOND: None}).posterior.law == "linear"
+    assert list(in_doubt(posed(AT_THE_VEERING, {SECOND: None}, "exact"))) == [FIRST]
+    assert in_doubt(posed(AT_THE_VEERING, {SECOND: None}, "linear")) == {}
 
 
 def test_beside_the_veering_it_is_sure():
