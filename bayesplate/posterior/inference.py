@@ -28,7 +28,7 @@ from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
-from bayesplate.posterior.doubts import is_too_wide, slip_remarks
+from bayesplate.posterior.doubts import is_too_wide, noise_remarks, slip_remarks
 from bayesplate.posterior.first_labels import propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
@@ -84,8 +84,15 @@ class PosedProblem:
     def doubts(self) -> tuple[str, ...]:
         """What is unusual about the constants and the readings, before anything is sampled: a sentence each."""
         constants = unusual(self.board, self.prior, self.estimate.rigidities)
-        is_sure = not any(self.posterior.peaks)  # otherwise the assignments say what a label may be
-        return (*constants, *self.veerings, *(slip_remarks(self.posterior, self.centre) if is_sure else ()))
+        if any(self.posterior.peaks):  # whose assignments say what a label may be
+            return (*constants, *self.veerings, *noise_remarks(self.board, self.log_widening))
+        return (*constants, *slip_remarks(self.posterior, self.centre))
+
+    @property
+    def log_widening(self) -> float:
+        """ln of the noise at the centre over the median of its prior, of the setup where that is most."""
+        medians = np.array([setup.noise.median for setup in self.board.setups])
+        return float(np.max(self.parameters.log_noise(self.centre[None])[0] - np.log(medians)))
 
     def under(self, law: LawName) -> PosedProblem:
         """The same problem under the law of that name."""
@@ -156,16 +163,9 @@ def pose(board: Board, prior: PriorCard, *, law: LawName | None = None, robust: 
         again, _ = _posed(doubted, prior, law, robust)
     except NotIdentifiableError:
         return problem
-    if _scatters(again) and _scatters(problem):  # something else is wrong, and makes wrong plates look plausible
-        return problem
+    if all(is_too_wide(one.board, one.log_widening) for one in (problem, again)):
+        return problem  # something else is wrong, and makes wrong plates look plausible
     return replace(again, veerings=veering_remarks(problem.board, doubted))
-
-
-def _scatters(problem: PosedProblem) -> bool:
-    """Whether the readings scatter about the plate far beyond what the prior of the noise lets expect."""
-    medians = [setup.noise.median for setup in problem.board.setups]
-    log_noise = problem.parameters.log_noise(problem.centre[None])[0]
-    return is_too_wide(problem.board, float(np.max(log_noise - np.log(medians))))
 
 
 def _posed(board: Board, prior: PriorCard, law: LawName | None, robust: bool) -> tuple[PosedProblem, Floats]:
