@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,9 +144,11 @@ def batch(
     try:
         with _interruptions_told():
             places = run.fitted(by, journal, progress)
+        aside, versions = tuple(boards.aside), run.versions
+        del boards, run  # where the cards of very many boards stand is not needed any more
         written = write_table(folder.path, table, journal.rows(places))
         graded = grade(journal.rows(places), grading or GradingRequest())
-        summary = _summary(run, seed, journal.rows(places))
+        summary = _summary(journal.rows(places), seed, versions, aside)
         journal.keep(dict.fromkeys(places))
     finally:
         journal.close()
@@ -181,11 +183,11 @@ def _interruptions_told() -> Iterator[None]:
         raise RunInterrupted("interrupted; --resume goes on with the boards that are left") from None
 
 
-def _summary(run: Run, seed: int, rows: Iterable[BoardRow]) -> BatchSummary:
+def _summary(rows: Iterable[BoardRow], seed: int, versions: Mapping[str, str], aside: tuple[str, ...]) -> BatchSummary:
     failures, n, n_fitted = [], 0, 0
     for row in rows:
         n += 1
         n_fitted += row.is_fitted
         if not row.is_fitted:
             failures.append(Failure(row.name, row.outcome, row.message))
-    return BatchSummary(FORMAT, seed, run.versions, n, n_fitted, n - n_fitted, tuple(failures), tuple(run.boards.aside))
+    return BatchSummary(FORMAT, seed, versions, n, n_fitted, n - n_fitted, tuple(failures), aside)
