@@ -42,6 +42,11 @@ MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
 _ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.75, 24
 _MOST_PAIRS, _MOST_LABELLED, _MOST_BARS = 15, 12, 60
+_ASIDE, _LETTER = 8.0, 0.6 * SMALL
+"""Gap between a point and its name, and the width of a letter, points."""
+_STEPS = [sign * 0.5 * (SMALL + 6.0) + step - 0.5 * SMALL for one in range(30) for sign, step in
+          ((1.0, one * (SMALL + 1.0)), (-1.0, -one * (SMALL + 1.0)))]  # fmt: skip
+"""Heights of a name over its point, points: above or below its bar, or else as near as there is room."""
 _MOST_VECTORS = 1000
 """Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
 _NINETY = 1.645
@@ -105,15 +110,9 @@ def speed_picture(graded: Grading) -> Picture:
     width = max(float(np.ptp(density[0])), 0.05 * float(density[0].mean()))
     middle = 0.5 * float(density[0].min() + density[0].max())
     panel.set_xlim(middle - 0.65 * width, middle + 0.65 * width)
-    if len(graded.names) <= _MOST_LABELLED:
-        for rank, i in enumerate(np.argsort(speed[0])):
-            is_right = density[0][i] > middle
-            panel.annotate(
-                short(drawable(graded.names[i]), _LONGEST), (density[0][i], speed[0][i]),
-                (-5 if is_right else 5, 4 if rank % 2 else -10), textcoords="offset points", fontsize=SMALL,
-                ha="right" if is_right else "left", parse_math=False,
-            )  # fmt: skip
     _lines_of_equal_ratio(panel, speed[0] / density[0])
+    if len(graded.names) <= _MOST_LABELLED:
+        _name_points(panel, density[0], speed[0], [short(drawable(name), _LONGEST) for name in graded.names])
     panel.set_xlabel("density, kg/m³", fontsize=SMALL)
     panel.set_ylabel("wave speed along the grain, m/s", fontsize=SMALL)
     ratio = speed[0] / density[0]
@@ -126,6 +125,28 @@ def speed_picture(graded: Grading) -> Picture:
         + ("" if is_crowd else " Bars: 90 % intervals.")
     )
     return Picture("density-speed", "Light and stiff", alt, caption, figure)
+
+
+def _name_points(panel: Axes, x: Floats, y: Floats, names: Sequence[str]) -> None:
+    """A name beside each point, on the side with more room, as near as no name before it stands in its way."""
+    panel.set(xlim=panel.get_xlim(), ylim=panel.get_ylim())  # which do not change any more
+    points = panel.transData.transform(np.column_stack([x, y])) * 72.0 / panel.figure.dpi
+    middle = points[:, 0].mean()
+    taken: list[tuple[float, float, float]] = []  # left, right and lower ends of names, points
+
+    def is_free(left: float, right: float, low: float) -> bool:
+        return all(left > b or right < a or abs(low - other) > SMALL + 1.0 for a, b, other in taken)
+
+    for i in np.argsort(y):
+        side = -1.0 if points[i, 0] > middle else 1.0
+        left, right = sorted(points[i, 0] + side * at for at in (_ASIDE, _ASIDE + _LETTER * len(names[i])))
+        up = next(step for step in _STEPS if is_free(left, right, points[i, 1] + step))
+        taken.append((left, right, points[i, 1] + up))
+        panel.annotate(
+            names[i], (x[i], y[i]), (_ASIDE * side, up), textcoords="offset points", fontsize=SMALL,
+            ha="left" if side > 0 else "right", parse_math=False,
+            arrowprops={"arrowstyle": "-", "color": GREY, "lw": 0.5, "shrinkA": 0.0, "shrinkB": 3.0},
+        )  # fmt: skip
 
 
 def limits_picture(graded: Grading) -> Picture:

@@ -9,7 +9,7 @@ import pytest
 from payloads import DIRECTION_MARKS, PAYLOADS, shown
 from read_pages import Read, faults
 
-from bayesplate.report.grading_figures import MOST_NAMED
+from bayesplate.report.grading_figures import MOST_NAMED, speed_picture
 from bayesplate.report.grading_page import write_grading_page
 from bayesplate.results.batch_summary import BatchSummary, Failure
 from bayesplate.results.board_rows import BoardRow
@@ -40,6 +40,24 @@ def few(tmp_path_factory):
     folder = tmp_path_factory.mktemp("few")
     limits = {"E_x": (11e9, 13e9), "density": (None, 450.0)}
     return folder, *page_of(folder, 6, GradingRequest(limits=limits, rigidity=20.0))
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.05])
+def test_no_name_stands_over_another_whether_boards_have_one_density_or_many(spread):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Annotation, Text
+
+    rng = np.random.default_rng(7)
+    mean = LOG + rng.standard_normal((12, 7)) * np.r_[np.full(6, 0.05), spread]
+    joints = [Joint(JOINT, tuple(one), tuple(map(tuple, 4e-4 * np.eye(7)))) for one in mean]
+    rows = [BoardRow(f"half-top-{i:02}", "fitted", joint=joint) for i, joint in enumerate(joints)]
+    figure = speed_picture(grade(rows, GradingRequest())).figure
+    FigureCanvasAgg(figure).draw()
+    named = [one for one in figure.axes[0].get_children() if isinstance(one, Annotation) and "half" in one.get_text()]
+    boxes = [Text.get_window_extent(one) for one in named]
+
+    assert len(boxes) == 12
+    assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
 
 
 def test_the_page_says_what_was_found(few):
