@@ -41,7 +41,8 @@ from bayesplate.posterior.inference import PosedProblem, infer
 from bayesplate.posterior.sampling import SamplerSettings
 
 N_DRAWS = 99
-MOST_STEPS, MOST_ATTEMPTS = 5_000, 4
+MOST_STEPS, MOST_ATTEMPTS = 20_000, 4
+"""Steps of a run, as many as a user's takes by default, and runs."""
 Ranks = dict[str, int]
 HeldOut = Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
 
