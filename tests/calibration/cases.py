@@ -97,7 +97,7 @@ CASES: dict[str, Case] = {
     "stiffness_gradient": Case("cantilever-9", lambda v, p, at: planted.StiffnessGradient(v["gradient"]), "gradient"),
     "grain_angle": Case("cantilever-9", lambda v, p, at: planted.GrainAngle(v["angle"]), "angle"),
     "poisson_ratio": Case(
-        "cantilever-9", lambda v, p, at: planted.PoissonRatio(v["poisson_xy"]), "poisson_xy", {"poisson_xy": "0.4"}
+        "cantilever-9", lambda v, p, at: planted.PoissonRatio(v["nu_xy"]), "poisson_xy", {"poisson_xy": "0.4"}
     ),
 }
 """Every effect that has a parameter, on a design where the readings tell something of it; and a clamp whose grip is not

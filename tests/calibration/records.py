@@ -56,13 +56,17 @@ def add_to(
     records: list[Record] = []
     with ProcessPoolExecutor(workers) as pool, path.open("a") as file:
         futures = [pool.submit(simulate, *job) for job in jobs]
-        for count, future in enumerate(as_completed(futures), start=1):
-            records.append(future.result())
-            file.write(json.dumps(records[-1]) + "\n")
-            file.flush()
-            if not quiet and (count % 10 == 0 or count == len(futures)):
-                left = (time.perf_counter() - started) / count * (len(futures) - count)
-                print(f"{count} of {len(futures)} done, {left / 60:.1f} minutes left", file=sys.stderr, flush=True)
+        try:
+            for count, future in enumerate(as_completed(futures), start=1):
+                records.append(future.result())
+                file.write(json.dumps(records[-1]) + "\n")
+                file.flush()
+                if not quiet and (count % 10 == 0 or count == len(futures)):
+                    left = (time.perf_counter() - started) / count * (len(futures) - count)
+                    print(f"{count} of {len(futures)} done, {left / 60:.1f} minutes left", file=sys.stderr, flush=True)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)  # or all that are left would be simulated, and no record written
+            raise
     return records
 
 

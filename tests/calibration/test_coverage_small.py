@@ -72,6 +72,15 @@ def test_a_board_is_the_same_whenever_it_is_planted(boards):
     assert again["quantities"] == boards[0]["quantities"]
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_the_truth_of_every_case_can_be_drawn(name, tmp_path):
+    design = DESIGNS[CASES[name].design]
+    truth = draw_truth(name, prepared(tmp_path, name, unread(design), PLACE), PLACE, np.random.default_rng(1))
+    read = [hertz for one in truth.hertz.values() for hertz in one.values()]
+    assert len(read) == sum(len(setup.beams) for setup in design.setups)
+    assert min(read) > 0
+
+
 def test_an_interrupted_run_goes_on(boards, tmp_path):
     out = tmp_path / "coverage.jsonl"
     lines = [json.dumps(identity(SHORT)), *(json.dumps(record) for record in boards)]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import time
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from calibration import again, bare, campaign_ranks, joint, oracle
+from calibration.records import add_to, read_done
 from calibration.run import SECTIONS, Part, page, parts
 from calibration.table import is_calibrated, is_caught, rows
 from scipy import stats
@@ -192,3 +195,21 @@ def test_the_page_tells_of_a_part_that_was_not_run():
     assert "noise known, 50 data sets: agree" in text
     assert text.index("## Closed forms") < text.index("noise known") < text.index("## At the paper's boards")
     assert set(parts(1, 1, 1, 1)) == set(SECTIONS) - {"ranks"}
+
+
+def fails_first(folder, number):
+    """A simulation that another process can import: the first one fails, each other leaves a file."""
+    if number == 0:
+        raise KeyError(number)
+    time.sleep(0.02)
+    (Path(folder) / str(number)).touch()
+    return {"simulation": number}
+
+
+def test_a_simulation_that_fails_ends_the_run_and_no_other_is_begun(tmp_path):
+    out = tmp_path / "records.jsonl"
+    read_done(out, {})
+    (tmp_path / "done").mkdir()
+    with pytest.raises(KeyError):
+        add_to(out, fails_first, [(str(tmp_path / "done"), number) for number in range(100)], 1, quiet=True)
+    assert len(list((tmp_path / "done").iterdir())) < 50
