@@ -171,7 +171,7 @@ def test_long_names_of_several_setups_and_effects_are_not_cut_off(tmp_path):
     groups = pictures(two.inference, two.draws, two.summary, DIAGNOSES["named"])
     names = [one.name for found in groups.values() for one in found]
 
-    assert len(names) == len(set(names)) == 13
+    assert len(names) == len(set(names)) == 14
     assert {f"modes-{LONG_NAME}", "modes-free"} <= set(names)
     require_whole(one for found in groups.values() for one in found)
 
