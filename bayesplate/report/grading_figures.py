@@ -24,6 +24,7 @@ from bayesplate.report.style import (
     Picture,
     drawable,
     legend_below,
+    moved_apart,
     short,
     stacked,
 )
@@ -42,11 +43,8 @@ MOST_NAMED = 30
 """Boards up to which each has a row with its name; more are drawn in the order of their size, without names."""
 _ROW, _CROWD, _LEFT, _LONGEST = 0.2, 1.6, 1.75, 24
 _MOST_PAIRS, _MOST_LABELLED, _MOST_BARS = 15, 12, 60
-_ASIDE, _LETTER = 8.0, 0.6 * SMALL
-"""Gap between a point and its name, and the width of a letter, points."""
-_STEPS = [sign * 0.5 * (SMALL + 6.0) + step - 0.5 * SMALL for one in range(30) for sign, step in
-          ((1.0, one * (SMALL + 1.0)), (-1.0, -one * (SMALL + 1.0)))]  # fmt: skip
-"""Heights of a name over its point, points: above or below its bar, or else as near as there is room."""
+_ASIDE, _ABOVE, _LINE = 8.0, 3.0, SMALL + 2.0
+"""Points from a point to its name, beside and above its bar, and from one name to the next."""
 _MOST_VECTORS = 1000
 """Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
 _NINETY = 1.645
@@ -128,23 +126,17 @@ def speed_picture(graded: Grading) -> Picture:
 
 
 def _name_points(panel: Axes, x: Floats, y: Floats, names: Sequence[str]) -> None:
-    """A name beside each point, on the side with more room, as near as no name before it stands in its way."""
+    """A name beside each point, on the side with more room, moved apart where names would overlap."""
     panel.set(xlim=panel.get_xlim(), ylim=panel.get_ylim())  # which do not change any more
-    points = panel.transData.transform(np.column_stack([x, y])) * 72.0 / panel.figure.dpi
-    middle = points[:, 0].mean()
-    taken: list[tuple[float, float, float]] = []  # left, right and lower ends of names, points
-
-    def is_free(left: float, right: float, low: float) -> bool:
-        return all(left > b or right < a or abs(low - other) > SMALL + 1.0 for a, b, other in taken)
-
-    for i in np.argsort(y):
-        side = -1.0 if points[i, 0] > middle else 1.0
-        left, right = sorted(points[i, 0] + side * at for at in (_ASIDE, _ASIDE + _LETTER * len(names[i])))
-        up = next(step for step in _STEPS if is_free(left, right, points[i, 1] + step))
-        taken.append((left, right, points[i, 1] + up))
+    height = panel.get_window_extent().height * 72.0 / panel.figure.dpi
+    order = np.argsort(y)
+    low, high = panel.get_ylim()
+    wanted = (y[order] - low) / (high - low) + _ABOVE / height
+    right = x > 0.5 * (x.min() + x.max())
+    for i, up in zip(order, (moved_apart(wanted, _LINE / height) - wanted) * height + _ABOVE, strict=True):
         panel.annotate(
-            names[i], (x[i], y[i]), (_ASIDE * side, up), textcoords="offset points", fontsize=SMALL,
-            ha="left" if side > 0 else "right", parse_math=False,
+            names[i], (x[i], y[i]), (-_ASIDE if right[i] else _ASIDE, up), textcoords="offset points", fontsize=SMALL,
+            ha="right" if right[i] else "left", parse_math=False,
             arrowprops={"arrowstyle": "-", "color": GREY, "lw": 0.5, "shrinkA": 0.0, "shrinkB": 3.0},
         )  # fmt: skip
 

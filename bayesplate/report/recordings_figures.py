@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.modes_found import Path
@@ -24,6 +23,7 @@ from bayesplate.report.style import (
     Picture,
     drawable,
     legend_below,
+    moved_apart,
     short,
     stacked,
 )
@@ -181,25 +181,12 @@ def _names(panel: Axes, peaks: Sequence[PickedRow]) -> None:
         return
     low, high = np.log(panel.get_xlim())
     wanted = (np.log([peak.hz for peak in peaks]) - low) / (high - low)
-    for place, true, peak in zip(_moved_apart(wanted), wanted, peaks, strict=True):
+    for place, true, peak in zip(moved_apart(wanted, _APART), wanted, peaks, strict=True):
         panel.plot([true, place], [1.0, 1.04], transform=panel.transAxes, color=DARK, lw=0.4, clip_on=False)
         label = f" {peak.labels[0].label}" if peak.labels and peak.labels[0].probability > 0.5 else ""
         words = f"{peak.hz:.1f}{label}"
         at: dict[str, Any] = {"transform": panel.transAxes, "rotation": 90, "ha": "center", "va": "bottom"}
         panel.text(place, 1.05, words, fontsize=SMALL - 1.5, **at)
-
-
-def _moved_apart(wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places at least a label apart, in the order of the wanted ones, within the panel."""
-    placed = wanted.copy()
-    for _ in range(2000):
-        lacking = np.maximum(_APART - np.diff(placed), 0.0)
-        if lacking.max(initial=0.0) < 1e-4:
-            break
-        placed[:-1] -= 0.5 * lacking
-        placed[1:] += 0.5 * lacking
-        placed = np.clip(placed, 0.0, 1.0)
-    return placed
 
 
 def _line(colour: str, words: str, style: str = "-") -> object:

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.report.style import BLUE, DARK, GREY, ORANGE, SMALL, Picture, stacked
+from bayesplate.report.style import BLUE, DARK, GREY, ORANGE, SMALL, Picture, moved_apart, stacked
 from bayesplate.results.peaks import UNNAMED, Spectrum
 from bayesplate.results.summary import Summary
 
@@ -86,27 +85,13 @@ def _write(panel: Axes, at: Sequence[float], names: Sequence[str], height: float
     low, high = np.log(panel.get_xlim())
     order = np.argsort(at, kind="stable")
     wanted = (np.log(np.array(at)[order]) - low) / (high - low)
-    placed = _apart(wanted)
+    placed = moved_apart(wanted, _APART)
     for place, true, i in zip(placed, wanted, order, strict=True):
         x, x_true = np.exp(low + (high - low) * np.array([place, true]))
         inner = height - 0.05 * np.sign(height)
         outer = height + 0.08 * np.sign(height)
         panel.plot([x_true, x], [inner, outer], color=DARK, lw=0.4)
         panel.text(x, outer, names[i], rotation=90, ha="center", va=side, fontsize=SMALL - 1.5)
-
-
-def _apart(wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places in the order of the wanted ones, at least a label apart, within the panel, near where they are wanted."""
-    placed = wanted.copy()
-    for _ in range(2000):
-        gaps = np.diff(placed)
-        short = np.maximum(_APART - gaps, 0.0)
-        if short.max(initial=0.0) < 1e-4:
-            break
-        placed[:-1] -= 0.5 * short
-        placed[1:] += 0.5 * short
-        placed = np.clip(placed, 0.0, 1.0)
-    return placed
 
 
 def _short(label: str) -> str:

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -98,6 +101,19 @@ def legend_below(figure: Figure, handles: Sequence[Any], n_columns: int) -> None
         handles=list(handles), loc="lower center", ncols=n_columns, frameon=False, fontsize=SMALL, borderaxespad=0.1,
         columnspacing=1.2, handletextpad=0.5, handlelength=1.6,
     )  # fmt: skip
+
+
+def moved_apart(wanted: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+    """Places from 0 to 1, at least so far apart, near where they are wanted, which is in rising order."""
+    placed = wanted.copy()
+    for _ in range(2000):
+        lacking = np.maximum(least - np.diff(placed), 0.0)
+        if lacking.max(initial=0.0) < 1e-4:
+            break
+        placed[:-1] -= 0.5 * lacking
+        placed[1:] += 0.5 * lacking
+        placed = np.clip(placed, 0.0, 1.0)
+    return placed
 
 
 def short(text: str, longest: int) -> str:

@@ -60,14 +60,14 @@ def proposed_pairs(log_mean: Floats, log_covariance: Floats, percent: Mapping[st
     mean = log_mean @ along.T
     covariance = np.einsum("ai,nij,bj->nab", along, log_covariance, along)
     either = _candidates(mean, np.diagonal(covariance, axis1=1, axis2=2), width)
-    found = np.empty(len(either), dtype=np.float32)
+    found = np.empty(len(either))
     for start in range(0, len(either), _AT_ONCE):
         some = slice(start, start + _AT_ONCE)
         a, b = np.divmod(either[some], len(mean))
         found[some] = box_probability(mean[a] - mean[b], covariance[a] + covariance[b], -width, width)
+    pairs, taken = [], np.zeros(len(mean), dtype=bool)
     may_match = found >= LEAST_PROBABILITY
     either, found = either[may_match], found[may_match]
-    pairs, taken = [], np.zeros(len(mean), dtype=bool)
     for i in np.argsort(-found, kind="stable"):
         first, second = divmod(int(either[i]), len(mean))
         if not taken[first] and not taken[second]:
@@ -103,6 +103,4 @@ def _candidates(mean: Floats, variance: Floats, width: Floats) -> Rows:
         nearest = np.flatnonzero(may_match)[np.argsort(-together, kind="stable")[:_NEAREST]]
         own, other = order[i], order[start + nearest]
         either.frombytes((n * np.minimum(own, other) + np.maximum(own, other)).tobytes())
-    found = np.frombuffer(either, dtype=np.int64)
-    found.sort()
-    return found[np.diff(found, prepend=-1) > 0]
+    return np.unique(np.frombuffer(either, dtype=np.int64))

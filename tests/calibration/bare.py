@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 from calibration.records import Record
-from calibration.sbc import posterior_draws, random_lines, ranks_among
+from calibration.sbc import posterior_draws, random_lines, ranked, ranks_among
 from calibration.truths import Design, Truth, noises_of, prior_values, reference, under_the_fixed_law
 from made_boards import NARROW, peaks_of
 from numpy.typing import NDArray
@@ -96,14 +96,7 @@ def simulate_one(index: int) -> Record:
         ranks[HALF_NOISE] = ranks_among(wrong, truth, posterior_draws(wrong, DESIGN, for_mutants)[0], unread)
     except BayesplateError as error:
         return record | {"error": f"{type(error).__name__}: {error}"}
-    return record | {
-        "ranks": ranks,
-        "seconds": round(time.perf_counter() - started, 2),
-        "law": "linear",
-        "attempts": attempts,
-        "relabelled": False,
-        "peaks": len(setup.peaks),
-    }
+    return record | ranked(ranks, started, attempts=attempts) | {"peaks": len(setup.peaks)}
 
 
 def identity() -> Record:

@@ -12,7 +12,7 @@ from dataclasses import asdict
 
 import numpy as np
 from calibration.records import Record
-from calibration.sbc import MOST_STEPS, held_out, random_lines, ranked_draws, ranks_among
+from calibration.sbc import MOST_STEPS, held_out, random_lines, ranked, ranked_draws, ranks_among
 from calibration.truths import Design, Truth, draw_truth, make_problem, reference
 
 from bayesplate.campaigns.boards import Member
@@ -109,21 +109,14 @@ def simulate_one(index: int, times: int = 2) -> Record:
         learnt = learnt_from(truths, for_draws)
         inference, draws, effective = learnt.board(0, for_draws, int(for_draws.integers(2**31)))
         unread = held_out(DESIGN, inference.problem)
-        of_board = ranks_among(inference.problem, truths[0], ranked_draws(draws.flat, for_draws), unread)
-        ranks = {"production": {**of_board, "shared": rank_of_shared(learnt.chains, truths[0], for_draws)}}
+        own = ranks_among(inference.problem, truths[0], ranked_draws(draws.flat, for_draws), unread)
+        ranks = {"production": {**own, "shared": rank_of_shared(learnt.chains, truths[0], for_draws)}}
         often = repeated(learnt, times, for_mutants)
         ranks[TWICE] = {"shared": rank_of_shared(often, truths[0], for_mutants)}
     except BayesplateError as error:
         return record | {"error": f"{type(error).__name__}: {error}"}
-    return record | {
-        "ranks": ranks,
-        "seconds": round(time.perf_counter() - started, 2),
-        "law": "linear",
-        "attempts": 1,
-        "relabelled": False,
-        "effective": round(effective),
-        "astray": round(float(learnt.astray.max()), 2),
-    }
+    of_board = {"effective": round(effective), "astray": round(float(learnt.astray.max()), 2)}
+    return record | ranked(ranks, started) | of_board
 
 
 def identity() -> Record:

@@ -41,7 +41,7 @@ from bayesplate.posterior.inference import PosedProblem, infer
 from bayesplate.posterior.sampling import SamplerSettings
 
 N_DRAWS = 99
-MOST_STEPS, MOST_ATTEMPTS = 20_000, 4
+MOST_STEPS, MOST_ATTEMPTS = SamplerSettings.max_steps, 4
 """Steps of a run, as many as a user's takes by default, and runs."""
 Ranks = dict[str, int]
 HeldOut = Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
@@ -163,13 +163,21 @@ def simulate_one(design: Design, index: int, mutants: Sequence[str] = ()) -> dic
     except BayesplateError as error:
         return record | {"error": f"{type(error).__name__}: {error}"}
     refused = add_mutants(mutants, design, truth, problem, for_mutants, ranks)
-    return record | {
+    relabelled = bool(truth.ranks_in_class) and truth.ranks_in_class != places
+    told = ranked(ranks, started, problem.posterior.law, attempts, relabelled=relabelled)
+    return record | told | ({"refused": refused} if mutants else {})
+
+
+def ranked(
+    ranks: dict[str, Ranks], started: float, law: str = "linear", attempts: int = 1, *, relabelled: bool = False
+) -> dict[str, Any]:
+    """What a record says of a simulation whose ranks were found."""
+    return {
         "ranks": ranks,
-        **({"refused": refused} if mutants else {}),
         "seconds": round(time.perf_counter() - started, 2),
-        "law": problem.posterior.law,
+        "law": law,
         "attempts": attempts,
-        "relabelled": bool(truth.ranks_in_class) and truth.ranks_in_class != places,
+        "relabelled": relabelled,
     }
 
 

@@ -212,4 +212,4 @@ def test_a_simulation_that_fails_ends_the_run_and_no_other_is_begun(tmp_path):
     (tmp_path / "done").mkdir()
     with pytest.raises(KeyError):
         add_to(out, fails_first, [(str(tmp_path / "done"), number) for number in range(100)], 1, quiet=True)
-    assert len(list((tmp_path / "done").iterdir())) < 50
+    assert len(list((tmp_path / "done").iterdir())) < 50  # those that were handed on; all 99 if the run went on
