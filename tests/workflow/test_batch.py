@@ -282,6 +282,19 @@ def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
     assert len(two.setups[0].frequencies_hz) == 4
 
 
+def test_two_boards_of_one_name_have_two_rows_and_one_line_whether_begun_or_gone_on_with(table, tmp_path):
+    header, row = TABLE.splitlines()[0], next(line for line in TABLE.splitlines() if line.startswith("twice,"))
+    (tmp_path / "tops.csv").write_text("\n".join([header, row, row]) + "\n")
+    folder, template = tmp_path / "out", tmp_path / "template.toml"
+    found = []
+    for resume in (False, True):
+        result = bayesplate.batch(table, folder, template=template, resume=resume, report=False)
+        found.append((result.table.read_bytes(), (folder / "boards.jsonl").read_bytes()))
+
+    assert found[0] == found[1]
+    assert (found[0][0].count(b"more than once"), found[0][1].count(b"\n")) == (2, 1)
+
+
 def test_bad_rows_are_rows_of_the_table_and_no_name_leaves_the_folder(table, tmp_path, monkeypatch):
     """Nothing is computed here: what the good rows give is another test's. Names are cells that no sheet executes."""
     monkeypatch.setattr(
