@@ -174,7 +174,7 @@ def pairs_picture(graded: Grading) -> Picture:
     for row, pair in enumerate(shown):
         both = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
-            mean, sd = FIGURES[name].log(graded.log_mean[both], graded.log_covariance[both])
+            mean, sd = FIGURES[name].log(graded.log_mean[both], graded.triangles[both])
             apart, spread = float(mean[1] - mean[0]), _NINETY * float(np.sqrt((sd**2).sum()))
             low, middle, high = (100.0 * np.expm1(apart + at * spread) for at in (-1.0, 0.0, 1.0))
             colour, marker = _COLOURS[name]

@@ -5,14 +5,13 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
 from bayesplate.results.board_rows import BoardRow
-from bayesplate.results.log_figures import FIGURES, LogFigure, target_thickness
+from bayesplate.results.log_figures import FIGURES, LogFigure, covariance_along, target_thickness, triangle
 from bayesplate.results.normal_box import box_probability
 from bayesplate.results.pairs import Pair, proposed_pairs
 
@@ -62,8 +61,8 @@ class Grading:
     names : tuple of str
     log_mean : (n, 7) array
         Of the names of `JOINT`.
-    log_covariance : (n, 7, 7) array of float32
-        Half as large, for there may be very many boards; draws do not tell as many digits.
+    triangles : (n, 28) array of float32
+        Upper ones of the covariance: for there may be very many boards, and draws do not tell more digits.
     meets : dict of (n,) array
         Probability of each limit by the name of its figure.
     meets_all : (n,) array or None
@@ -74,14 +73,14 @@ class Grading:
     request: GradingRequest
     names: tuple[str, ...]
     log_mean: Floats
-    log_covariance: Floats
+    triangles: Floats
     meets: Mapping[str, Floats]
     meets_all: Floats | None
     pairs: tuple[Pair, ...]
 
     def spread(self, figure: LogFigure) -> tuple[Floats, Floats, Floats]:
         """Median, and the ends of the 90 % interval of each board, in the unit of people: (n,) arrays."""
-        mean, sd = figure.log(self.log_mean, self.log_covariance)
+        mean, sd = figure.log(self.log_mean, self.triangles)
         middle, low, high = (np.exp(mean + at * sd) / figure.per_unit for at in (0.0, -_NINETY, _NINETY))
         return middle, low, high
 
@@ -112,21 +111,20 @@ def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:
     Grading
     """
     names: list[str] = []
-    means, covariances = array("d"), array("f")
+    means, triangles = array("d"), array("f")
     for row in rows:
         if row.joint is not None:
             names.append(row.name)
             means.extend(row.joint.log_mean)
-            covariances.extend(chain.from_iterable(row.joint.log_covariance))
-    n = len(names)
-    log_mean, log_covariance = np.reshape(means, (n, 7)), np.reshape(covariances, (n, 7, 7))
-    meets, meets_all = _meets(log_mean, log_covariance, request.limits)
-    pairs = proposed_pairs(log_mean, log_covariance, request.match_percent)
-    return Grading(request, tuple(names), log_mean, log_covariance, meets, meets_all, pairs)
+            triangles.extend(triangle(row.joint.log_covariance))
+    log_mean, upper = np.reshape(means, (len(names), 7)), np.reshape(triangles, (len(names), 28))
+    meets, meets_all = _meets(log_mean, upper, request.limits)
+    pairs = proposed_pairs(log_mean, upper, request.match_percent)
+    return Grading(request, tuple(names), log_mean, upper, meets, meets_all, pairs)
 
 
 def _meets(
-    log_mean: Floats, log_covariance: Floats, limits: Mapping[str, tuple[float | None, float | None]]
+    log_mean: Floats, triangles: Floats, limits: Mapping[str, tuple[float | None, float | None]]
 ) -> tuple[dict[str, Floats], Floats | None]:
     """The probability of each limit, and of all."""
     if not limits:
@@ -135,7 +133,7 @@ def _meets(
     offset = np.log([FIGURES[name].factor for name in limits])
     low = np.array([-np.inf if one is None else np.log(one) for one, _ in limits.values()])
     high = np.array([np.inf if one is None else np.log(one) for _, one in limits.values()])
-    mean, covariance = log_mean @ along.T + offset, along @ log_covariance @ along.T
+    mean, covariance = log_mean @ along.T + offset, covariance_along(along, triangles)
     each = {
         name: box_probability(mean[:, i : i + 1], covariance[:, i : i + 1, i : i + 1], low[i : i + 1], high[i : i + 1])
         for i, name in enumerate(limits)

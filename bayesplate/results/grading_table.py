@@ -77,7 +77,7 @@ def _head(name: str, figure: LogFigure) -> str:
 
 def _column(graded: Grading, figure: LogFigure) -> list[str]:
     middle = graded.spread(figure)[0]
-    sd = figure.log(graded.log_mean, graded.log_covariance)[1]
+    sd = figure.log(graded.log_mean, graded.triangles)[1]
     return [plus_minus(_Number(float(one), float(one * share))) for one, share in zip(middle, sd, strict=True)]
 
 
@@ -104,7 +104,7 @@ def _pairs_table(graded: Grading, most: int) -> Table:
 def _apart(graded: Grading, first: int, second: int, name: str) -> str:
     """By how much a constant of the second board differs from the first one's, with the standard deviation."""
     both = [first, second]
-    mean, sd = FIGURES[name].log(graded.log_mean[both], graded.log_covariance[both])
+    mean, sd = FIGURES[name].log(graded.log_mean[both], graded.triangles[both])
     ratio = math.exp(mean[1] - mean[0])
     return f"{100.0 * (ratio - 1.0):+.0f} ± {100.0 * ratio * math.hypot(*sd):.0f} %"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,11 +42,37 @@ class LogFigure:
         """The powers in the order of `JOINT`: (7,) array."""
         return np.array([self.powers.get(name, 0.0) for name in JOINT])
 
-    def log(self, log_mean: Floats, log_covariance: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard deviation of its logarithm, SI: (n,) arrays from (n, 7) and (n, 7, 7) arrays."""
-        along = self.direction
-        variance = np.einsum("i,nij,j->n", along, log_covariance, along)
-        return log_mean @ along + np.log(self.factor), np.sqrt(np.maximum(variance, 0.0))
+    def log(self, log_mean: Floats, triangles: Floats) -> tuple[Floats, Floats]:
+        """Mean and standard deviation of its logarithm, SI: (n,) arrays from (n, 7) and (n, 28) arrays."""
+        variance = covariance_along(self.direction[None], triangles)[:, 0, 0]
+        return log_mean @ self.direction + np.log(self.factor), np.sqrt(np.maximum(variance, 0.0))
+
+
+_ROW, _COLUMN = np.triu_indices(len(JOINT))
+
+
+def triangle(log_covariance: Sequence[Sequence[float]]) -> list[float]:
+    """The upper triangle of a covariance of `JOINT`, row after row: 28 numbers say all of it."""
+    return [log_covariance[i][j] for i, j in zip(_ROW.tolist(), _COLUMN.tolist(), strict=True)]
+
+
+def covariance_along(directions: Floats, triangles: Floats) -> Floats:
+    """Covariance of some sums of logarithms.
+
+    Parameters
+    ----------
+    directions : (k, 7) array
+        Their coefficients.
+    triangles : (n, 28) array
+        Of each board's covariance.
+
+    Returns
+    -------
+    (n, k, k) array
+    """
+    product = directions[:, None, _ROW] * directions[None, :, _COLUMN]
+    both = np.where(_ROW == _COLUMN, product, product + product.swapaxes(0, 1))
+    return np.einsum("np,abp->nab", triangles, both)
 
 
 def _along(axis: str) -> dict[str, LogFigure]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _N_POINTS = 1024
-_AT_ONCE = 128
+_AT_ONCE = 8
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 MOST = len(_PRIMES) + 1
 """Numbers that may be limited together."""

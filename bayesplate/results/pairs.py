@@ -9,16 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.results.log_figures import FIGURES
+from bayesplate.results.log_figures import FIGURES, covariance_along
 from bayesplate.results.normal_box import box_probability
 
 Floats = NDArray[np.float64]
-Rows = NDArray[np.intp]
+Rows = NDArray[np.signedinteger]
 
 _NEAREST = 12
 """Partners that are looked at for each board."""
-_AT_ONCE = 1_000
-"""Pairs whose probability is computed together, so that the memory hardly grows with the number of boards."""
+_AT_ONCE = 16
+"""Boards whose pairs are judged together, so that the memory hardly grows with the number of boards."""
 LEAST_PROBABILITY = 0.05
 """Pairs that match with less are not proposed."""
 
@@ -32,7 +32,7 @@ class Pair:
     probability: float
 
 
-def proposed_pairs(log_mean: Floats, log_covariance: Floats, percent: Mapping[str, float]) -> tuple[Pair, ...]:
+def proposed_pairs(log_mean: Floats, triangles: Floats, percent: Mapping[str, float]) -> tuple[Pair, ...]:
     """Pairs of boards, each board at most once, the likeliest match first.
 
     Two boards match if each constant of the one is that of the other within its tolerance:
@@ -44,7 +44,8 @@ def proposed_pairs(log_mean: Floats, log_covariance: Floats, percent: Mapping[st
     ----------
     log_mean : (n, 7) array
         Of the names of `JOINT`.
-    log_covariance : (n, 7, 7) array
+    triangles : (n, 28) array
+        Upper ones of their covariance.
     percent : dict of float
         Tolerance of each figure that has to match.
 
@@ -58,49 +59,63 @@ def proposed_pairs(log_mean: Floats, log_covariance: Floats, percent: Mapping[st
     along = np.stack([FIGURES[name].direction for name in percent])
     width = np.log1p(np.array(list(percent.values())) / 100.0)
     mean = log_mean @ along.T
-    covariance = np.einsum("ai,nij,bj->nab", along, log_covariance, along)
-    either = _candidates(mean, np.diagonal(covariance, axis1=1, axis2=2), width)
-    found = np.empty(len(either))
-    for start in range(0, len(either), _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
-        a, b = np.divmod(either[some], len(mean))
-        found[some] = box_probability(mean[a] - mean[b], covariance[a] + covariance[b], -width, width)
+    variances = (covariance_along(one[None], triangles)[:, 0, 0] for one in along)
+    nearest = _nearest(mean, np.stack(list(variances), axis=1), width)
+    firsts, seconds, probabilities = array("i"), array("i"), array("d")
+    for start in range(0, len(mean), _AT_ONCE):
+        one, other = _pairs_of(nearest, start, start + _AT_ONCE)
+        covariance = covariance_along(along, triangles[one]) + covariance_along(along, triangles[other])
+        probability = box_probability(mean[one] - mean[other], covariance, -width, width)
+        may_match = probability >= LEAST_PROBABILITY
+        firsts.extend(one[may_match])
+        seconds.extend(other[may_match])
+        probabilities.extend(probability[may_match])
+    first, second, found = np.asarray(firsts), np.asarray(seconds), np.asarray(probabilities)
     pairs, taken = [], np.zeros(len(mean), dtype=bool)
-    may_match = found >= LEAST_PROBABILITY
-    either, found = either[may_match], found[may_match]
-    for i in np.argsort(-found, kind="stable"):
-        first, second = divmod(int(either[i]), len(mean))
-        if not taken[first] and not taken[second]:
-            pairs.append(Pair(first, second, float(found[i])))
-            taken[[first, second]] = True
+    for i in np.lexsort((second, first, -found)):
+        if not taken[first[i]] and not taken[second[i]]:
+            pairs.append(Pair(int(first[i]), int(second[i]), float(found[i])))
+            taken[[first[i], second[i]]] = True
     return tuple(pairs)
 
 
-def _candidates(mean: Floats, variance: Floats, width: Floats) -> Rows:
-    """The likeliest partners of each board if the constants were independent: n first + second, each pair once.
+def _pairs_of(nearest: Rows, start: int, end: int) -> tuple[Rows, Rows]:
+    """The pairs of some boards with their partners: two (n_pairs,) arrays, the first board before the second.
+
+    Among the pairs of all boards each is there once.
+    """
+    own = np.arange(start, min(end, len(nearest)))[:, None]
+    partners = nearest[own[:, 0]]
+    is_mutual = np.any(nearest[partners] == own[:, :, None], axis=2)
+    row, column = np.nonzero((partners >= 0) & ((own < partners) | ~is_mutual))
+    one, other = own[row, 0], partners[row, column]
+    return np.minimum(one, other), np.maximum(one, other)
+
+
+def _nearest(mean: Floats, variance: Floats, width: Floats) -> Rows:
+    """The likeliest partners of each board if the constants were independent: (n, 12) array, -1 where there are fewer.
 
     Only boards that may match at all are looked at: that a figure of two of them is between two limits is no more
     probable than that it is below the upper one. Along the first figure those boards are neighbours.
     """
     from scipy.special import ndtr, ndtri
 
-    n = len(mean)
+    found = np.full((len(mean), _NEAREST), -1, dtype=np.int32)
     farthest = -ndtri(LEAST_PROBABILITY)  # standard deviations beyond the width
     order = np.argsort(mean[:, 0], kind="stable")
     mean, variance = mean[order], variance[order]
     reach = width[0] + farthest * np.sqrt(variance[:, 0] + variance[:, 0].max())
     starts = np.searchsorted(mean[:, 0], mean[:, 0] - reach)
     ends = np.searchsorted(mean[:, 0], mean[:, 0] + reach, side="right")
-    either = array("q")
     for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        apart = np.abs(mean[start:end] - mean[i])
-        sd = np.sqrt(np.maximum(variance[start:end] + variance[i], 1e-24))
-        may_match = np.all(apart <= width + farthest * sd, axis=1)
-        may_match[i - start] = False
-        apart, sd = apart[may_match], sd[may_match]
+        others = np.delete(np.arange(start, end), i - start)
+        for k, limit in enumerate(width):
+            far = limit + farthest * np.sqrt(variance[others, k] + variance[i, k])
+            others = others[np.abs(mean[others, k] - mean[i, k]) <= far]
+        apart = np.abs(mean[others] - mean[i])
+        sd = np.sqrt(np.maximum(variance[others] + variance[i], 1e-24))
         within = ndtr((width - apart) / sd) - ndtr((-width - apart) / sd)
         together = np.log(np.maximum(within, 1e-300)).sum(axis=1)
-        nearest = np.flatnonzero(may_match)[np.argsort(-together, kind="stable")[:_NEAREST]]
-        own, other = order[i], order[start + nearest]
-        either.frombytes((n * np.minimum(own, other) + np.maximum(own, other)).tobytes())
-    return np.unique(np.frombuffer(either, dtype=np.int64))
+        likeliest = others[np.argsort(-together, kind="stable")[:_NEAREST]]
+        found[order[i], : len(likeliest)] = order[likeliest]
+    return found

@@ -72,7 +72,7 @@ class Run:
 
         def calls() -> Iterator[tuple[tuple[int, str, Entry, str, int], Call]]:
             twice = _named_twice(self.boards.entries)
-            order = sorted(range(len(self.boards.entries)), key=lambda i: (self.boards.entries[i].alike, i))
+            order = sorted(range(len(self.boards.entries)), key=lambda i: self.boards.entries[i].alike)
             for at in order:
                 entry = self.boards.entries[at]
                 posed = self._posed(entry, twice)

@@ -12,7 +12,7 @@ from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.grading import GradingRequest, grade
 from bayesplate.results.grading_table import MOST_ON_TERMINAL, grading_tables, write_grading
 from bayesplate.results.joint import JOINT, Joint
-from bayesplate.results.log_figures import FIGURES, target_thickness
+from bayesplate.results.log_figures import FIGURES, target_thickness, triangle
 from bayesplate.results.normal_box import box_probability
 from bayesplate.results.pairs import proposed_pairs
 
@@ -42,16 +42,16 @@ def test_the_joint_distribution_is_that_of_the_logarithms(values):
 def test_figures_are_what_the_draws_give(values):
     """Mean and sd of each logarithm, exactly: a product of powers is a sum of logarithms."""
     joint = Joint.of_values(values)
-    mean, covariance = np.array([joint.log_mean]), np.array([joint.log_covariance])
+    mean, upper = np.array([joint.log_mean]), np.array([triangle(joint.log_covariance)])
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], 0.4)
     by_hand = {name: item.values for name, item in derived_quantities(constants, values["density"]).items()} | values
 
     for name, figure in FIGURES.items():
-        log_mean, log_sd = figure.log(mean, covariance)
+        log_mean, log_sd = figure.log(mean, upper)
         assert log_mean[0] == pytest.approx(np.log(by_hand[name]).mean(), abs=1e-12), name
         assert log_sd[0] == pytest.approx(np.log(by_hand[name]).std(ddof=1), rel=1e-6), name
     wanted = values["thickness"] * (20.0 / values["D_x"]) ** (1.0 / 3.0)
-    log_mean, log_sd = target_thickness(20.0).log(mean, covariance)
+    log_mean, log_sd = target_thickness(20.0).log(mean, upper)
     assert log_mean[0] == pytest.approx(np.log(wanted).mean(), abs=1e-12)
     assert log_sd[0] == pytest.approx(np.log(wanted).std(ddof=1), rel=1e-6)
 
@@ -123,12 +123,12 @@ def test_pairs_do_not_depend_on_how_many_are_looked_at_together(monkeypatch, val
     rng = np.random.default_rng(2)
     joint = Joint.of_values(values)
     mean = np.array(joint.log_mean) + 0.1 * rng.standard_normal((60, 7))
-    covariance = np.broadcast_to(joint.log_covariance, (60, 7, 7))
-    whole = proposed_pairs(mean, covariance, {"E_x": 10.0, "E_y": 10.0})
-    monkeypatch.setattr("bayesplate.results.pairs._AT_ONCE", 100)
-    monkeypatch.setattr("bayesplate.results.normal_box._AT_ONCE", 7)
+    upper = np.broadcast_to(triangle(joint.log_covariance), (60, 28))
+    whole = proposed_pairs(mean, upper, {"E_x": 10.0, "E_y": 10.0})
+    monkeypatch.setattr("bayesplate.results.pairs._AT_ONCE", 7)
+    monkeypatch.setattr("bayesplate.results.normal_box._AT_ONCE", 3)
 
-    assert proposed_pairs(mean, covariance, {"E_x": 10.0, "E_y": 10.0}) == whole
+    assert proposed_pairs(mean, upper, {"E_x": 10.0, "E_y": 10.0}) == whole
     assert len(whole) > 10
     assert len({i for pair in whole for i in (pair.first, pair.second)}) == 2 * len(whole)
 
@@ -152,7 +152,8 @@ def test_no_pair_that_may_match_is_passed_over():
                 taken |= set(pair)
                 least = min(least, found[i])
 
-        pairs = proposed_pairs(mean, covariance, {"E_x": 10.0, "E_y": 10.0})
+        upper = np.array([triangle(one) for one in covariance])
+        pairs = proposed_pairs(mean, upper, {"E_x": 10.0, "E_y": 10.0})
 
         assert [(pair.first, pair.second) for pair in pairs] == expected
     assert least < 0.06
@@ -166,12 +167,12 @@ def test_pairs_take_memory_in_proportion_to_the_boards():
     of_a_board = 2 * 12 * 5 * 8
     rng = np.random.default_rng(3)
     mean = 0.1 * rng.standard_normal((2000, 7))
-    covariance = np.broadcast_to(1e-4 * np.eye(7), (2000, 7, 7))
+    upper = np.broadcast_to(triangle(1e-4 * np.eye(7)), (2000, 28))
 
     def peak(n: int) -> int:
         tracemalloc.start()
         try:
-            proposed_pairs(mean[:n], covariance[:n], {"E_x": 10.0, "E_y": 10.0})
+            proposed_pairs(mean[:n], upper[:n], {"E_x": 10.0, "E_y": 10.0})
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()
