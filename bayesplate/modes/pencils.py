@@ -41,38 +41,45 @@ def pencil_eigenvalues(stiffness: Floats, mass: Floats, shift: Floats | float) -
     -------
     (n_draws, r) array, s^-2
     """
-    shifts = np.broadcast_to(shift, (len(stiffness), 1, 1))
-    try:
-        return _eigenvalues(stiffness, mass, shifts)
-    except np.linalg.LinAlgError:
-        return np.concatenate([_one_or_nan(*draw) for draw in zip(stiffness, mass, shifts, strict=True)])
+    _, flexibility, is_material = _flexibility(stiffness, mass, shift)
+    values = 1.0 / np.linalg.eigvalsh(flexibility) - np.reshape(shift, (-1, 1))
+    return np.where(is_material[:, None], values[:, ::-1], np.nan)
 
 
-def _flexibility(stiffness: Floats, mass: Floats, shift: Floats | float) -> tuple[Floats, Floats]:
-    """Coordinates in which the shifted stiffness is one, and the mass in them, whose eigenvalues are flexibilities.
+def _flexibility(stiffness: Floats, mass: Floats, shift: Floats | float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Coordinates in which the shifted stiffness is one; the mass in them, whose eigenvalues are flexibilities.
 
-    The stiffness is factorised and not the mass, for shear strains have no mass.
+    The stiffness is factorised and not the mass, for shear strains have no mass. Third, which draws are a material: of
+    the others both matrices are one.
     """
-    inverse = np.linalg.inv(np.linalg.cholesky(stiffness + shift * mass))
+    factors, is_material = _factors(stiffness + shift * mass)
+    inverse = np.linalg.inv(factors)
     across = np.swapaxes(inverse, -1, -2)
-    return across, inverse @ mass @ across
+    flexibility = inverse @ mass @ across
+    flexibility[~is_material] = np.eye(stiffness.shape[-1])
+    return across, flexibility, is_material
 
 
-def _eigenvalues(stiffness: Floats, mass: Floats, shift: Floats) -> Floats:
-    _, flexibility = _flexibility(stiffness, mass, shift)
-    values = 1.0 / np.linalg.eigvalsh(flexibility) - shift[:, :, 0]
-    return np.asarray(values[:, ::-1])
-
-
-def _one_or_nan(stiffness: Floats, mass: Floats, shift: Floats) -> Floats:
+def _factors(matrices: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Cholesky factors, and of which draws: those of a matrix that is not positive definite are one."""
     try:
-        return _eigenvalues(stiffness[None], mass[None], shift[None])
+        factors = np.asarray(np.linalg.cholesky(matrices))
     except np.linalg.LinAlgError:
-        return np.full((1, len(stiffness)), np.nan)
+        factors = np.stack([_factor_or_nan(one) for one in matrices])
+    is_material = np.isfinite(factors[:, -1, -1])  # what is no number in a row is none in those below
+    factors[~is_material] = np.eye(matrices.shape[-1])
+    return factors, is_material
+
+
+def _factor_or_nan(matrix: Floats) -> Floats:
+    try:
+        return np.asarray(np.linalg.cholesky(matrix))
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.nan)
 
 
 def pencil_modes(stiffness: Floats, mass: Floats, shift: Floats | float, n_modes: int) -> tuple[Floats, Floats]:
-    """Lowest eigenvalues, increasing, and their vectors.
+    """Lowest eigenvalues, increasing, and their vectors; not numbers where the weights are those of no material.
 
     Parameters
     ----------
@@ -86,17 +93,13 @@ def pencil_modes(stiffness: Floats, mass: Floats, shift: Floats | float, n_modes
     values : (n_draws, n_modes) array, s^-2
     vectors : (n_draws, r, n_modes) array
         Mass-normalised.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the weights are those of no material.
     """
-    across, flexibility = _flexibility(stiffness, mass, shift)
+    across, flexibility, is_material = _flexibility(stiffness, mass, shift)
     flexibilities, turned = np.linalg.eigh(flexibility)
     highest = flexibilities[:, : -n_modes - 1 : -1]
     vectors = across @ turned[:, :, : -n_modes - 1 : -1] / np.sqrt(highest)[:, None, :]
-    return 1.0 / highest - np.reshape(shift, (-1, 1)), vectors
+    values = 1.0 / highest - np.reshape(shift, (-1, 1))
+    return np.where(is_material[:, None], values, np.nan), np.where(is_material[:, None, None], vectors, np.nan)
 
 
 def condensed_eigenvalues(stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int) -> Floats:
@@ -170,11 +173,6 @@ def stepped_modes(
     -------
     values, vectors
         As of `pencil_modes`.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the weights are those of no material.
     """
     step = _step(stiffness, mass, n_kept, n_rigid)
     values, vectors = pencil_modes(step.shifted, step.mass, 0.0, n_modes)

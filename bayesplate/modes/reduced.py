@@ -94,7 +94,8 @@ class ReducedBlock:
     def modes(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest elastic modes of many draws: (n_draws, n) eigenvalues, s^-2, and (n_draws, r, n) vectors.
 
-        The vectors are combinations of the basis, normalised in the draw's mass.
+        The vectors are combinations of the basis, normalised in the draw's mass. Neither is a number at a draw that is
+        no plate.
         """
         n_wanted = min(n_modes + self.n_rigid, self.stiffness.shape[-1])
         pencil = _weighted(weights.stiffness, self.stiffness), self.mass(weights)
@@ -110,11 +111,14 @@ class ReducedBlock:
         Returns
         -------
         (n_draws, n_products) array of int
-            From 0; `n_modes` where it names none of them.
+            From 0; `n_modes` where it names none of them, -1 at a draw that is no plate.
         """
-        found = np.full((len(weights.stiffness), len(self.products)), n_modes, dtype=np.intp)
-        for row, vectors in zip(found, self.modes(weights, n_modes)[1], strict=True):
-            row[[product for product, _ in name_parts(vectors.T @ self.parts)]] = np.arange(vectors.shape[1])
+        found = np.full((len(weights.stiffness), len(self.products)), -1, dtype=np.intp)
+        values, vectors = self.modes(weights, n_modes)
+        for draw in np.flatnonzero(np.isfinite(values).all(axis=1)):
+            found[draw] = n_modes
+            named = [product for product, _ in name_parts(vectors[draw].T @ self.parts)]
+            found[draw, named] = np.arange(vectors.shape[2])
         return found
 
     def energies(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -173,7 +177,8 @@ class ReducedOrderModel:
         Returns
         -------
         dict of (n_draws,) array of int
-            By the orders along x and y; those that name none of the lowest modes have the highest rank of all.
+            By the orders along x and y; those that name none of the lowest modes have the highest rank of all. -1 at a
+            draw that is no plate.
         """
         found: dict[Beams, NDArray[np.intp]] = {}
         for block in self.blocks:

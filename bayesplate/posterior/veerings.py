@@ -11,14 +11,12 @@ other doubtful one (`bayesplate.frequencies.peaks`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.modes.plate import Beams, Weights
+from bayesplate.modes.plate import Beams
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.setup import Setup
 
@@ -69,7 +67,10 @@ def _confidences(model: SetupModel, values: Values) -> dict[Beams, float]:
     sure = {one.beams: one.frequency.mean for one in model.setup.readings if one.is_sure}
     if not sure:
         return {}
-    ranks = _ranks(model, values)
+    assert model.exact is not None
+    every = model.exact.reduced.ranks(model.system.weights(values))
+    is_plate = np.all([one >= 0 for one in every.values()], axis=0)
+    ranks = {beams: one[is_plate] for beams, one in every.items()}
     found = {}
     for beams, hertz in sure.items():
         others = [one for one in ranks if one != beams and _are_of_one_class(model.setup, one, beams)]
@@ -80,20 +81,6 @@ def _confidences(model: SetupModel, values: Values) -> dict[Beams, float]:
         if has_changed[~np.array(in_order, dtype=bool)].any():
             found[beams] = 1.0 - float(has_changed.any(axis=0).mean())
     return found
-
-
-def _ranks(model: SetupModel, values: Values) -> dict[Beams, NDArray[np.intp]]:
-    """Rank of the mode that each product of beam functions names, at those draws that are a plate."""
-    assert model.exact is not None
-    reduced, weights = model.exact.reduced, model.system.weights(values)
-    try:
-        return reduced.ranks(weights)
-    except np.linalg.LinAlgError:
-        found = []
-        for i in range(len(weights.stiffness)):
-            with suppress(np.linalg.LinAlgError):
-                found.append(reduced.ranks(Weights(*(part[i : i + 1] for part in weights))))
-        return {beams: np.concatenate([one[beams] for one in found]) for beams in found[0]}
 
 
 def _are_of_one_class(setup: Setup, one: Beams, other: Beams) -> bool:

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from bayesplate.modes.pencils import condensed_eigenvalues, pencil_eigenvalues, stepped_eigenvalues, stepped_modes
+from bayesplate.modes.pencils import (
+    condensed_eigenvalues,
+    pencil_eigenvalues,
+    pencil_modes,
+    stepped_eigenvalues,
+    stepped_modes,
+)
 
 N_DRAWS, R, N_KEPT, N_WANTED, N_RIGID = 5, 40, 14, 8, 2
 EIGENVALUES = np.concatenate([np.zeros(N_RIGID), np.arange(1.0, R - N_RIGID + 1.0) ** 2])
@@ -117,3 +123,12 @@ def test_no_material_is_no_number_and_the_other_draws_stay(with_mass, way):
     found = CHEAP[way](stiffness, mass, N_KEPT, N_RIGID)
     assert np.isnan(found[1]).all()
     np.testing.assert_allclose(found[[0, 2, 3, 4]], expected[[0, 2, 3, 4]], rtol=1e-12, atol=1e-9)
+
+
+def test_modes_of_no_material_are_no_numbers_and_those_of_the_other_draws_stay():
+    stiffness, mass = coupled(0.1, 2)
+    expected = pencil_modes(stiffness, mass, 1.0, N_WANTED)
+    stiffness[1] *= -1.0
+    for found, before in zip(pencil_modes(stiffness, mass, 1.0, N_WANTED), expected, strict=True):
+        assert np.isnan(found[1]).all()
+        np.testing.assert_array_equal(np.delete(found, 1, axis=0), np.delete(before, 1, axis=0))

@@ -149,7 +149,9 @@ def test_modes_of_draws_are_named_as_those_of_full_solves(name):
     board, names = WANTED[name]
     plate, found, reduced = prepared(name)
     points = [weights_at(board, p) for p in np.random.default_rng(8).uniform(-1.0, 1.0, (12, 3))]
-    ranks = reduced.ranks(together(points))
+    nothing = Weights(-points[0].stiffness, points[0].mass)
+    ranks = reduced.ranks(together([*points, nothing]))
+    assert all(of_draws[-1] == -1 for of_draws in ranks.values())
     n_named = 0
     for i, point in enumerate(points):
         places = {beams: one.place for beams, one in find(plate, point, names).items()}

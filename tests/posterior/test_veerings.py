@@ -125,7 +125,8 @@ def named_apart(ranks: dict[tuple[int, int], list[int]], hertz: dict[tuple[int, 
 
 
 def test_the_confidence_is_the_share_of_plates_that_agree():
-    ranks = {(2, 0): [0, 0, 0, 1, 1], (0, 2): [1, 1, 1, 0, 2], (2, 2): [2, 2, 2, 2, 0]}
+    """One draw is no plate, and counts for neither."""
+    ranks = {(2, 0): [0, 0, -1, 0, 1, 1], (0, 2): [1, 1, -1, 1, 0, 2], (2, 2): [2, 2, -1, 2, 2, 0]}
     assert named_apart(ranks, {(2, 0): 100.0}) == {(2, 0): pytest.approx(3 / 5)}
 
 

@@ -50,27 +50,18 @@ class Following:
         return cls(block, vectors[0].T @ block.mass(without)[0], wanted, groups)
 
     def eigenvalues(self, weights: Weights) -> Floats:
-        """Eigenvalue of each labelled mode for many draws: (n_draws, n_wanted) array, s^-2."""
-        try:
-            return self._eigenvalues(weights)
-        except np.linalg.LinAlgError:
-            draws = [Weights(*(w[i : i + 1] for w in weights)) for i in range(len(weights.stiffness))]
-            return np.concatenate([self._one_or_nan(draw) for draw in draws])
+        """Eigenvalue of each labelled mode for many draws: (n_draws, n_wanted) array, s^-2.
 
-    def _one_or_nan(self, weights: Weights) -> Floats:
-        """The same of one draw; not a number where the weights are those of no material."""
-        try:
-            return self._eigenvalues(weights)
-        except np.linalg.LinAlgError:
-            return np.full((1, self.wanted.size), np.nan)
-
-    def _eigenvalues(self, weights: Weights) -> Floats:
+        Not a number where the weights are those of no material.
+        """
         from scipy.optimize import linear_sum_assignment
 
         values, vectors = self.block.modes(weights, len(self.shapes) + _BEYOND)
         shares = (self.shapes @ vectors) ** 2
-        picked = np.stack([linear_sum_assignment(one, maximize=True)[1][self.wanted] for one in shares])
-        found = np.take_along_axis(values, picked, axis=1)
+        found = np.full((len(values), self.wanted.size), np.nan)
+        for draw in np.flatnonzero(np.isfinite(values).all(axis=1)):
+            picked = linear_sum_assignment(shares[draw], maximize=True)[1][self.wanted]
+            found[draw] = values[draw, picked]
         for group in self.groups:
             found[:, group] = np.sort(found[:, group], axis=1)
-        return np.asarray(found)
+        return found
