@@ -55,11 +55,7 @@ class Posterior:
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log density: (n_draws,) array from (n_draws, n_dim); -inf outside the support."""
-        total = self.log_prior(theta)
-        inside = np.isfinite(total)
-        if inside.any():
-            total[inside] += self.log_likelihood(theta[inside]).sum(axis=1)
-        return total
+        return self.evaluate(theta)[0]
 
     def evaluate(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Log density, and ln f of all modes, setup after setup: (n_draws,) and (n_draws, n_every) arrays.

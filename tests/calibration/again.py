@@ -49,11 +49,9 @@ class OfBoth(Posterior):
 
     second: Posterior
 
-    def log_likelihood(self, theta: Floats) -> Floats:
-        every = self.every_log_frequency(theta)
-        return np.concatenate(
-            [self.log_likelihood_of(every, theta), self.second.log_likelihood_of(every, theta)], axis=1
-        )
+    def log_likelihood_of(self, every_log_frequency: Sequence[Floats], theta: Floats) -> Floats:
+        first = super().log_likelihood_of(every_log_frequency, theta)
+        return np.concatenate([first, self.second.log_likelihood_of(every_log_frequency, theta)], axis=1)
 
 
 @lru_cache(maxsize=2)

@@ -57,9 +57,9 @@ class ByRow(Posterior):
     hertz: Floats = field(default_factory=lambda: np.empty((0, 0)))
     is_counted_twice: bool = False
 
-    def log_likelihood(self, theta: Floats) -> Floats:
+    def log_likelihood_of(self, every_log_frequency: Sequence[Floats], theta: Floats) -> Floats:
         rows = np.arange(len(theta)) % len(self.hertz)
-        (predicted,) = self.log_frequencies(theta)
+        (predicted,) = self.labelled(every_log_frequency)
         (errors,) = self.readings
         told = replace(errors, frequency=self.hertz[rows])
         found = told.log_likelihood(predicted, np.exp(self.parameters.log_noise(theta))[:, 0])

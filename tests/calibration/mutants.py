@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,8 +32,10 @@ class CountedTwice(Posterior):
 
     mode: int = 0
 
-    def log_likelihood(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        found = super().log_likelihood(theta)
+    def log_likelihood_of(
+        self, every_log_frequency: Sequence[NDArray[np.float64]], theta: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        found = super().log_likelihood_of(every_log_frequency, theta)
         return np.concatenate([found, found[:, [self.mode]]], axis=1)
 
 

@@ -150,7 +150,7 @@ def test_control_draws_of_a_posterior_without_one_mode_fail(fitted, mode):
 class Nowhere(Posterior):
     """A posterior that has nothing where its normal case is."""
 
-    def log_likelihood(self, theta):
+    def log_likelihood_of(self, every_log_frequency, theta):
         return np.full((len(theta), 1), -np.inf)
 
 

@@ -23,7 +23,7 @@ from bayesplate.quantities import Quantity
 class WithoutReadings(Posterior):
     """The posterior of readings that say nothing."""
 
-    def log_likelihood(self, theta):
+    def log_likelihood_of(self, every_log_frequency, theta):
         return np.zeros((len(theta), len(self.factors)))
 
 
