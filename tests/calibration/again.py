@@ -124,7 +124,7 @@ def _draws(problem: PosedProblem, rng: np.random.Generator) -> Floats:
     """`N_DRAWS` of thousands, as in the calibration over the prior; a run that fails its gate is started anew."""
     for _ in range(MOST_ATTEMPTS):
         gate = Gate(tau_count_min=25.0, ess_min=10 * N_DRAWS)
-        settings = SamplerSettings(int(rng.integers(2**31)), 2, 24, chunk_steps=50, max_steps=MOST_STEPS, gate=gate)
+        settings = SamplerSettings(int(rng.integers(2**31)), 2, 16, max_steps=MOST_STEPS, gate=gate)
         inference = infer(problem, settings)
         if inference.convergence.passed:
             pooled = inference.chains.pooled

@@ -20,7 +20,6 @@ from calibration.truths import Design, Truth, noises_of, prior_values, reference
 from made_boards import NARROW, peaks_of
 from numpy.typing import NDArray
 
-from bayesplate.cards import load_prior
 from bayesplate.errors import BayesplateError
 from bayesplate.frequencies.model import SetupModel, with_others
 from bayesplate.plate.setup import Setup
@@ -61,7 +60,7 @@ def unread(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
 
 def draw(rng: np.random.Generator) -> tuple[Truth, PosedProblem]:
     """A truth from the prior, and the fit of its labelled readings and bare peaks."""
-    values = prior_values(DESIGN, load_prior(DESIGN.prior), rng)
+    values = prior_values(DESIGN, DESIGN.prior_card, rng)
     noise = noises_of(DESIGN, rng, NOISE)
     model = every_mode()
     read = model.every_log_frequency({name: np.asarray(value) for name, value in values.items()}, "linear")[0]

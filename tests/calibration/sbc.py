@@ -102,7 +102,6 @@ def posterior_draws(problem: PosedProblem, design: Design, rng: np.random.Genera
             seed=int(rng.integers(2**31)),
             n_ensembles=design.n_ensembles,
             n_walkers=design.n_walkers,
-            chunk_steps=50,
             max_steps=MOST_STEPS,
             gate=Gate(tau_count_min=design.gate_taus, ess_min=10 * N_DRAWS),
         )

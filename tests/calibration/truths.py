@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -71,15 +71,20 @@ class Design:
     prior: str = "spruce"
     effect: str = ""
     base_seed: int = 1
-    n_walkers: int = 24
+    n_walkers: int = 16
     n_ensembles: int = 2
     gate_taus: float = 25.0
 
-    @property
+    @cached_property
+    def prior_card(self) -> PriorCard:
+        """The prior card, read once."""
+        return load_prior(self.prior)
+
+    @cached_property
     def inputs(self) -> dict[str, Quantity]:
         """Inputs of the board; density and sides are exact."""
         length_x, length_y = LENGTHS[self.edges]
-        poisson = load_prior(self.prior).poisson_xy
+        poisson = self.prior_card.poisson_xy
         assert poisson is not None
         return {
             "length_x": Quantity.exact(length_x),
@@ -149,7 +154,7 @@ def prior_values(design: Design, prior: PriorCard, rng: np.random.Generator) -> 
 
 def draw_truth(design: Design, rng: np.random.Generator, given: Mapping[str, float] | None = None) -> Truth:
     """Draw constants, inputs and noise from the prior but for those that are given, and readings from them."""
-    values = prior_values(design, load_prior(design.prior), rng) | dict(given or {})
+    values = prior_values(design, design.prior_card, rng) | dict(given or {})
     noises = noises_of(design, rng)
     hertz, ranks = _frequencies(design, values)
     read = {
@@ -202,7 +207,7 @@ def ranks_in_class(models: Sequence[SetupModel]) -> tuple[int, ...]:
 @lru_cache(maxsize=2)
 def reference(design: Design) -> PosedProblem:
     """The board at the medians of the prior: where the fixed linear law is made."""
-    prior = load_prior(design.prior)
+    prior = design.prior_card
     inputs = {name: float(quantity.median) for name, quantity in {**design.inputs, **amplitudes(design)}.items()}
     found = rigidities(*(prior.constants[n].median for n in MODULI), inputs["thickness"], inputs["poisson_xy"])
     values = inputs | {name: float(value) for name, value in zip(RIGIDITIES, found, strict=True)}
@@ -214,7 +219,7 @@ def make_problem(design: Design, truth: Truth, belief: Callable[[Board], Board] 
     """The inference of simulated readings, of the board that the analysis believes in."""
     board = design.board(truth.hertz)
     board = board if belief is None else belief(board)
-    prior = load_prior(design.prior)
+    prior = design.prior_card
     if design.law != "fixed-linear":
         return pose(board, prior, law=None if design.law == "auto" else "exact")
     first = reference(design)
