@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, TypeAlias, TypeVar
 
 from bayesplate.errors import Fault, InputError
@@ -162,7 +163,11 @@ def computed(workers: Workers, calls: Iterable[tuple[Key, Call]]) -> Answers[Key
     key, Future
         In the order in which they are done.
     """
-    left = iter(calls)
+    every = iter(calls)
+    first = next(every, None)
+    if first is None:
+        return  # no worker starts for nothing
+    left = chain([first], every)
     while True:
         broken = yield from _until_broken(workers, left, _AHEAD * workers.n)
         if broken is None:

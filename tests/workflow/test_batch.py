@@ -26,7 +26,7 @@ from bayesplate.cli import main
 from bayesplate.errors import BatchError, CheckpointError, InputError
 from bayesplate.results.folder import json_text
 from bayesplate.workflow.batch_boards import boards_of
-from bayesplate.workflow.batch_pool import Call, WorkerDied, computed, processes
+from bayesplate.workflow.batch_pool import Call, WorkerDied, Workers, computed, processes
 
 WHY = "mend their cards: --resume then fits these alone"
 
@@ -233,6 +233,13 @@ def test_a_worker_that_dies_takes_no_other_board_with_it():
     assert isinstance(found[1].exception(), WorkerDied)
     assert found[2].result() == 3
     assert isinstance(found[3].exception(), ValueError)
+
+
+def test_no_worker_starts_for_nothing():
+    def opened():
+        raise AssertionError("workers were started")
+
+    assert list(computed(Workers(opened, 2), [])) == []
 
 
 def test_few_calls_wait_at_a_time():
