@@ -57,6 +57,27 @@ def band_p_value(ranks: NDArray[np.int_], n_draws: int) -> float:
     return float((1 + np.searchsorted(smallest, observed * (1 + 1e-9))) / (N_SIMULATED + 1))
 
 
+def band(n_ranks: int, n_draws: int, level: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ends of the band that the empirical distribution of uniform ranks leaves with a probability.
+
+    Parameters
+    ----------
+    n_ranks, n_draws : int
+    level : float
+        That probability.
+
+    Returns
+    -------
+    low, high : (n_draws,) arrays
+        Shares of ranks below 1 to n_draws.
+    """
+    tails, smallest = _reference(n_ranks, n_draws + 1)
+    inside = tails >= smallest[int(level * N_SIMULATED)]
+    low = inside.argmax(axis=1)
+    high = n_ranks - inside[:, ::-1].argmax(axis=1)
+    return low / n_ranks, high / n_ranks
+
+
 def chi2_p_value(ranks: NDArray[np.int_], n_draws: int) -> float:
     """The older test, blind to the order of the bins: a second opinion."""
     counts, _ = np.histogram(ranks, bins=N_BINS, range=(0, n_draws + 1))

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from calibration import again, bare, campaign_ranks, joint, oracle
 from calibration.layouts import EFFECTS
 from calibration.mutants import FITTED
+from calibration.pictures import ALT, draw
 from calibration.records import Record, add_to, read_done
 from calibration.sbc import identity, simulate_one
 from calibration.table import MUTANTS, NOT_COUNTED, family_p_value, is_calibrated, is_caught, rows, text
@@ -32,6 +34,7 @@ from calibration.truths import Design
 FEWEST_OF_MUTANT = 60
 """Simulations in which every mutant is fitted, though some are found out by fewer."""
 TITLE = "Calibration of the posterior"
+_TOLD = re.compile(r"```text\n.*?\n```", re.DOTALL)
 SECTIONS = {
     "ranks": (
         "Ranks of the truth among draws",
@@ -226,10 +229,19 @@ def judge(records: list[dict[str, Any]], wanted: Mapping[str, int] = MUTANTS) ->
     return paragraphs, well
 
 
-def page(found: dict[str, list[str]], before: str = "") -> str:
+def page(found: dict[str, list[str]], before: str = "", pictures: Container[str] = ()) -> str:
     """What was found as a page of the documentation.
 
     Of a part that was not run the page says what it said before; one that never was says so and nothing else.
+
+    Parameters
+    ----------
+    found : dict of list of str
+        Lines of the parts that were run.
+    before : str
+        The page as it was.
+    pictures : container of str
+        Parts of which there is a picture beside the page.
     """
     head = f"# {TITLE}\n\nWritten by `make calibration`; do not edit. Each part stands as it was last run.\n"
     kept = dict(block.split("\n", 1) for block in before.split("\n## ")[1:])
@@ -238,9 +250,27 @@ def page(found: dict[str, list[str]], before: str = "") -> str:
         if name in found:
             told = "\n".join(["```text", *"\n".join(found[name]).splitlines(), "```"])
         else:
-            told = "".join(kept.get(title, "").partition("```text\n")[1:]).strip() or "Not run with this version."
-        parts_of_page.append(f"## {title}\n\n{what}\n\n{told}\n")
+            block = _TOLD.search(kept.get(title, ""))
+            told = block.group() if block else "Not run with this version."
+        shown = f"\n![{ALT}]({picture_of(name)})\n" if name in pictures else ""
+        parts_of_page.append(f"## {title}\n\n{what}\n\n{told}\n{shown}")
     return "\n".join(parts_of_page)
+
+
+def picture_of(name: str) -> str:
+    """File of a part's picture."""
+    return f"calibration-{name}.png"
+
+
+def publish(folder: Path, found: dict[str, list[str]], records: Mapping[str, Sequence[Record]]) -> None:
+    """Write the page of what was found and the pictures of its ranks; of parts that were not run both stay."""
+    folder.mkdir(parents=True, exist_ok=True)
+    told = folder / "calibration.md"
+    for name, of_part in records.items():
+        draw(of_part, folder / picture_of(name))
+    before = told.read_text(encoding="utf-8") if told.exists() else ""
+    pictures = [name for name in SECTIONS if (folder / picture_of(name)).exists()]
+    told.write_text(page(found, before, pictures), encoding="utf-8")
 
 
 def main() -> int:
@@ -275,26 +305,26 @@ def main() -> int:
     started = time.perf_counter()
     out, workers = arguments["out"], arguments["workers"]
     found: dict[str, list[str]] = {}
+    every: dict[str, list[Record]] = {}
     well = True
     if "ranks" in arguments["parts"] or out.exists():
         at_work = workers if "ranks" in arguments["parts"] else 0
-        found["ranks"], is_right = judge(run(design, arguments["simulations"], arguments["mutants"], at_work, out))
+        every["ranks"] = run(design, arguments["simulations"], arguments["mutants"], at_work, out)
+        found["ranks"], is_right = judge(every["ranks"])
         well &= is_right
     counts = (arguments[name] for name in ("sets", "at_boards", "steps", "ranked"))
     for name, part in parts(*counts).items():
         beside = out.with_name(f"{out.stem}-{name}{out.suffix}")
         records = part.run(beside, workers) if name in arguments["parts"] else part.done(beside)
         if records:
+            every[name] = records
             found[name], is_right = part.judge(records)
             well &= is_right
     well &= set(found) == set(SECTIONS)
     for name, lines in found.items():
         print(f"{SECTIONS[name][0]}\n" + "\n".join(lines))
     if arguments["publish"]:
-        arguments["publish"].mkdir(parents=True, exist_ok=True)
-        told = arguments["publish"] / "calibration.md"
-        before = told.read_text(encoding="utf-8") if told.exists() else ""
-        told.write_text(page(found, before), encoding="utf-8")
+        publish(arguments["publish"], found, every)
     print(f"{'calibrated' if well else 'NOT CALIBRATED'}, {(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

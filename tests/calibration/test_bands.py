@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibration.bands import band_p_value, central_coverage, chi2_p_value
+from calibration.bands import band, band_p_value, central_coverage, chi2_p_value
 from calibration.table import MUTANT_LEVEL
 from scipy import stats
 
@@ -20,6 +20,20 @@ def test_uniform_ranks_leave_the_band_as_often_as_stated(p_value, n_ranks):
     # five rejections in a hundred, to four binomial errors; chi-squared is approximate at two counts a bin
     slack = 0.02 if (p_value is chi2_p_value and n_ranks == 40) else 0.0
     assert np.mean(p < 0.05) == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / n_sets) + slack)
+
+
+@pytest.mark.parametrize("spread", [1.0, 0.9])
+def test_the_band_that_is_drawn_is_the_one_that_judges(spread):
+    rng = np.random.default_rng(5)
+    low, high = band(200, N_DRAWS, 0.05)
+    verdicts = []
+    for _ in range(100):
+        ranks = (100 * stats.norm.cdf(rng.standard_normal(200) / spread)).astype(int)
+        shares = np.bincount(ranks, minlength=N_DRAWS + 1).cumsum()[:-1] / 200
+        is_outside = bool(np.any((shares < low - 1e-9) | (shares > high + 1e-9)))
+        assert is_outside == (band_p_value(ranks, N_DRAWS) <= 0.0501)
+        verdicts.append(is_outside)
+    assert 0 < sum(verdicts) < 100
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.5, 0.5), (2.0, 2.0), (1.0, 1.6)], ids=["too narrow", "too wide", "shifted"])

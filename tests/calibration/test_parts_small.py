@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from calibration import again, bare, campaign_ranks, joint, oracle
 from calibration.records import add_to, read_done
-from calibration.run import SECTIONS, Part, page, parts
+from calibration.run import SECTIONS, Part, page, parts, publish
+from calibration.sbc import N_DRAWS
 from calibration.table import is_calibrated, is_caught, rows
 from scipy import stats
 
@@ -195,6 +196,23 @@ def test_the_page_tells_of_a_part_that_was_not_run():
     assert "noise known, 50 data sets: agree" in text
     assert text.index("## Closed forms") < text.index("noise known") < text.index("## At the paper's boards")
     assert set(parts(1, 1, 1, 1)) == set(SECTIONS) - {"ranks"}
+
+
+def test_ranks_are_drawn_and_the_page_shows_the_picture(tmp_path):
+    rng = np.random.default_rng(1)
+    kinds = ("production", "spread 0.8 of itself")
+    records = [{"ranks": {kind: {"D_x": int(rng.integers(N_DRAWS + 1))} for kind in kinds}} for _ in range(40)]
+    on_boards = [{**one, "board": again.BOARDS[i % 2]} for i, one in enumerate(records)]
+    publish(tmp_path, {"exact": ["agree"]}, {"exact": records, "boards": on_boards, "joint": [{"z": {}}]})
+    publish(tmp_path, {"oracle": ["agree too"]}, {})
+    text = (tmp_path / "calibration.md").read_text()
+
+    assert sorted(one.name for one in tmp_path.glob("*.png")) == ["calibration-boards.png", "calibration-exact.png"]
+    assert text.count("](calibration-exact.png)") == text.count("](calibration-boards.png)") == 1
+    assert (
+        text.index("## Ranks under the exact law") < text.index("calibration-exact.png") < text.index("## Ranks of a j")
+    )
+    assert text.count("```text\nagree\n```") == text.count("```text\nagree too\n```") == 1
 
 
 def fails_first(folder, number):

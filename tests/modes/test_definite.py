@@ -1,0 +1,72 @@
+"""Equations with positive definite matrices: as numpy solves them, no numbers for others, and the lock given away."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from scipy.linalg import lapack
+
+from bayesplate.modes.definite import definite_solutions
+
+N_DRAWS, R, N = 5, 30, 7
+
+
+def definite(size: int, n: int, seed: int = 0) -> np.ndarray:
+    made = np.random.default_rng(seed).standard_normal((n, size, size))
+    return made @ np.swapaxes(made, 1, 2) + size * np.eye(size)
+
+
+def test_solutions_are_those_of_numpy_and_what_was_given_stays():
+    matrices = definite(R, N_DRAWS)
+    loads = np.random.default_rng(1).standard_normal((N_DRAWS, R, N))
+    given = matrices.copy(), loads.copy()
+    found = definite_solutions(matrices, loads)
+
+    np.testing.assert_allclose(found, np.linalg.solve(matrices, loads), rtol=1e-11, atol=1e-13)
+    np.testing.assert_array_equal(matrices, given[0])
+    np.testing.assert_array_equal(loads, given[1])
+
+
+def test_parts_of_larger_arrays_are_solved_too():
+    whole = definite(R + 4, N_DRAWS)
+    matrices, loads = whole[:, 4:, 4:], whole[:, 4:, :4]
+
+    np.testing.assert_allclose(definite_solutions(matrices, loads), np.linalg.solve(matrices, loads), rtol=1e-10)
+
+
+def test_what_is_not_definite_gives_no_numbers_and_the_others_stay():
+    matrices, loads = definite(R, N_DRAWS), np.ones((N_DRAWS, R, N))
+    expected = definite_solutions(matrices, loads)
+    matrices[1] *= -1.0
+    matrices[2, 0, 0] = np.nan
+    found = definite_solutions(matrices, loads)
+
+    assert np.isnan(found[[1, 2]]).all()
+    np.testing.assert_array_equal(found[[0, 3, 4]], expected[[0, 3, 4]])
+
+
+@pytest.mark.parametrize(("solve", "is_kept"), [(definite_solutions, False), (lapack.dposv, True)])
+def test_other_threads_run_while_it_computes(solve, is_kept):
+    """How long another thread waits at most beside the time that it takes; SciPy's own, which keeps the lock, is the
+    control.
+    """
+    (matrix,) = definite(1500, 1)
+    arguments = (matrix, np.ones((1500, 1))) if is_kept else (matrix[None], np.ones((1, 1500, 1)))
+    definite_solutions(np.eye(2)[None], np.ones((1, 2, 1)))  # what is loaded once
+    taken = []
+
+    def run() -> None:
+        started = time.perf_counter()
+        solve(*arguments)
+        taken.append(time.perf_counter() - started)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    ticks = [time.perf_counter()]
+    while thread.is_alive():
+        ticks.append(time.perf_counter())
+
+    assert (np.diff(ticks).max() > 0.5 * taken[0]) == is_kept
