@@ -55,7 +55,7 @@ def main() -> None:
 @click.argument("card")
 @shared_options("effects", "setup", "json", "quiet", "debug")
 def check(card: str, effects: list[str] | None, setup: str | None, as_json: bool, quiet: bool, debug: bool) -> None:
-    """Every fault of CARD, or what would be fitted and what it can identify."""
+    """Every fault of CARD, or what a fit of it can identify."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.check import check as run
         from bayesplate.workflow.shown import show_check
@@ -87,7 +87,10 @@ def fit(
     debug: bool,
     **asked: Any,
 ) -> None:
-    """Posterior of the elastic constants of CARD: report.html, summary.json, posterior.nc."""
+    """Posterior of the elastic constants of CARD.
+
+    Writes report.html, summary.json and posterior.nc.
+    """
     refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
     refuse_both(linear, exact, "--linear and --exact force different laws")
     refuse_beside_repeat(context, card, repeat)
@@ -120,7 +123,7 @@ def modes(
     quiet: bool,
     debug: bool,
 ) -> None:
-    """Table of the lowest modes of CARD, and a sheet of Chladni figures."""
+    """Lowest modes of CARD, and a sheet of their Chladni figures."""
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.modes import modes as run
         from bayesplate.workflow.prepare import default_folder
@@ -148,7 +151,10 @@ def compare(
     quiet: bool,
     debug: bool,
 ) -> None:
-    """Every method on CARD side by side, as a thin and as a shear-flexible plate."""
+    """Every method on CARD side by side.
+
+    As a thin and as a shear-flexible plate.
+    """
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.compare import compare as run
@@ -186,7 +192,10 @@ def diagnose(
     quiet: bool,
     debug: bool,
 ) -> None:
-    """Trace the residual of CARD to an effect, add it, and report the error before and after."""
+    """Trace the residual of CARD to an effect that it lacks.
+
+    Adds the effect, and reports the error before and after.
+    """
     refuse_both(force, resume, "--force starts anew and --resume continues")
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
@@ -240,7 +249,10 @@ def plan(
     quiet: bool,
     debug: bool,
 ) -> None:
-    """What to measure next on CARD, by what it is expected to give and what it costs."""
+    """What to measure next on CARD.
+
+    By what it is expected to give and what it costs.
+    """
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
             from bayesplate.workflow.plan import plan as run
@@ -273,7 +285,10 @@ def plan(
 @click.option("--frequency", multiple=True, metavar="LABEL=HZ", help='As often as there are modes: "(1,1)=35".')
 @shared_options("json", "quiet", "debug")
 def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: Any) -> None:
-    """Write a first card to PATH, by asking, or from options where there are any."""
+    """Write a first card to PATH.
+
+    By asking, or from options where there are any.
+    """
     given = {name: value for name, value in answers.items() if value}
     options = given_answers(given)
     with reporting(as_json=as_json, debug=debug):
@@ -313,7 +328,10 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
 @click.option("--out", type=click.Path(), default="results/recordings", show_default=True, help="Output folder.")
 @shared_options("force", "json", "quiet", "debug")
 def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bool, debug: bool, **given: Any) -> None:
-    """Frequencies of the modes in recordings FILES, and the [setup] that a card takes."""
+    """Frequencies of the modes in recordings FILES.
+
+    With the [setup] that a card takes.
+    """
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.pick import FRAGMENT, PAGE
         from bayesplate.workflow.pick import pick as run
@@ -369,7 +387,10 @@ def batch(
     debug: bool,
     **asked: Any,
 ) -> None:
-    """Fit the cards of the folder SOURCE, or the rows of the table SOURCE: one table, and a page that grades them."""
+    """Fit many boards: a folder of cards, or the rows of a table.
+
+    One table of all, and a page that grades them. SOURCE is the folder or the table.
+    """
     refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
     refuse_both(linear, exact, "--linear and --exact force different laws")
     refuse_both(asked["workers"] is not None, asked["dask"] is not None, "--workers are processes here, --dask others")

@@ -226,6 +226,14 @@ def test_a_mistyped_command_line_is_a_usage_error(arguments, said):
     assert files_in(Path()) == {}
 
 
+def test_what_each_command_does_is_told_in_a_whole_sentence():
+    told = CliRunner().invoke(main, ["--help"]).output.partition("Commands:")[2].split("\n")
+    lines = [line for line in told if line.strip()]
+
+    assert [line.split()[0] for line in lines] == sorted(main.commands)
+    assert all(line.endswith(".") and not line.endswith("...") for line in lines)
+
+
 def test_debug_shows_the_traceback_and_keeps_the_exit_code():
     plain = invoke("fit", "nowhere.toml")
     debug = invoke("fit", "nowhere.toml", "--debug")

@@ -77,18 +77,28 @@ def _some(words: Iterable[str]) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """The known word that was probably meant, or an empty text; a forgotten unit is forgiven."""
+    """The known word that was probably meant, or an empty text; a forgotten unit is forgiven.
+
+    A part of one word alone stands for it: "shear" for transverse_shear.
+    """
     if len(word) > _LONGEST_SHOWN:
         return ""
     candidates: dict[str, str] = {}
-    for name in known:
+    names = list(known)
+    for name in names:
         candidates.setdefault(_UNIT.sub("", name), name)
         candidates[name] = name
     for spelling in (word, _UNIT.sub("", word)):
         close = difflib.get_close_matches(spelling, candidates, n=1, cutoff=0.6)
         if close:
             return candidates[close[0]]
-    return ""
+    parts = _parts(word)
+    having = [name for name in names if parts and parts <= _parts(name)]
+    return having[0] if len(having) == 1 else ""
+
+
+def _parts(name: str) -> set[str]:
+    return set(re.split(r"[-_ ]+", name.casefold())) - {""}
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

@@ -85,6 +85,10 @@ def _limit(name: str, ends: str, told: str, faults: list[Fault]) -> tuple[float 
             Fault(place, f"LEAST:GREATEST in {FIGURES[name].unit}, one of them may be left away", quoted(ends))
         )
         return None
+    given = [one for one in (low, high) if one is not None]
+    if min(given) <= 0.0 or given != sorted(set(given)):
+        faults.append(Fault(place, "positive numbers, the least before the greatest", quoted(ends)))
+        return None
     factor = FIGURES[name].per_unit
     return (None if low is None else low * factor, None if high is None else high * factor)
 

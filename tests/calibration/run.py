@@ -39,8 +39,9 @@ SECTIONS = {
     "ranks": (
         "Ranks of the truth among draws",
         "Constants, noise and the size of an effect drawn from their priors, readings from them, and the rank of each "
-        "among the draws of the fit; a frequency that was not read and the log likelihood are ranked too. Each mutant "
-        "is a wrong posterior that the same bands must find out.",
+        "among the draws of the fit; a frequency that was not read and the log likelihood are ranked too. The law is "
+        "the one that a user's fit chooses: where it is not linear, a surrogate of it is walked on and corrected. Each "
+        "mutant is a wrong posterior that the same bands must find out.",
     ),
     "linear": (
         "Ranks under the linear law",
@@ -48,11 +49,12 @@ SECTIONS = {
     ),
     "exact": (
         "Ranks under the exact law",
-        "The same without an effect.",
+        "The same without an effect, every step under the exact law itself.",
     ),
     "both": (
         "Ranks of a joint fit",
-        "One board held free, then clamped at one end: constants in common, noise of each setup its own.",
+        "One board held free, then clamped at one end: constants in common, noise of each setup its own. The law is "
+        "the one that a user's fit chooses.",
     ),
     "sessions": (
         "Ranks of two sessions",
@@ -126,7 +128,7 @@ class Part:
 MODELS = {
     "linear": Design(law="fixed-linear", resolution=0.0),
     "exact": Design(),
-    "both": Design(edges="both"),
+    "both": Design(edges="both", law="auto"),
     "sessions": Design(edges="days", law="fixed-linear", resolution=0.0, n_walkers=32),
 }
 """Models that are ranked without mutants, by the name of their part."""
@@ -292,7 +294,7 @@ def main() -> int:
     parser.add_argument(
         "--generator", choices=("package", "ritz"), default="package", help="whose frequencies are true"
     )
-    parser.add_argument("--law", choices=("exact", "auto", "fixed-linear"), default="exact")
+    parser.add_argument("--law", choices=("exact", "auto", "fixed-linear"), default="auto")
     parser.add_argument("--resolution", type=float, default=1.0, help="Hz; 0 for readings that are not rounded")
     parser.add_argument("--without-effect", action="store_true", help="no size of an effect among the ranks")
     parser.add_argument("--base-seed", type=int, default=1)

@@ -42,6 +42,8 @@ def test_a_missing_file_names_the_path_and_the_folder(tmp_path: Path) -> None:
     ("load", "kind", "name", "meant"),
     [
         (load_board, "board", "finish-spruce-cantilever", "finnish-spruce-cantilever"),
+        (load_board, "board", "fiemme", "fiemme-spruce-clamped"),
+        (load_board, "board", "2r", "spruce-free-2R"),
         (load_prior, "prior", "spruse", "spruce"),
         (load_coefficients, "coefficient", "paper-clampd", "paper-clamped"),
     ],
@@ -53,6 +55,12 @@ def test_a_misspelt_name_names_the_shelf_and_the_nearest_card(
         load(name)
     assert f"models{os.sep}{kind}" in str(caught.value)  # type: ignore[attr-defined]
     assert f"did you mean {meant}?" in str(caught.value)  # type: ignore[attr-defined]
+
+
+def test_a_part_of_several_names_stands_for_none():
+    with refused("(a card in") as caught:
+        load_board("free")
+    assert "did you mean" not in str(caught.value)  # type: ignore[attr-defined]
 
 
 def test_a_name_far_from_all_others_names_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

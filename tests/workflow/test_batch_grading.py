@@ -36,6 +36,16 @@ def test_everything_that_cannot_be_read_is_said_at_once():
     assert "--rigidity: wanted a positive number of N m, got -3" in said
 
 
+@pytest.mark.parametrize("ends", ["14:11", "11:11", "-3:11", "0:"])
+def test_limits_that_no_board_meets_are_refused_as_they_were_written(ends):
+    with pytest.raises(InputError) as refused:
+        grading_request(None, [f"E_x={ends}"], None)
+
+    assert f'--limit E_x={ends}: wanted positive numbers, the least before the greatest, got "{ends}"' in str(
+        refused.value
+    )
+
+
 BAD = [
     (GradingRequest(match_percent={"E_z": 1.0}), "grading match_percent: wanted names of E_x, E_y, G_xy, density"),
     (GradingRequest(match_percent={"E_x": -1.0}), "grading match_percent E_x: wanted a positive number"),
