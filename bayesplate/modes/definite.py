@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,10 +50,9 @@ def _dposv() -> Callable[..., None]:
     """LAPACK's dposv(uplo, n, nrhs, a, lda, b, ldb, info), all by reference."""
     from scipy.linalg import cython_lapack
 
+    name_of = ctypes.PYFUNCTYPE(ctypes.c_char_p, ctypes.py_object)(("PyCapsule_GetName", ctypes.pythonapi))
+    of_capsule = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)
+    pointer_of = of_capsule(("PyCapsule_GetPointer", ctypes.pythonapi))
     capsule = cython_lapack.__pyx_capi__["dposv"]
-    api: Any = ctypes.pythonapi
-    api.PyCapsule_GetName.restype, api.PyCapsule_GetName.argtypes = ctypes.c_char_p, [ctypes.py_object]
-    api.PyCapsule_GetPointer.restype = ctypes.c_void_p
-    api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
-    address = api.PyCapsule_GetPointer(capsule, api.PyCapsule_GetName(capsule))
-    return ctypes.CFUNCTYPE(None, ctypes.c_char_p, *[ctypes.c_void_p] * 7)(address)
+    function = ctypes.CFUNCTYPE(None, ctypes.c_char_p, *[ctypes.c_void_p] * 7)
+    return function(pointer_of(capsule, name_of(capsule)))
