@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import sys
 import time
 from collections.abc import Callable, Container, Mapping, Sequence
@@ -34,7 +33,6 @@ from calibration.truths import Design
 FEWEST_OF_MUTANT = 60
 """Simulations in which every mutant is fitted, though some are found out by fewer."""
 TITLE = "Calibration of the posterior"
-_TOLD = re.compile(r"```text\n.*?\n```", re.DOTALL)
 SECTIONS = {
     "ranks": (
         "Ranks of the truth among draws",
@@ -234,7 +232,8 @@ def judge(records: list[dict[str, Any]], wanted: Mapping[str, int] = MUTANTS) ->
 def page(found: dict[str, list[str]], before: str = "", pictures: Container[str] = ()) -> str:
     """What was found as a page of the documentation.
 
-    Of a part that was not run the page says what it said before; one that never was says so and nothing else.
+    Of a part that was not run the page says what it said before, word for word; one that never was says so and
+    nothing else.
 
     Parameters
     ----------
@@ -249,11 +248,12 @@ def page(found: dict[str, list[str]], before: str = "", pictures: Container[str]
     kept = dict(block.split("\n", 1) for block in before.split("\n## ")[1:])
     parts_of_page = [head]
     for name, (title, what) in SECTIONS.items():
+        if name not in found and title in kept:
+            parts_of_page.append(f"## {title}\n{kept[title].rstrip()}\n")
+            continue
+        told = "Not run with this version."
         if name in found:
             told = "\n".join(["```text", *"\n".join(found[name]).splitlines(), "```"])
-        else:
-            block = _TOLD.search(kept.get(title, ""))
-            told = block.group() if block else "Not run with this version."
         shown = f"\n![{ALT}]({picture_of(name)})\n" if name in pictures else ""
         parts_of_page.append(f"## {title}\n\n{what}\n\n{told}\n{shown}")
     return "\n".join(parts_of_page)
