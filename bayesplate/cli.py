@@ -153,7 +153,7 @@ def compare(
 ) -> None:
     """Every method on CARD side by side.
 
-    As a thin and as a shear-flexible plate.
+    Each as a thin and as a shear-flexible plate.
     """
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
@@ -251,7 +251,7 @@ def plan(
 ) -> None:
     """What to measure next on CARD.
 
-    By what it is expected to give and what it costs.
+    Ranks measurements by what they are expected to give and what they cost.
     """
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
@@ -287,7 +287,7 @@ def plan(
 def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: Any) -> None:
     """Write a first card to PATH.
 
-    By asking, or from options where there are any.
+    It asks, or takes the options where there are any.
     """
     given = {name: value for name, value in answers.items() if value}
     options = given_answers(given)
@@ -330,7 +330,7 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
 def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bool, debug: bool, **given: Any) -> None:
     """Frequencies of the modes in recordings FILES.
 
-    With the [setup] that a card takes.
+    Writes the [setup] that a card takes, too.
     """
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.pick import FRAGMENT, PAGE

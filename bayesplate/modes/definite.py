@@ -36,10 +36,10 @@ def definite_solutions(matrices: Floats, loads: Floats) -> Floats:
     solutions = np.array(np.swapaxes(loads, 1, 2), order="C")  # and over these, column by column
     sizes = [ctypes.byref(ctypes.c_int(size)) for size in (r, n)]
     fault = ctypes.c_int()
-    solve = _dposv()
+    solve, first_factor, first_solution = _dposv(), factors.ctypes.data, solutions.ctypes.data
     for i in range(n_draws):
-        at, of = factors.ctypes.data + i * factors.strides[0], solutions.ctypes.data + i * solutions.strides[0]
-        solve(b"L", sizes[0], sizes[1], at, sizes[0], of, sizes[0], ctypes.byref(fault))
+        factor, solution = first_factor + i * factors.strides[0], first_solution + i * solutions.strides[0]
+        solve(b"L", sizes[0], sizes[1], factor, sizes[0], solution, sizes[0], ctypes.byref(fault))
         if fault.value:
             solutions[i] = np.nan
     return np.swapaxes(solutions, 1, 2)

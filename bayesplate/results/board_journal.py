@@ -68,10 +68,6 @@ class Journal:
         """The rows that stand there, in this order."""
         return (self.row(place) for place in places)
 
-    def forget_keys(self) -> None:
-        """Let go of where the rows of earlier runs stand; from here on a row is found by its place alone."""
-        self._places.clear()
-
     def keep(self, places: Iterable[int]) -> None:
         """Write the journal anew with these rows alone, in this order; it is closed then."""
         partial = self.path.with_name(self.path.name + ".partial")

@@ -146,7 +146,6 @@ def batch(
             places = run.fitted(by, journal, progress)
         aside, versions = tuple(boards.aside), run.versions
         del boards, run  # where the cards of very many boards stand is not needed any more
-        journal.forget_keys()
         written = write_table(folder.path, table, journal.rows(places))
         graded = grade(journal.rows(places), grading or GradingRequest())
         summary = _summary(journal.rows(places), seed, versions, aside)

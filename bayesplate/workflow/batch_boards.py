@@ -70,7 +70,7 @@ class Folder:
         self._strange: dict[int, str] = {}  # files whose name is not the board's
         entries, aside = [], []
         alike: dict[tuple[str, ...], tuple[str, ...]] = {}
-        for at, name in enumerate(_cards_in(path)):
+        for at, name in enumerate(sorted(file.name for file in path.glob("*.toml"))):
             file = path / name
             content = _content_of(file) if self._is_inside(file) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
@@ -148,14 +148,6 @@ def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] |
         remedy = "a board card with what all boards have in common"
         raise InputError(Fault("--template", "a card for the table", "none", remedy))
     return Table(path, os.fspath(template))
-
-
-def _cards_in(path: Path) -> list[str]:
-    """Names of the files that may be cards, sorted; plain strings, for `Path` interns the names that it lists."""
-    try:
-        return sorted(name for name in os.listdir(path) if name.endswith(".toml"))
-    except PermissionError:
-        return []
 
 
 def _content_of(file: Path) -> Mapping[str, Any]:

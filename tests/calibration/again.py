@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 from calibration.mutants import NARROWER, narrowed
 from calibration.records import Record
-from calibration.sbc import MOST_ATTEMPTS, MOST_STEPS, N_DRAWS
+from calibration.sbc import N_DRAWS, posterior_draws
 from calibration.table import family_p_value, is_calibrated, rows, text
+from calibration.truths import Design
 from numpy.typing import NDArray
 
 from bayesplate.errors import BayesplateError
@@ -113,23 +114,11 @@ def simulate_again(name: str, index: int, law: str | None = None) -> Record:
         ]
         second = with_readings(posterior, hertz)
         both = OfBoth(posterior.board, posterior.prior, posterior.models, posterior.law, second=second)
-        draws = _draws(replace(problem, posterior=both, is_forced=True), rng)
+        draws, _ = posterior_draws(replace(problem, posterior=both, is_forced=True), Design(), rng)
     except BayesplateError as error:
         return record | {"error": f"{type(error).__name__}: {error}"}
     ranks = {"production": _ranks(both, truth, draws), MUTANT: _ranks(both, truth, narrowed(draws, NARROWER[MUTANT]))}
     return record | {"ranks": ranks, "law": posterior.law, "seconds": round(time.perf_counter() - started, 2)}
-
-
-def _draws(problem: PosedProblem, rng: np.random.Generator) -> Floats:
-    """`N_DRAWS` of thousands, as in the calibration over the prior; a run that fails its gate is started anew."""
-    for _ in range(MOST_ATTEMPTS):
-        gate = Gate(tau_count_min=25.0, ess_min=10 * N_DRAWS)
-        settings = SamplerSettings(int(rng.integers(2**31)), 2, 16, max_steps=MOST_STEPS, gate=gate)
-        inference = infer(problem, settings)
-        if inference.convergence.passed:
-            pooled = inference.chains.pooled
-            return np.asarray(pooled[rng.choice(len(pooled), N_DRAWS, replace=False)])
-    raise BayesplateError("; ".join(inference.convergence.reasons))
 
 
 def _ranks(posterior: Posterior, truth: Floats, draws: Floats) -> dict[str, int]:

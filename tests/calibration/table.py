@@ -22,7 +22,7 @@ MUTANTS = {
     "noise fixed at half": 40,
     "sign of the Poisson ratio flipped": 40,
     "one mode counted twice": 1000,
-    "spread 0.7 of itself": 64,
+    "spread 0.7 of itself": 96,
     "spread 0.8 of itself": 200,
 }
 """Wrong posteriors that must be found out, and how many simulations that takes: see `test_bands` for the spreads."""
