@@ -83,6 +83,11 @@ class Convergence:
     n_kept_steps: int
     suggested_steps: int
 
+    @property
+    def n_taus(self) -> float:
+        """Length of each ensemble in autocorrelation times of the slowest parameter."""
+        return self.n_kept_steps / self.tau_max
+
 
 def burn_in_steps(n_steps: int) -> int:
     """Return how many of `n_steps` are discarded: a sixth, and at least 100 (or half of a very short run).
@@ -128,6 +133,17 @@ def autocorrelation_time(draws: FloatArray) -> FloatArray:
         outside = np.flatnonzero(np.arange(n_steps) >= _WINDOW * sums)
         tau[dim] = max(sums[outside[0] if outside.size else -1], 1.0)  # below 1 would claim more than independent draws
     return tau
+
+
+def length_in_taus(draws: FloatArray) -> float:
+    """Return the length of ensembles in autocorrelation times, of the slowest parameter in the slowest of them.
+
+    Parameters
+    ----------
+    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
+        After burn-in.
+    """
+    return draws.shape[1] / max(float(autocorrelation_time(ensemble).max()) for ensemble in draws)
 
 
 def split_rhat(draws: FloatArray) -> FloatArray:
@@ -238,9 +254,9 @@ def _faults_of_parameters(
     if never_moves.any():
         frozen = ", ".join(name for name, still in zip(names, never_moves, strict=True) if still)
         reasons.append(f"{frozen} never moves in an ensemble: check its prior and its bounds.")
-    if not found.n_kept_steps >= gate.tau_count_min * found.tau_max:
+    if not found.n_taus >= gate.tau_count_min:
         reasons.append(
-            f"The ensembles hold {found.n_kept_steps / found.tau_max:.1f} autocorrelation times of "
+            f"The ensembles hold {found.n_taus:.1f} autocorrelation times of "
             f"{names[int(np.argmax(found.tau))]}, {gate.tau_count_min:.0f} are wanted: allow "
             f"{found.suggested_steps} steps after burn-in."
         )

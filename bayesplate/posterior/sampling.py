@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.posterior.checkpoint import Checkpoint, Chunk
-from bayesplate.posterior.convergence import Convergence, Gate, acceptance_by_walker, assess, burn_in_steps
+from bayesplate.posterior.convergence import (
+    Convergence,
+    Gate,
+    acceptance_by_walker,
+    assess,
+    burn_in_steps,
+    length_in_taus,
+)
 from bayesplate.posterior.ensembles import Learnt, advance, correcting, crossed, stepping
 from bayesplate.posterior.moves import CorrectedSteps, Steps
 from bayesplate.posterior.starting import Evaluate, GuardedPosterior, LogPosterior, random_numbers, start_ensembles
@@ -114,8 +121,8 @@ class Progress:
     ----------
     n_steps, max_steps : int
         Steps done and allowed.
-    convergence : Convergence or None
-        The last judgement; None before the first.
+    n_taus : float or None
+        Length of the ensembles in autocorrelation times when it was last computed; None before.
     stage : str
         What of a longer run is being done; empty if it is nothing but this sampling.
     done : float or None
@@ -124,16 +131,14 @@ class Progress:
 
     n_steps: int
     max_steps: int
-    convergence: Convergence | None
+    n_taus: float | None = None
     stage: str = ""
     done: float | None = None
 
     @property
     def sampled(self) -> float:
         """Share of this sampling, by its autocorrelation times: 0 to 1."""
-        if self.convergence is None:
-            return 0.0
-        return min(self.convergence.n_kept_steps / self.convergence.tau_max / Gate().tau_count_min, 1.0)
+        return min((self.n_taus or 0.0) / Gate().tau_count_min, 1.0)
 
 
 def sample(
@@ -228,7 +233,7 @@ def sample(
                 seed=settings.seed,
             )
         learnt = None
-        convergence = None
+        convergence = n_taus = None
         warm_up = WarmUp()
         while True:
             n_steps = len(chunks) * settings.chunk_steps
@@ -237,9 +242,11 @@ def sample(
             at_end = n_steps >= settings.max_steps
             if at_end or (is_over and _gate_is_due(n_steps, warm_up.end * settings.chunk_steps, settings.chunk_steps)):
                 chains = _joined(chunks, warm_up.end, is_corrected=cheap is not None)
-                convergence = assess(chains.kept, settings.gate, names=names)
+                n_taus = length_in_taus(chains.kept)
+                if at_end or n_taus >= settings.gate.tau_count_min:  # the rule that takes longest: the others can wait
+                    convergence = assess(chains.kept, settings.gate, names=names)
             if progress is not None and chunks:
-                progress(Progress(n_steps, settings.max_steps, convergence))
+                progress(Progress(n_steps, settings.max_steps, n_taus))
             if convergence is not None and (at_end or convergence.passed):
                 return chains, convergence
             if chunks:

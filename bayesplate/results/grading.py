@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -78,20 +78,20 @@ class Grading:
     meets_all: Floats | None
     pairs: tuple[Pair, ...]
 
-    def spread(self, figure: LogFigure) -> tuple[Floats, Floats, Floats]:
-        """Median, and the ends of the 90 % interval of each board, in the unit of people: (n,) arrays."""
-        mean, sd = figure.log(self.log_mean, self.triangles)
+    def spread(self, figure: LogFigure, boards: slice | Sequence[int] = slice(None)) -> tuple[Floats, Floats, Floats]:
+        """Median, and the ends of the 90 % interval of some boards, in the unit of people: (n,) arrays."""
+        mean, sd = figure.log(self.log_mean[boards], self.triangles[boards])
         middle, low, high = (np.exp(mean + at * sd) / figure.per_unit for at in (0.0, -_NINETY, _NINETY))
         return middle, low, high
 
     @property
-    def partners(self) -> dict[int, tuple[int, float]]:
-        """The partner of each board that has one, by place, and the probability that they match."""
-        found = {}
+    def partners(self) -> tuple[NDArray[np.int32], Floats]:
+        """Place of each board's partner, -1 where it has none, and the probability that they match: (n,) arrays."""
+        partner, probability = np.full(len(self.names), -1, dtype=np.int32), np.zeros(len(self.names))
         for pair in self.pairs:
-            found[pair.first] = (pair.second, pair.probability)
-            found[pair.second] = (pair.first, pair.probability)
-        return found
+            partner[[pair.first, pair.second]] = pair.second, pair.first
+            probability[[pair.first, pair.second]] = pair.probability
+        return partner, probability
 
 
 def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:

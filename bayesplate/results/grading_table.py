@@ -20,6 +20,8 @@ from bayesplate.results.words import percent, plus_minus
 GRADING = "grading.csv"
 MOST_LISTED, MOST_ON_TERMINAL = 100, 20
 """Boards that a table for people has; all of them are in grading.csv."""
+_AT_ONCE = 256
+"""Boards whose figures are computed together."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ def _which(most: int, n: int) -> str:
 
 
 def _figures_table(graded: Grading, some: list[int], title: str, figures: dict[str, LogFigure]) -> Table:
-    columns = [_column(graded, figure) for figure in figures.values()]
-    rows = tuple((graded.names[i], *(column[i] for column in columns)) for i in some)
+    columns = [_column(graded, some, figure) for figure in figures.values()]
+    rows = tuple((graded.names[i], *cells) for i, *cells in zip(some, *columns, strict=True))
     heads = (_head(name, figure) for name, figure in figures.items())
     return Table(title, ("board", *heads), rows)
 
@@ -75,9 +77,9 @@ def _head(name: str, figure: LogFigure) -> str:
     return f"{told}{figure.words}" + ("" if figure.unit == "1" else f", {figure.unit}")
 
 
-def _column(graded: Grading, figure: LogFigure) -> list[str]:
-    middle = graded.spread(figure)[0]
-    sd = figure.log(graded.log_mean, graded.triangles)[1]
+def _column(graded: Grading, some: list[int], figure: LogFigure) -> list[str]:
+    middle = graded.spread(figure, some)[0]
+    sd = figure.log(graded.log_mean[some], graded.triangles[some])[1]
     return [plus_minus(_Number(float(one), float(one * share))) for one, share in zip(middle, sd, strict=True)]
 
 
@@ -132,11 +134,13 @@ def _header(graded: Grading) -> list[Cell]:
 
 def _rows(graded: Grading) -> Iterator[list[Cell]]:
     figures = [*(FIGURES[name] for name in MODULI), *graded.request.figures.values()]
-    spreads = [[end * one.per_unit for end in graded.spread(one)] for one in figures]
-    partners = graded.partners
-    for i, name in enumerate(graded.names):
-        numbers = [float(end[i]) for one in spreads for end in one]
-        limits = [float(one[i]) for one in graded.meets.values()]
-        whole = [] if graded.meets_all is None else [float(graded.meets_all[i])]
-        partner, probability = partners.get(i, (None, None))
-        yield [name, *numbers, *limits, *whole, None if partner is None else graded.names[partner], probability]
+    partner, probability = graded.partners
+    for start in range(0, len(graded.names), _AT_ONCE):
+        places = range(start, min(start + _AT_ONCE, len(graded.names)))
+        spreads = [end * one.per_unit for one in figures for end in graded.spread(one, places)]
+        for i in places:
+            numbers = [float(end[i - start]) for end in spreads]
+            limits = [float(one[i]) for one in graded.meets.values()]
+            whole = [] if graded.meets_all is None else [float(graded.meets_all[i])]
+            match = [None, None] if partner[i] < 0 else [graded.names[partner[i]], float(probability[i])]
+            yield [graded.names[i], *numbers, *limits, *whole, *match]

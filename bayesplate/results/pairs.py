@@ -56,6 +56,17 @@ def proposed_pairs(log_mean: Floats, triangles: Floats, percent: Mapping[str, fl
     """
     if len(log_mean) < 2 or not percent:
         return ()
+    first, second, probability = _matches(log_mean, triangles, percent)
+    pairs, taken = [], np.zeros(len(log_mean), dtype=bool)
+    for i in np.lexsort((second, first, -probability)):
+        if not taken[first[i]] and not taken[second[i]]:
+            pairs.append(Pair(int(first[i]), int(second[i]), float(probability[i])))
+            taken[[first[i], second[i]]] = True
+    return tuple(pairs)
+
+
+def _matches(log_mean: Floats, triangles: Floats, percent: Mapping[str, float]) -> tuple[Rows, Rows, Floats]:
+    """All pairs that may be proposed: both boards and the probability that they match, (n_pairs,) arrays."""
     along = np.stack([FIGURES[name].direction for name in percent])
     width = np.log1p(np.array(list(percent.values())) / 100.0)
     mean = log_mean @ along.T
@@ -70,13 +81,7 @@ def proposed_pairs(log_mean: Floats, triangles: Floats, percent: Mapping[str, fl
         firsts.extend(one[may_match])
         seconds.extend(other[may_match])
         probabilities.extend(probability[may_match])
-    first, second, found = np.asarray(firsts), np.asarray(seconds), np.asarray(probabilities)
-    pairs, taken = [], np.zeros(len(mean), dtype=bool)
-    for i in np.lexsort((second, first, -found)):
-        if not taken[first[i]] and not taken[second[i]]:
-            pairs.append(Pair(int(first[i]), int(second[i]), float(found[i])))
-            taken[[first[i], second[i]]] = True
-    return tuple(pairs)
+    return np.asarray(firsts), np.asarray(seconds), np.asarray(probabilities)
 
 
 def _pairs_of(nearest: Rows, start: int, end: int) -> tuple[Rows, Rows]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -21,35 +20,18 @@ _OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """Where one board of a batch is to be found; small, for there may be very many.
-
-    Attributes
-    ----------
-    name : str
-        Of the board, before it is known whether it may be one.
-    at : int
-        Which of the source.
-    alike : tuple of str
-        What boards have in common that share their matrices: they are fitted one after another.
-    """
-
-    name: str
-    at: int
-    alike: tuple[str, ...] = ()
-
-
 class Source(Protocol):
-    """Where boards come from."""
+    """Where boards come from; little is kept of each, for there may be very many."""
 
-    entries: Sequence[Entry]
-    """In the order of their names."""
+    names: Sequence[str]
+    """Of the boards, in their order, before it is known whether each may be one."""
+    alike: Sequence[tuple[str, ...]]
+    """What boards have in common that share their matrices: they are fitted one after another."""
     aside: Sequence[str]
     """Files that were left aside, because they are cards of another kind."""
 
-    def card(self, entry: Entry) -> BoardCard:
-        """The card of a board; raises InputError with all its faults."""
+    def card(self, at: int) -> BoardCard:
+        """The card of the board at a place among the names; raises InputError with all its faults."""
 
 
 class Folder:
@@ -68,27 +50,31 @@ class Folder:
     def __init__(self, path: Path) -> None:
         self._path, self._inside = path, os.path.realpath(path)
         self._strange: dict[int, str] = {}  # files whose name is not the board's
-        entries, aside = [], []
-        alike: dict[tuple[str, ...], tuple[str, ...]] = {}
-        for at, name in enumerate(sorted(file.name for file in path.glob("*.toml"))):
+        names: list[str] = []
+        alike: list[tuple[str, ...]] = []
+        aside: list[str] = []
+        kept: dict[tuple[str, ...], tuple[str, ...]] = {}
+        for name in sorted(file.name for file in path.glob("*.toml")):
             file = path / name
             content = _content_of(file) if self._is_inside(file) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
             if is_other or content.keys() == {"setup"}:
-                aside.append(plain(file.name))
-            else:
-                shared = _alike(content)
-                entries.append(Entry(plain(file.stem), at, alike.setdefault(shared, shared)))
-                if f"{entries[-1].name}.toml" != name:
-                    self._strange[at] = name
-        if not entries:
+                aside.append(plain(name))
+                continue
+            if f"{plain(file.stem)}.toml" != name:
+                self._strange[len(names)] = name
+            names.append(plain(file.stem))
+            shared = _alike(content)
+            alike.append(kept.setdefault(shared, shared))
+        if not names:
             raise InputError(Fault(plain(str(path)), "a folder with board cards (NAME.toml)", "none in it"))
-        self.entries: Sequence[Entry] = entries
+        self.names: Sequence[str] = names
+        self.alike: Sequence[tuple[str, ...]] = alike
         self.aside: Sequence[str] = aside
 
-    def card(self, entry: Entry) -> BoardCard:
+    def card(self, at: int) -> BoardCard:
         """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
-        path = self._path / self._strange.get(entry.at, f"{entry.name}.toml")
+        path = self._path / self._strange.get(at, f"{self.names[at]}.toml")
         if not self._is_inside(path):
             wanted, remedy = "a card in the folder of the batch", "copy the card"
             raise InputError(Fault(plain(path.name), wanted, "a link that leads out of it", remedy))
@@ -119,13 +105,17 @@ class Table:
         self._columns = Columns(Template(template), header, file)
         if not self._rows:
             raise InputError(Fault(file, "a row for each board", "no row"))
-        named = [(plain(self._columns.name_of(row)) or f"row-{i}", i) for i, row in enumerate(self._rows, start=1)]
-        self.entries: Sequence[Entry] = [Entry(name, i) for name, i in sorted(named)]
+        own = (plain(self._columns.name_of(row)) for row in self._rows)
+        named = sorted((name or f"row-{i}", i) for i, name in enumerate(own, start=1))
+        self.names: Sequence[str] = [name for name, _ in named]
+        self.alike: Sequence[tuple[str, ...]] = [()] * len(named)
         self.aside: Sequence[str] = ()
+        self._numbers = [number for _, number in named]
 
-    def card(self, entry: Entry) -> BoardCard:
+    def card(self, at: int) -> BoardCard:
         """The card of a row; raises InputError with all its faults."""
-        return self._columns.card(self._rows[entry.at - 1], entry.at)
+        number = self._numbers[at]
+        return self._columns.card(self._rows[number - 1], number)
 
 
 def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] | None) -> Source:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from bayesplate.cards.words import did_you_mean, quoted
 from bayesplate.errors import Fault, InputError, plain
@@ -12,6 +13,7 @@ from bayesplate.results.grading import GradingRequest
 from bayesplate.results.log_figures import FIGURES
 from bayesplate.results.normal_box import MOST
 
+_RANGE = "positive numbers, the least before the greatest, at least one of them"
 _MATCHED = tuple(name for name in FIGURES if name[0] in "EG" or name == "density")
 
 
@@ -85,9 +87,8 @@ def _limit(name: str, ends: str, told: str, faults: list[Fault]) -> tuple[float 
             Fault(place, f"LEAST:GREATEST in {FIGURES[name].unit}, one of them may be left away", quoted(ends))
         )
         return None
-    given = [one for one in (low, high) if one is not None]
-    if min(given) <= 0.0 or given != sorted(set(given)):
-        faults.append(Fault(place, "positive numbers, the least before the greatest", quoted(ends)))
+    if not _is_range((low, high)):
+        faults.append(Fault(place, _RANGE, quoted(ends)))
         return None
     factor = FIGURES[name].per_unit
     return (None if low is None else low * factor, None if high is None else high * factor)
@@ -127,12 +128,15 @@ def grading_faults(name: str, value: object) -> Iterator[Fault]:
 def _limit_faults(place: str, limit: object) -> Iterator[Fault]:
     if not isinstance(limit, tuple) or len(limit) != 2:
         yield Fault(place, "a pair (least, greatest), SI, None for no limit", repr(limit))
-        return
+    elif not _is_range(limit):
+        yield Fault(place, _RANGE, repr(limit))
+
+
+def _is_range(limit: tuple[Any, Any]) -> bool:
+    """Whether at least one end is there, and those that are there are as they should be."""
+    low, high = limit
     given = [one for one in limit if one is not None]
-    if not given or not all(_is_positive(one) for one in given):
-        yield Fault(place, "positive numbers, at least one of them", repr(limit))
-    elif len(given) == 2 and given[0] >= given[1]:
-        yield Fault(place, "the least value before the greatest", f"{given[0]:g} and {given[1]:g}")
+    return bool(given) and all(map(_is_positive, given)) and (len(given) < 2 or low < high)
 
 
 def _is_positive(value: object) -> bool:

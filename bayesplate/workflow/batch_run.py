@@ -26,7 +26,7 @@ from bayesplate.results.board_journal import Journal
 from bayesplate.results.board_rows import BoardRow, row_of
 from bayesplate.results.folder import BOARDS, SUMMARY
 from bayesplate.results.versions import versions
-from bayesplate.workflow.batch_boards import Entry, Source
+from bayesplate.workflow.batch_boards import Source
 from bayesplate.workflow.batch_pool import Call, WorkerDied, Workers, computed
 from bayesplate.workflow.fit_board import FitRequest, fit_board, fit_board_into
 from bayesplate.workflow.prepare import prepared_card
@@ -57,9 +57,9 @@ class Run:
 
     def fitted(self, by: Workers, journal: Journal, progress: Callable[[Progress], None] | None) -> array[int]:
         """Fit the boards that the journal does not hold; where all their rows stand, in the order of their names."""
-        places = array("q", bytes(8 * len(self.boards.entries)))
+        places = array("q", bytes(8 * len(self.boards.names)))
         refused: dict[str, int] = {}  # rows of boards of one name are alike
-        done = _Done(len(self.boards.entries), progress)
+        done = _Done(len(self.boards.names), progress)
 
         def write(at: int, key: str, row: BoardRow) -> None:
             place = refused.get(key, journal.place(key))
@@ -70,49 +70,49 @@ class Run:
             places[at] = place
             done.tell(row.is_fitted)
 
-        def calls() -> Iterator[tuple[tuple[int, str, Entry, str, int], Call]]:
-            twice = _named_twice(self.boards.entries)
-            order = sorted(range(len(self.boards.entries)), key=lambda i: self.boards.entries[i].alike)
-            for at in order:
-                entry = self.boards.entries[at]
-                posed = self._posed(entry, twice)
+        def calls() -> Iterator[tuple[tuple[int, str, str, int], Call]]:
+            twice = _named_twice(self.boards.names)
+            for at in sorted(range(len(self.boards.names)), key=self.boards.alike.__getitem__):
+                posed = self._posed(at, twice)
                 if isinstance(posed, BoardRow):
                     write(at, _hash("refused", posed.to_json()), posed)
-                elif (row := self._done(posed.key, entry, journal)) is not None:
+                elif (row := self._done(posed.key, at, journal)) is not None:
                     write(at, posed.key, row)
                 else:
-                    yield (at, posed.key, entry, posed.card_sha256, posed.seed), posed.call
+                    yield (at, posed.key, posed.card_sha256, posed.seed), posed.call
 
         with closing(computed(by, calls())) as answers:
-            for (at, key, entry, card_sha256, seed), future in answers:
-                row = _answer(entry, future)
+            for (at, key, card_sha256, seed), future in answers:
+                row = _answer(self.boards.names[at], future)
                 write(at, key, row if row.is_fitted else replace(row, card_sha256=card_sha256, seed=seed))
         return places
 
-    def _done(self, key: str, entry: Entry, journal: Journal) -> BoardRow | None:
+    def _done(self, key: str, at: int, journal: Journal) -> BoardRow | None:
         """The row of an earlier run, where there is one and the board need not be computed again."""
         place = journal.place(key)
         if place is None:
             return None
         row = journal.row(place)
-        is_there = not self.folders or not row.is_fitted or (self.folder / BOARDS / entry.name / SUMMARY).is_file()
+        own = self.folder / BOARDS / self.boards.names[at] / SUMMARY
+        is_there = not self.folders or not row.is_fitted or own.is_file()
         return row if row.outcome not in _AGAIN and is_there else None
 
-    def _posed(self, entry: Entry, twice: frozenset[str]) -> _Posed | BoardRow:
+    def _posed(self, at: int, twice: frozenset[str]) -> _Posed | BoardRow:
         """What is to be computed of a board, or the row that says why nothing is."""
-        if entry.name.casefold() in twice:
-            return BoardRow(entry.name, _REFUSED, f"wanted a name of its own, got {entry.name} more than once")
+        name = self.boards.names[at]
+        if name.casefold() in twice:
+            return BoardRow(name, _REFUSED, f"wanted a name of its own, got {name} more than once")
         try:
-            card = self.boards.card(entry)
+            card = self.boards.card(at)
             named = load_named(card)
             if named.faults or named.prior is None:
                 prepared_card(card, named, self.request.effects)  # which raises with all other faults as well
         except InputError as error:
-            return BoardRow(entry.name, _REFUSED, _one_line(error))
+            return BoardRow(name, _REFUSED, _one_line(error))
         assert named.prior is not None
         seed = int(_hash(self.request.seed, card.sha256)[:8], 16)
         request = replace(self.request, seed=seed, tables=dict(named.tables))
-        tables = {name: repr(one) for name, one in sorted(named.tables.items())}
+        tables = {table: repr(one) for table, one in sorted(named.tables.items())}
         asked = {**asdict(replace(request, tables={})), "tables": tables}
         key = _hash(FORMAT, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
         arguments = (card, named.prior, request)
@@ -146,10 +146,10 @@ class _Done:
         if self._tell is not None and (self._n_done % every == 0 or self._n_done == self._n):
             failed = f", {self._n_failed} not fitted" if self._n_failed else ""
             stage = f"{self._n_done} of {self._n} boards{failed}"
-            self._tell(Progress(0, 0, None, stage=stage, done=self._n_done / self._n))
+            self._tell(Progress(0, 0, stage=stage, done=self._n_done / self._n))
 
 
-def _answer(entry: Entry, future: Future[Any]) -> BoardRow:
+def _answer(name: str, future: Future[Any]) -> BoardRow:
     """The row of a board that was computed."""
     error = future.exception()
     if error is None:
@@ -160,19 +160,18 @@ def _answer(entry: Entry, future: Future[Any]) -> BoardRow:
     if type(error).__name__ == "KilledWorker":  # Dask's word for it
         outcome = _DIED
     told = "" if isinstance(error, BayesplateError | WorkerDied) else f"{type(error).__name__}: "
-    return BoardRow(entry.name, outcome, told + _one_line(error))
+    return BoardRow(name, outcome, told + _one_line(error))
 
 
 def _one_line(error: BaseException) -> str:
     return "; ".join(str(error).splitlines())
 
 
-def _named_twice(entries: Sequence[Entry]) -> frozenset[str]:
+def _named_twice(names: Sequence[str]) -> frozenset[str]:
     """Names that several boards have: none of them is fitted, for nobody could tell whose row or folder it is."""
     seen: set[str] = set()
     twice: set[str] = set()
-    for entry in entries:
-        name = entry.name.casefold()
+    for name in map(str.casefold, names):
         (twice if name in seen else seen).add(name)
     return frozenset(twice)
 

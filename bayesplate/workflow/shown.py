@@ -177,8 +177,6 @@ def _time_words(seconds: float) -> str:
 
 def _sampling_text(progress: Progress) -> str:
     text = f"sampling: step {progress.n_steps} of at most {progress.max_steps}"
-    verdict = progress.convergence
-    if verdict is None:
+    if progress.n_taus is None:
         return text
-    n_taus = verdict.n_kept_steps / verdict.tau_max
-    return f"{text}; {n_taus:.0f} of {Gate().tau_count_min:.0f} autocorrelation times, R-hat {verdict.rhat_max:.4f}"
+    return f"{text}; {progress.n_taus:.0f} of {Gate().tau_count_min:.0f} autocorrelation times"

@@ -45,4 +45,4 @@ class Stages:
         whole = self._past + self._length + self.left
         self._done = max(self._done, (self._past + share * self._length) / whole)
         if self.tell is not None:
-            self.tell(replace(progress or Progress(0, 0, None), stage=self._stage, done=self._done))
+            self.tell(replace(progress or Progress(0, 0), stage=self._stage, done=self._done))

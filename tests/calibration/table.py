@@ -21,7 +21,7 @@ MUTANTS = {
     "likelihood omitted": 40,
     "noise fixed at half": 40,
     "sign of the Poisson ratio flipped": 40,
-    "one mode counted twice": 1000,
+    "one mode counted twice": 400,
     "spread 0.7 of itself": 96,
     "spread 0.8 of itself": 200,
 }

@@ -126,7 +126,7 @@ def read_boards(content: str | bytes) -> None:
 
     def read() -> Any:
         boards = boards_of(path, BENCH["folder"] / "template.toml")
-        return [accepted_or_refused(lambda entry=entry: boards.card(entry)) for entry in boards.entries]
+        return [accepted_or_refused(lambda at=at: boards.card(at)) for at in range(len(boards.names))]
 
     accepted_or_refused(read, BENCH["folder"])
 
@@ -137,7 +137,7 @@ def read_folder(content: str | bytes) -> None:
 
     def read() -> Any:
         boards = boards_of(BENCH["folder"], None)
-        return [accepted_or_refused(lambda entry=entry: boards.card(entry)) for entry in boards.entries]
+        return [accepted_or_refused(lambda at=at: boards.card(at)) for at in range(len(boards.names))]
 
     accepted_or_refused(read, BENCH["folder"])
 
@@ -191,7 +191,7 @@ def test_what_is_spoilt_here_was_sound():
     assert len(read_board_text(text, BOARD).setups[0].frequencies_hz) == 1
     assert load_campaign(written("together.toml", CAMPAIGN)).name == "together"
     boards = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
-    assert [boards.card(entry).name for entry in boards.entries] == ["a", "b"]
+    assert [boards.card(at).name for at in range(len(boards.names))] == ["a", "b"]
 
 
 HUGE = "0x" + "f" * 5000
@@ -204,9 +204,9 @@ def test_a_huge_number_in_one_card_stops_no_batch(tmp_path):
         text = CARD.replace(BOARD, name).replace("length_x_mm = 253", f"length_x_mm = {length}")
         (tmp_path / f"{name}.toml").write_text(text)
     boards = boards_of(tmp_path, None)
-    found = [accepted_or_refused(lambda entry=entry: boards.card(entry)) for entry in boards.entries]
+    found = [accepted_or_refused(lambda at=at: boards.card(at)) for at in range(len(boards.names))]
 
-    assert [entry.name for entry in boards.entries] == ["a", "b", "c"]
+    assert list(boards.names) == ["a", "b", "c"]
     assert [isinstance(one, InputError) for one in found] == [False, True, True]
 
 
@@ -219,7 +219,7 @@ def test_a_huge_number_beside_a_fragment_or_a_table_is_a_fault_of_its_key(tmp_pa
     (tmp_path / "boards.csv").write_text(ROWS)
     boards = boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
 
-    for read in (lambda: read_board_text(merged_text, BOARD), lambda: boards.card(boards.entries[0])):
+    for read in (lambda: read_board_text(merged_text, BOARD), lambda: boards.card(0)):
         with pytest.raises(InputError, match=r"length_x_mm: wanted a number from .*, got a whole number of 20000 bits"):
             read()
 

@@ -13,6 +13,7 @@ from bayesplate.posterior.convergence import (
     assess,
     autocorrelation_time,
     burn_in_steps,
+    length_in_taus,
     split_rhat,
 )
 
@@ -44,6 +45,11 @@ def test_the_autocorrelation_time_is_that_of_emcee():
     draws = renewal_draws(n_ensembles=1, n_steps=3000)[0]
     assert autocorrelation_time(draws) == pytest.approx(emcee.autocorr.integrated_time(draws, tol=0), rel=0.03)
     assert autocorrelation_time(draws) == pytest.approx(TAU, rel=0.1)
+
+
+def test_the_length_that_a_run_waits_for_is_the_one_that_is_judged():
+    draws = renewal_draws(n_steps=200)
+    assert length_in_taus(draws) == assess(draws).n_taus < Gate().tau_count_min
 
 
 def test_a_walker_that_stays_apart_lengthens_the_time():
@@ -173,7 +179,7 @@ RULES = {
     ),
     "fewer than 50 autocorrelation times": (
         "autocorrelation times of",
-        lambda: cut_where(lambda one: one.n_kept_steps / one.tau_max, 50.0, renewal_draws(n_steps=700, n_dim=1)),
+        lambda: cut_where(lambda one: one.n_taus, 50.0, renewal_draws(n_steps=700, n_dim=1)),
     ),
     "an ensemble that accepts less than 0.15": (
         "accepts 15 % of its proposals",

@@ -107,7 +107,9 @@ def test_pairs_match_with_the_probability_that_draws_give(values):
     assert (pair.first, pair.second) == (0, 1)
     assert 0.5 < expected < 0.95
     assert pair.probability == pytest.approx(expected, abs=0.004)
-    assert graded.partners == {0: (1, pair.probability), 1: (0, pair.probability)}
+    partner, probability = graded.partners
+    assert partner.tolist() == [1, 0, -1, -1]
+    assert probability.tolist() == [pair.probability, pair.probability, 0.0, 0.0]
 
 
 def test_a_wide_board_matches_less_probably_than_a_near_one_and_tolerance_decides(values):

@@ -67,7 +67,7 @@ def test_what_is_no_board_card_is_left_aside(cards, tmp_path):
     found = boards_of(folder, None)
 
     assert set(found.aside) == {"own-prior.toml", "setup.toml"}
-    assert "unfinished" in {entry.name for entry in found.entries}
+    assert "unfinished" in found.names
 
 
 @pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
@@ -83,11 +83,11 @@ def test_a_link_out_of_the_folder_is_no_card_of_it(tmp_path):
     found = boards_of(folder, None)
 
     read = {}
-    for entry in found.entries:
+    for at, name in enumerate(found.names):
         try:
-            read[entry.name] = found.card(entry).name
+            read[name] = found.card(at).name
         except InputError as error:
-            read[entry.name] = str(error)
+            read[name] = str(error)
 
     assert (read["a"], read["c"]) == ("a", "c")
     assert read["b"] == (
@@ -279,7 +279,7 @@ def table(tmp_path) -> Path:
 
 def test_a_row_is_the_card_that_the_template_and_its_cells_make(table):
     boards = boards_of(table, table.parent / "template.toml")
-    one, two = (boards.card(entry) for entry in boards.entries if entry.name in ("top-1", "top-2"))
+    one, two = (boards.card(at) for at, name in enumerate(boards.names) if name in ("top-1", "top-2"))
 
     assert (one.plate.mass_g.mean, one.plate.mass_g.sd, one.plate.density_kg_m3) == (300.0, 2.0, None)
     assert one.plate.thickness_mm.mean == 3.1
@@ -336,7 +336,7 @@ def test_a_table_in_parquet_says_the_same(table, tmp_path):
     texts = []
     for file in ("tops.csv", "tops.parquet"):
         boards = boards_of(tmp_path / file, tmp_path / "template.toml")
-        texts.append([boards.card(entry).text for entry in boards.entries if entry.name in ("top-1", "top-2")])
+        texts.append([boards.card(at).text for at, name in enumerate(boards.names) if name in ("top-1", "top-2")])
 
     assert texts[0] == texts[1]
     assert len(texts[0]) == 2

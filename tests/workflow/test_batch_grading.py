@@ -41,16 +41,14 @@ def test_limits_that_no_board_meets_are_refused_as_they_were_written(ends):
     with pytest.raises(InputError) as refused:
         grading_request(None, [f"E_x={ends}"], None)
 
-    assert f'--limit E_x={ends}: wanted positive numbers, the least before the greatest, got "{ends}"' in str(
-        refused.value
-    )
+    assert f"--limit E_x={ends}: wanted positive numbers, the least before the greatest, at" in str(refused.value)
 
 
 BAD = [
     (GradingRequest(match_percent={"E_z": 1.0}), "grading match_percent: wanted names of E_x, E_y, G_xy, density"),
     (GradingRequest(match_percent={"E_x": -1.0}), "grading match_percent E_x: wanted a positive number"),
-    (GradingRequest(limits={"E_x": (3.0, 2.0)}), "grading limits E_x: wanted the least value before the greatest"),
-    (GradingRequest(limits={"E_x": (None, None)}), "grading limits E_x: wanted positive numbers, at least one"),
+    (GradingRequest(limits={"E_x": (3.0, 2.0)}), "grading limits E_x: wanted positive numbers, the least before"),
+    (GradingRequest(limits={"E_x": (None, None)}), "grading limits E_x: wanted positive numbers, the least before"),
     (GradingRequest(limits={"E_x": 3.0}), "grading limits E_x: wanted a pair"),
     (GradingRequest(limits={"speed": (1.0, 2.0)}), "grading limits: wanted names of E_x"),
     (GradingRequest(rigidity=float("nan")), "grading rigidity: wanted a positive number of N m"),

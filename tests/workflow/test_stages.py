@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 
 from bayesplate.posterior.convergence import Gate
@@ -14,7 +12,7 @@ from bayesplate.workflow.stages import Stages
 
 
 def sampled(n_taus: float) -> Progress:
-    return Progress(100, 20_000, SimpleNamespace(n_kept_steps=n_taus * 10.0, tau_max=10.0, rhat_max=1.01))
+    return Progress(100, 20_000, n_taus)
 
 
 def test_the_share_is_that_of_the_whole_and_never_falls():
@@ -54,7 +52,7 @@ def test_the_line_tells_the_share_and_the_time_left(done, seconds, words):
 def test_sampling_within_a_part_is_told_after_it():
     text = progress_text(Progress(25, 20_000, None, "fit", 0.5), 10.0)
     assert text == "50 % done, about 10 s left: fit; sampling: step 25 of at most 20000"
-    assert progress_text(Progress(25, 20_000, None)) == "sampling: step 25 of at most 20000"
+    assert progress_text(Progress(25, 20_000)) == "sampling: step 25 of at most 20000"
 
 
 def test_a_line_is_printed_when_a_part_begins_and_now_and_then_while_sampling(capsys):
