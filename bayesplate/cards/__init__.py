@@ -6,6 +6,7 @@ from bayesplate.cards.board import (
     MaterialSection,
     PlateSection,
     load_board,
+    load_board_in,
     read_board_text,
 )
 from bayesplate.cards.campaign import CampaignCard, SharedSection, is_campaign, load_campaign
@@ -57,6 +58,7 @@ __all__ = [
     "find",
     "is_campaign",
     "load_board",
+    "load_board_in",
     "load_campaign",
     "load_coefficients",
     "load_named",

@@ -100,14 +100,16 @@ class BoardCard(Section):
         alias="setup", description="a [setup] table, or several [[setup]]"
     )
     _written: Mapping[str, Any] = PrivateAttr({})
-    _path: Path | None = PrivateAttr(None)
+    _folder: Path | None = PrivateAttr(None)
+    _file: str = PrivateAttr("")
     _sha256: str = PrivateAttr("")
     _text: str = PrivateAttr("")
 
     def model_post_init(self, context: Any) -> None:
         """Keep where the card comes from."""
         self._written = (context or {}).get("written", {})
-        self._path = (context or {}).get("path")
+        self._folder = (context or {}).get("folder")
+        self._file = (context or {}).get("file", "")
         self._sha256 = (context or {}).get("sha256", "")
         self._text = (context or {}).get("text", "")
 
@@ -119,7 +121,17 @@ class BoardCard(Section):
     @property
     def path(self) -> Path | None:
         """The card's file; None if it was read from a text."""
-        return self._path
+        return None if self._folder is None else self._folder / self._file
+
+    @property
+    def folder(self) -> Path | None:
+        """Where cards that it names by a relative path are looked for; None for the working directory."""
+        return self._folder
+
+    @property
+    def file(self) -> str:
+        """The name of its file, as messages show it."""
+        return plain(self._file) or f"{self.name}.toml"
 
     @property
     def sha256(self) -> str:
@@ -163,7 +175,15 @@ def load_board(
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
     path = find("boards", name_or_path)
-    return _read_board(read_file(path), plain(path.name), path.stem, path, may_lack_frequencies, setup)
+    return _read_board(read_file(path), path.name, path.stem, path.parent, may_lack_frequencies, setup)
+
+
+def load_board_in(folder: Path, file: str) -> BoardCard:
+    """Read a board card of a folder; raises InputError like `load_board`.
+
+    It makes no path of the file's name: Python's table of the names in paths would grow with the cards that are read.
+    """
+    return _read_board(read_file(os.path.join(folder, file)), file, os.path.splitext(file)[0], folder)
 
 
 def read_board_text(
@@ -180,18 +200,18 @@ def read_board_text(
     """
     stem = name.removesuffix(".toml")
     data = text.encode("utf-8", "surrogatepass")
-    path = None if beside is None else beside / f"{plain(stem)}.toml"
-    return _read_board(data, f"{plain(stem)}.toml", stem, path, may_lack_frequencies, setup)
+    return _read_board(data, f"{plain(stem)}.toml", stem, beside, may_lack_frequencies, setup)
 
 
 def _read_board(
     data: bytes,
     file: str,
     stem: str,
-    path: Path | None,
+    folder: Path | None,
     may_lack_frequencies: bool = False,
     setup: str | os.PathLike[str] | None = None,
 ) -> BoardCard:
+    own, file = file, plain(file)
     table = read_table(data, file)
     if setup is not None:
         together, file = merged(table, file, setup)
@@ -200,7 +220,8 @@ def _read_board(
     faults = [*name_faults(table, file, stem), *_mass_faults(table, file), *_setup_name_faults(table, file)]
     context = {
         "written": table,
-        "path": path,
+        "folder": folder,
+        "file": own,
         "sha256": hashlib.sha256(data).hexdigest(),
         "text": data.decode("utf-8"),
         "may_lack_frequencies": may_lack_frequencies,

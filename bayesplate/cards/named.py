@@ -12,7 +12,7 @@ from bayesplate.cards.board import BoardCard
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.prior import PriorCard, load_prior
 from bayesplate.cards.words import setup_places
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.errors import Fault, InputError
 
 Card = TypeVar("Card", PriorCard, CoefficientCard)
 
@@ -72,8 +72,7 @@ def load_named(
     -------
     NamedCards
     """
-    file = plain(card.path.name) if card.path else f"{card.name}.toml"
-    beside = card.path.parent if card.path else None
+    file, beside = card.file, card.folder
     faults: list[Fault] = []
     if prior is None:
         prior = _read(load_prior, card.material.prior, beside, f"{file} [material] prior", faults)

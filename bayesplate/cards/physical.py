@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from bayesplate.cards.board import BoardCard
 from bayesplate.cards.setup import SetupSection
 from bayesplate.cards.words import setup_places
-from bayesplate.errors import Fault, plain
+from bayesplate.errors import Fault
 from bayesplate.labels import Label
 from bayesplate.quantities import Quantity
 
@@ -29,7 +29,7 @@ def physical_faults(card: BoardCard) -> list[Fault]:
         Empty if there is none. Cards that it names and that cannot be read are found where they are read, labels that
         no mode of the board has where modes are computed, effects that cannot act where effects are known, not here.
     """
-    file = plain(card.path.name) if card.path else f"{card.name}.toml"
+    file = card.file
     faults = [*_plate_faults(card, file)]
     for setup, where in zip(card.setups, setup_places(file, [setup.name for setup in card.setups]), strict=True):
         faults += [

@@ -20,12 +20,12 @@ _KEY_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{DEEPEST_NESTING},}}")
 
 
-def read_file(path: Path) -> bytes:
+def read_file(path: str | Path) -> bytes:
     """The bytes of a card file.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
 
     Raises
     ------
@@ -40,7 +40,7 @@ def read_file(path: Path) -> bytes:
         with open(descriptor, "rb") as file:
             data = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
-        _refuse(asked, "a card", "no such file", f"looked in {plain(str(path.absolute().parent))}")
+        _refuse(asked, "a card", "no such file", f"looked in {plain(str(Path(path).absolute().parent))}")
     except PermissionError:
         _refuse(asked, "a readable file", "permission denied")
     except (OSError, ValueError) as error:
@@ -131,7 +131,7 @@ def _depth_exceeds(table: dict[str, Any], limit: int) -> bool:
     return True
 
 
-def _kind(path: Path) -> str:
+def _kind(path: str | Path) -> str:
     mode = os.stat(path).st_mode
     named = ((stat.S_ISDIR, "a directory"), (stat.S_ISFIFO, "a FIFO"), (stat.S_ISSOCK, "a socket"))
     return next((name for test, name in named if test(mode)), "a device")

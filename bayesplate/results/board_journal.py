@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -64,9 +65,9 @@ class Journal:
                 raise OSError("no space left")
         return start
 
-    def rows(self, places: Iterable[int]) -> Iterator[BoardRow]:
-        """The rows that stand there, in this order."""
-        return (self.row(place) for place in places)
+    def rows(self, places: Sequence[int]) -> Sequence[BoardRow]:
+        """The rows that stand there, in this order; each is read when it is asked for."""
+        return _Rows(self, places)
 
     def keep(self, places: Iterable[int]) -> None:
         """Write the journal anew with these rows alone, in this order; it is closed then."""
@@ -90,6 +91,18 @@ class Journal:
     def _line(self, place: int) -> bytes:
         self._lines.seek(place)
         return self._lines.readline()
+
+
+@dataclass(frozen=True)
+class _Rows(Sequence[BoardRow]):
+    journal: Journal
+    places: Sequence[int]
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def __getitem__(self, at: Any) -> Any:
+        return self.journal.row(self.places[at])
 
 
 def _line(key: str, row: BoardRow) -> bytes:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from array import array
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -94,7 +93,7 @@ class Grading:
         return partner, probability
 
 
-def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:
+def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
     """Grade the boards that were fitted.
 
     Constants and density of a board are taken to be log-normal together, with the means and the covariance of the
@@ -102,7 +101,7 @@ def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:
 
     Parameters
     ----------
-    rows : iterable of BoardRow
+    rows : sequence of BoardRow
         Fitted or not.
     request : GradingRequest
 
@@ -111,13 +110,14 @@ def grade(rows: Iterable[BoardRow], request: GradingRequest) -> Grading:
     Grading
     """
     names: list[str] = []
-    means, triangles = array("d"), array("f")
+    log_mean: Floats = np.empty((len(rows), 7))
+    upper: Floats = np.empty((len(rows), 28), dtype=np.float32)
     for row in rows:
         if row.joint is not None:
+            log_mean[len(names)] = row.joint.log_mean
+            upper[len(names)] = triangle(row.joint.log_covariance)
             names.append(row.name)
-            means.extend(row.joint.log_mean)
-            triangles.extend(triangle(row.joint.log_covariance))
-    log_mean, upper = np.reshape(means, (len(names), 7)), np.reshape(triangles, (len(names), 28))
+    log_mean, upper = log_mean[: len(names)], upper[: len(names)]
     meets, meets_all = _meets(log_mean, upper, request.limits)
     pairs = proposed_pairs(log_mean, upper, request.match_percent)
     return Grading(request, tuple(names), log_mean, upper, meets, meets_all, pairs)

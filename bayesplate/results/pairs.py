@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -58,7 +57,7 @@ def proposed_pairs(log_mean: Floats, triangles: Floats, percent: Mapping[str, fl
         return ()
     first, second, probability = _matches(log_mean, triangles, percent)
     pairs, taken = [], np.zeros(len(log_mean), dtype=bool)
-    for i in np.lexsort((second, first, -probability)):
+    for i in np.argsort(probability, kind="stable")[::-1]:
         if not taken[first[i]] and not taken[second[i]]:
             pairs.append(Pair(int(first[i]), int(second[i]), float(probability[i])))
             taken[[first[i], second[i]]] = True
@@ -72,16 +71,16 @@ def _matches(log_mean: Floats, triangles: Floats, percent: Mapping[str, float]) 
     mean = log_mean @ along.T
     variances = (covariance_along(one[None], triangles)[:, 0, 0] for one in along)
     nearest = _nearest(mean, np.stack(list(variances), axis=1), width)
-    firsts, seconds, probabilities = array("i"), array("i"), array("d")
+    first, second = np.empty((2, nearest.size), dtype=np.int32)
+    probability, n = np.empty(nearest.size), 0
     for start in range(0, len(mean), _AT_ONCE):
         one, other = _pairs_of(nearest, start, start + _AT_ONCE)
         covariance = covariance_along(along, triangles[one]) + covariance_along(along, triangles[other])
-        probability = box_probability(mean[one] - mean[other], covariance, -width, width)
-        may_match = probability >= LEAST_PROBABILITY
-        firsts.extend(one[may_match])
-        seconds.extend(other[may_match])
-        probabilities.extend(probability[may_match])
-    return np.asarray(firsts), np.asarray(seconds), np.asarray(probabilities)
+        found = box_probability(mean[one] - mean[other], covariance, -width, width)
+        may_match = found >= LEAST_PROBABILITY
+        some = slice(n, n := n + int(may_match.sum()))
+        first[some], second[some], probability[some] = one[may_match], other[may_match], found[may_match]
+    return first[:n], second[:n], probability[:n]
 
 
 def _pairs_of(nearest: Rows, start: int, end: int) -> tuple[Rows, Rows]:
@@ -108,19 +107,18 @@ def _nearest(mean: Floats, variance: Floats, width: Floats) -> Rows:
     found = np.full((len(mean), _NEAREST), -1, dtype=np.int32)
     farthest = -ndtri(LEAST_PROBABILITY)  # standard deviations beyond the width
     order = np.argsort(mean[:, 0], kind="stable")
-    mean, variance = mean[order], variance[order]
-    reach = width[0] + farthest * np.sqrt(variance[:, 0] + variance[:, 0].max())
-    starts = np.searchsorted(mean[:, 0], mean[:, 0] - reach)
-    ends = np.searchsorted(mean[:, 0], mean[:, 0] + reach, side="right")
-    for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        others = np.delete(np.arange(start, end), i - start)
+    first = mean[order, 0]
+    reach = width[0] + farthest * np.sqrt(variance[order, 0] + variance[:, 0].max())
+    starts, ends = np.searchsorted(first, first - reach), np.searchsorted(first, first + reach, side="right")
+    for i, own in enumerate(order):
+        others = np.delete(order[starts[i] : ends[i]], i - starts[i])
         for k, limit in enumerate(width):
-            far = limit + farthest * np.sqrt(variance[others, k] + variance[i, k])
-            others = others[np.abs(mean[others, k] - mean[i, k]) <= far]
-        apart = np.abs(mean[others] - mean[i])
-        sd = np.sqrt(np.maximum(variance[others] + variance[i], 1e-24))
+            far = limit + farthest * np.sqrt(variance[others, k] + variance[own, k])
+            others = others[np.abs(mean[others, k] - mean[own, k]) <= far]
+        apart = np.abs(mean[others] - mean[own])
+        sd = np.sqrt(np.maximum(variance[others] + variance[own], 1e-24))
         within = ndtr((width - apart) / sd) - ndtr((-width - apart) / sd)
         together = np.log(np.maximum(within, 1e-300)).sum(axis=1)
         likeliest = others[np.argsort(-together, kind="stable")[:_NEAREST]]
-        found[order[i], : len(likeliest)] = order[likeliest]
+        found[own, : len(likeliest)] = likeliest
     return found

@@ -146,9 +146,10 @@ def batch(
             places = run.fitted(by, journal, progress)
         aside, versions = tuple(boards.aside), run.versions
         del boards, run  # where the cards of very many boards stand is not needed any more
-        written = write_table(folder.path, table, journal.rows(places))
-        graded = grade(journal.rows(places), grading or GradingRequest())
-        summary = _summary(journal.rows(places), seed, versions, aside)
+        rows = journal.rows(places)
+        written = write_table(folder.path, table, rows)
+        graded = grade(rows, grading or GradingRequest())
+        summary = _summary(rows, seed, versions, aside)
         journal.keep(dict.fromkeys(places))
     finally:
         journal.close()

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from bayesplate.cards import BoardCard, Columns, Template, load_board, plain
+from bayesplate.cards import BoardCard, Columns, Template, load_board_in, plain
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.rows import Cell, csv_rows
 from bayesplate.errors import Fault, InputError
@@ -48,22 +48,22 @@ class Folder:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path, self._inside = path, os.path.realpath(path)
+        self._path, self._inside = path, os.path.join(os.path.realpath(path), "")
         self._strange: dict[int, str] = {}  # files whose name is not the board's
         names: list[str] = []
         alike: list[tuple[str, ...]] = []
         aside: list[str] = []
         kept: dict[tuple[str, ...], tuple[str, ...]] = {}
-        for name in sorted(file.name for file in path.glob("*.toml")):
-            file = path / name
-            content = _content_of(file) if self._is_inside(file) else {}
+        for name in sorted(name for name in os.listdir(path) if name.endswith(".toml")):
+            content = self._content_of(name) if self._is_inside(name) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
             if is_other or content.keys() == {"setup"}:
                 aside.append(plain(name))
                 continue
-            if f"{plain(file.stem)}.toml" != name:
+            own = plain(name.removesuffix(".toml"))
+            if f"{own}.toml" != name:
                 self._strange[len(names)] = name
-            names.append(plain(file.stem))
+            names.append(own)
             shared = _alike(content)
             alike.append(kept.setdefault(shared, shared))
         if not names:
@@ -74,14 +74,21 @@ class Folder:
 
     def card(self, at: int) -> BoardCard:
         """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
-        path = self._path / self._strange.get(at, f"{self.names[at]}.toml")
-        if not self._is_inside(path):
+        file = self._strange.get(at, f"{self.names[at]}.toml")
+        if not self._is_inside(file):
             wanted, remedy = "a card in the folder of the batch", "copy the card"
-            raise InputError(Fault(plain(path.name), wanted, "a link that leads out of it", remedy))
-        return load_board(path)
+            raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
+        return load_board_in(self._path, file)
 
-    def _is_inside(self, path: Path) -> bool:
-        return Path(os.path.realpath(path)).is_relative_to(self._inside)  # which a link to itself does not confuse
+    def _is_inside(self, file: str) -> bool:
+        return os.path.realpath(os.path.join(self._path, file)).startswith(self._inside)
+
+    def _content_of(self, file: str) -> Mapping[str, Any]:
+        """What a card's file holds; nothing where it cannot be read, which is told when the board's turn comes."""
+        try:
+            return read_table(read_file(os.path.join(self._path, file)), plain(file))
+        except InputError:
+            return {}
 
 
 class Table:
@@ -138,14 +145,6 @@ def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] |
         remedy = "a board card with what all boards have in common"
         raise InputError(Fault("--template", "a card for the table", "none", remedy))
     return Table(path, os.fspath(template))
-
-
-def _content_of(file: Path) -> Mapping[str, Any]:
-    """What a card's file holds; nothing where it cannot be read, which is told when the board's turn comes."""
-    try:
-        return read_table(read_file(file), plain(file.name))
-    except InputError:
-        return {}
 
 
 def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:

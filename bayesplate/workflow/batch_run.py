@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -169,11 +170,7 @@ def _one_line(error: BaseException) -> str:
 
 def _named_twice(names: Sequence[str]) -> frozenset[str]:
     """Names that several boards have: none of them is fitted, for nobody could tell whose row or folder it is."""
-    seen: set[str] = set()
-    twice: set[str] = set()
-    for name in map(str.casefold, names):
-        (twice if name in seen else seen).add(name)
-    return frozenset(twice)
+    return frozenset(one for one, other in pairwise(sorted(map(str.casefold, names))) if one == other)
 
 
 def _hash(*parts: object) -> str:

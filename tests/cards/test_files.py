@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bayesplate.cards import card_names, load_board, load_coefficients, load_prior, read_board_text
+from bayesplate.cards import card_names, load_board, load_board_in, load_coefficients, load_prior, read_board_text
 from bayesplate.errors import InputError
 
 Write = Callable[[bytes | str], Path]
@@ -90,6 +90,14 @@ def test_a_card_is_read_by_path(board_file: Path, as_argument: Callable[[Path], 
 
     assert card.path == board_file
     assert card.name == "my-board"
+
+
+def test_a_card_of_a_folder_is_the_card_of_its_path(board_file: Path) -> None:
+    one = load_board_in(board_file.parent, board_file.name)
+    assert (one.path, one.folder, one.file) == (board_file, board_file.parent, "my-board.toml")
+    assert one == load_board(board_file)
+    with refused(f"{board_file.parent}/other.toml: wanted a card, got no such file (looked in {board_file.parent})"):
+        load_board_in(board_file.parent, "other.toml")
 
 
 def test_the_name_must_be_that_of_the_file(board_file: Path) -> None:
