@@ -116,7 +116,7 @@ PRIOR_SDS = np.log(PRIOR_FACTORS) / NOISE
 class NormalInverseGamma(Posterior):
     """The production likelihood, and the conjugate prior: an inverse-gamma variance, ln D normal in units of it."""
 
-    def log_prior(self, theta):
+    def log_prior(self, theta, values=None):
         log_noise = theta[:, 3]
         z = (theta[:, :3] - np.log(PRIOR_MEDIANS)) / PRIOR_SDS * np.exp(-log_noise)[:, None]
         return -(2.0 * SHAPE + 3.0) * log_noise - SCALE * np.exp(-2.0 * log_noise) - 0.5 * np.sum(z**2, axis=1)

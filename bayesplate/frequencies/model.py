@@ -102,6 +102,12 @@ class SetupModel:
         """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
         return log_frequency(self.law(law).squared(self.system.weights(values)))
 
+    @cached_property
+    def _discrepancy_names(self) -> dict[int, tuple[str, str]]:
+        """By mode: the parameters whose product is its discrepancy."""
+        names = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
+        return {i: both for i, both in names.items() if both is not None}
+
     def discrepancies(self, values: Values) -> NDArray[np.float64]:
         """ln f of the board less that of its plate, of all modes.
 
@@ -110,8 +116,7 @@ class SetupModel:
         (n_draws, n_every) array
             A single zero where no session shares any.
         """
-        names = {i: discrepancy_names(self.setup, label) for i, label in enumerate(self.every_label) if label}
-        known = {i: one for i, one in names.items() if one is not None and one[1] in values}
+        known = {i: names for i, names in self._discrepancy_names.items() if names[1] in values}
         if not known:
             return np.zeros((1, 1))
         shifts = {i: np.ravel(values[scale] * values[standard]) for i, (scale, standard) in known.items()}

@@ -141,6 +141,8 @@ class Steps:
         self._differential = iter(jumps)
         self._thresholds = iter(thresholds)
         self._order = iter(order)
+        self._seen: FloatArray | None = None
+        self._proposed_there = np.empty(0)  # ln of the proposal's density at the coordinates that were seen last
 
     def walked(self, coords: FloatArray, log_prob: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """All walkers after the updates of one step: coordinates, log densities, and which have moved."""
@@ -151,17 +153,22 @@ class Steps:
         return coords, log_prob, moved
 
     def _updated(self, coords: FloatArray, log_prob: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        if next(self._order) == "I":
+        is_independent = next(self._order) == "I"
+        if is_independent:
             points, proposed, log_density = next(self._independent)
+            here = self._proposed_there if coords is self._seen else self.proposal.log_density(coords)
             with np.errstate(invalid="ignore"):  # both may be minus infinity
-                log_ratio = proposed - log_density - (log_prob - self.proposal.log_density(coords))
+                log_ratio = proposed - log_density - (log_prob - here)
         else:
             points = coords + next(self._differential)
             proposed = self.density(points)
             with np.errstate(invalid="ignore"):
                 log_ratio = proposed - log_prob
         accepted = next(self._thresholds) < log_ratio
-        return np.where(accepted[:, None], points, coords), np.where(accepted, proposed, log_prob), accepted
+        after = np.where(accepted[:, None], points, coords)
+        if is_independent:
+            self._seen, self._proposed_there = after, np.where(accepted, log_density, here)
+        return after, np.where(accepted, proposed, log_prob), accepted
 
     def propose(self, _: Any, state: Any) -> tuple[Any, NDArray[np.bool_]]:
         """One step of emcee's chain."""

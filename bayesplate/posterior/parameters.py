@@ -107,10 +107,19 @@ class Parameters:
 
     def log_prior_inputs(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log density of the input columns: (n_draws,) array."""
-        total = np.zeros(theta.shape[0])
-        for i, parameter in enumerate(self.uncertain, start=self.first_input):
-            total += parameter.prior.log_prior(theta[:, i])
-        return total
+        z = theta[:, self.first_input :]
+        lower, upper, level = self._input_priors
+        inside = ((z >= lower) & (z <= upper)).all(axis=1)
+        return np.where(inside, level - 0.5 * np.einsum("ni,ni->n", z, z), -np.inf)
+
+    @cached_property
+    def _input_priors(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Bounds of the input columns, and what their log density is beside -z^2 / 2 between them."""
+        priors = [parameter.prior for parameter in self.uncertain]
+        lower, upper = np.array([prior.standard_bounds for prior in priors]).reshape(-1, 2).T
+        inside = np.clip(0.0, lower, upper)
+        heights = [float(prior.log_prior(z)) + 0.5 * z**2 for prior, z in zip(priors, inside, strict=True)]
+        return lower, upper, sum(heights)
 
     def log_prior_noise(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log density of the columns of noise: (n_draws,) array."""

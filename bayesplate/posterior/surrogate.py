@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.plate.board import Values
 from bayesplate.posterior.ensembles import advance
 from bayesplate.posterior.moves import Steps
 from bayesplate.posterior.proposals import Proposal
@@ -134,7 +135,7 @@ class SurrogatePosterior(Posterior):
 
     surrogate: Surrogate
 
-    def every_log_frequency(self, theta: Floats) -> list[Floats]:
+    def every_log_frequency(self, theta: Floats, values: Values | None = None) -> list[Floats]:
         """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
         return self.by_setup(self.surrogate.log_frequencies(theta))
 

@@ -12,7 +12,7 @@ from bayesplate.cards import PriorCard
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.frequencies.peaks import PeakLikelihood
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
@@ -45,12 +45,16 @@ class Posterior:
     parameters: Parameters = field(init=False)
     readings: tuple[ReadingErrors, ...] = field(init=False)
     peaks: tuple[PeakLikelihood | None, ...] = field(init=False)
+    sure: tuple[tuple[NDArray[np.bool_], ReadingErrors], ...] = field(init=False)
     priors: Mapping[str, Quantity] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", Parameters(self.board))
         object.__setattr__(self, "priors", self.prior.constants)
         object.__setattr__(self, "readings", tuple(ReadingErrors.of(s, self.robust) for s in self.board.setups))
+        masks = (np.array([one.is_sure for one in s.readings], dtype=bool) for s in self.board.setups)
+        sure = tuple((mask, errors.at(mask)) for mask, errors in zip(masks, self.readings, strict=True))
+        object.__setattr__(self, "sure", sure)
         object.__setattr__(self, "peaks", tuple(PeakLikelihood.of(model, self.robust) for model in self.models))
 
     def __call__(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -62,11 +66,12 @@ class Posterior:
 
         Not a number where the prior excludes the draw.
         """
-        total = self.log_prior(theta)
+        values = self.parameters.values(theta)
+        total = self.log_prior(theta, values)
         inside = np.isfinite(total)
         log_frequency = np.full((len(theta), sum(self.n_every)), np.nan)
         if inside.any():
-            by_setup = self.every_log_frequency(theta[inside])
+            by_setup = self.every_log_frequency(theta[inside], values if inside.all() else None)
             total[inside] += self.log_likelihood_of(by_setup, theta[inside]).sum(axis=1)
             log_frequency[inside] = np.concatenate(by_setup, axis=1)
         return total, log_frequency
@@ -75,29 +80,34 @@ class Posterior:
         """Columns of each setup among those of `evaluate`: one (..., n_every) array per setup."""
         return np.split(log_frequency, np.cumsum(self.n_every)[:-1], axis=-1)
 
-    def log_prior(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Log prior density: (n_draws,) array."""
-        factors = self.log_prior_factors(theta)
+    def log_prior(self, theta: NDArray[np.float64], values: Values | None = None) -> NDArray[np.float64]:
+        """Log prior density: (n_draws,) array; `values` as of `log_prior_constants`."""
+        factors = self.log_prior_factors(theta, values)
         total = np.sum([factors[name] for name in ("inputs", "noise", "constants") if name in factors], axis=0)
         return np.where(np.isnan(total), -np.inf, total)
 
-    def log_prior_factors(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    def log_prior_factors(
+        self, theta: NDArray[np.float64], values: Values | None = None
+    ) -> dict[str, NDArray[np.float64]]:
         """What the prior is a product of: log densities of the constants, the noise, and the inputs if any; (n_draws,).
 
         The inputs are the uncertain parameters of the board, those of declared effects included.
         """
-        factors = {"constants": self.log_prior_constants(theta), "noise": self.parameters.log_prior_noise(theta)}
+        factors = {
+            "constants": self.log_prior_constants(theta, values),
+            "noise": self.parameters.log_prior_noise(theta),
+        }
         return factors | ({"inputs": self.parameters.log_prior_inputs(theta)} if self.parameters.inputs else {})
 
-    def log_prior_constants(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    def log_prior_constants(self, theta: NDArray[np.float64], values: Values | None = None) -> NDArray[np.float64]:
         """Log prior density of ln D_x, ln D_y, ln D_s given the inputs: (n_draws,) array.
 
         A density of the moduli is one of the rigidities: the Jacobian of their logarithms is 1 (`moduli`). Outside
-        nu_xy nu_yx < 1 no material exists and the density is zero.
+        nu_xy nu_yx < 1 no material exists and the density is zero. The draws' `values` are given where they are known.
         """
-        values = self.parameters.values(theta)
+        values = self.parameters.values(theta) if values is None else values
         constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
-        by_name = values | constants._asdict()
+        by_name = {**values, **constants._asdict()}
         densities = [prior.log_density_of_log(np.log(by_name[name])) for name, prior in self.priors.items()]
         return np.where(np.isnan(constants.E_x), -np.inf, np.sum(densities, axis=0))
 
@@ -151,9 +161,11 @@ class Posterior:
             names += [] if peaks is None else [f"{setup.name} peaks"]
         return tuple(names)
 
-    def every_log_frequency(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def every_log_frequency(
+        self, theta: NDArray[np.float64], values: Values | None = None
+    ) -> list[NDArray[np.float64]]:
         """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
-        values = self.parameters.values(theta)
+        values = self.parameters.values(theta) if values is None else values
         return log_frequencies_of_board(self.models, values, self.law)
 
     def log_frequencies(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -176,9 +188,8 @@ class Posterior:
         noise = np.exp(self.parameters.log_noise(theta))
         parts = []
         labelled = self.labelled(every_log_frequency)
-        for i, (errors, setup, peaks) in enumerate(zip(self.readings, self.board.setups, self.peaks, strict=True)):
-            sure = np.array([reading.is_sure for reading in setup.readings], dtype=bool)
-            parts.append(errors.at(sure).log_likelihood(labelled[i][:, sure], noise[:, i]))
+        for i, ((sure, errors), peaks) in enumerate(zip(self.sure, self.peaks, strict=True)):
+            parts.append(errors.log_likelihood(labelled[i][:, sure], noise[:, i]))
             if peaks is not None:
                 parts.append(peaks.log_likelihood(every_log_frequency[i], noise[:, i])[:, None])
         return np.concatenate(parts, axis=1)

@@ -158,8 +158,8 @@ class Nowhere(Posterior):
 class AtTheEdge(Posterior):
     """A prior that ends at the estimate."""
 
-    def log_prior_constants(self, theta):
-        return np.where(theta[:, 0] > 0.0, super().log_prior_constants(theta), -np.inf)
+    def log_prior_constants(self, theta, values=None):
+        return np.where(theta[:, 0] > 0.0, super().log_prior_constants(theta, values), -np.inf)
 
 
 def test_where_there_is_no_normal_case_the_reason_is_told(fitted, monkeypatch):
