@@ -57,7 +57,7 @@ def proposed_pairs(log_mean: Floats, triangles: Floats, percent: Mapping[str, fl
         return ()
     first, second, probability = _matches(log_mean, triangles, percent)
     pairs, taken = [], np.zeros(len(log_mean), dtype=bool)
-    for i in np.argsort(probability, kind="stable")[::-1]:
+    for i in np.lexsort((second, first, -probability)):
         if not taken[first[i]] and not taken[second[i]]:
             pairs.append(Pair(int(first[i]), int(second[i]), float(probability[i])))
             taken[[first[i], second[i]]] = True

@@ -44,7 +44,7 @@ class Folder:
     Raises
     ------
     InputError
-        If there is no board card in it.
+        If it cannot be read, or there is no board card in it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,7 +54,7 @@ class Folder:
         alike: list[tuple[str, ...]] = []
         aside: list[str] = []
         kept: dict[tuple[str, ...], tuple[str, ...]] = {}
-        for name in sorted(name for name in os.listdir(path) if name.endswith(".toml")):
+        for name in _cards_in(path):
             content = self._content_of(name) if self._is_inside(name) else {}
             is_other = not {"plate", "setup"} & content.keys() and _OF_OTHER_CARDS & content.keys()
             if is_other or content.keys() == {"setup"}:
@@ -145,6 +145,14 @@ def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] |
         remedy = "a board card with what all boards have in common"
         raise InputError(Fault("--template", "a card for the table", "none", remedy))
     return Table(path, os.fspath(template))
+
+
+def _cards_in(folder: Path) -> list[str]:
+    """Names of the files that may be cards, in their order."""
+    try:
+        return sorted(name for name in os.listdir(folder) if name.endswith(".toml"))
+    except OSError as error:
+        raise InputError(Fault(plain(str(folder)), "a readable folder", error.strerror or str(error))) from None
 
 
 def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import os
 import pickle
@@ -68,6 +69,15 @@ def test_what_is_no_board_card_is_left_aside(cards, tmp_path):
 
     assert set(found.aside) == {"own-prior.toml", "setup.toml"}
     assert "unfinished" in found.names
+
+
+def test_a_folder_that_cannot_be_read_is_refused(cards, monkeypatch):
+    def denied(path):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(os, "listdir", denied)
+    with pytest.raises(InputError, match=f"{cards}: wanted a readable folder, got Permission denied"):
+        boards_of(cards, None)
 
 
 @pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
