@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,30 +121,56 @@ def autocorrelation_time(draws: FloatArray) -> FloatArray:
     A. Sokal, Monte Carlo Methods in Statistical Mechanics (1996); J. Goodman and J. Weare, Ensemble samplers with
     affine invariance (2010).
     """
-    n_steps, _, n_dim = draws.shape
+    return np.array([_time_of(draws[:, :, dim]) for dim in range(draws.shape[2])])
+
+
+def _time_of(series: FloatArray) -> float:
+    """Integrated autocorrelation time of one parameter in one ensemble, from its (n_steps, n_walkers) draws."""
+    n_steps = len(series)
+    series = np.ascontiguousarray(series.T)
+    if np.ptp(series) == 0.0:
+        return float(np.inf)
     length = next_fast_len(2 * n_steps, real=True)  # padded, or the far end would wrap round
-    tau = np.full(n_dim, np.inf)
-    for dim in range(n_dim):
-        series = np.ascontiguousarray(draws[:, :, dim].T)
-        if np.ptp(series) == 0.0:
-            continue
-        spectrum = rfft(series - series.mean(), n=length, axis=-1)
-        autocovariance = irfft((spectrum.real**2 + spectrum.imag**2).sum(axis=0), n=length)[:n_steps]
-        sums = 2.0 * np.cumsum(autocovariance / autocovariance[0]) - 1.0
-        outside = np.flatnonzero(np.arange(n_steps) >= _WINDOW * sums)
-        tau[dim] = max(sums[outside[0] if outside.size else -1], 1.0)  # below 1 would claim more than independent draws
-    return tau
+    spectrum = rfft(series - series.mean(), n=length, axis=-1)
+    autocovariance = irfft((spectrum.real**2 + spectrum.imag**2).sum(axis=0), n=length)[:n_steps]
+    sums = 2.0 * np.cumsum(autocovariance / autocovariance[0]) - 1.0
+    outside = np.flatnonzero(np.arange(n_steps) >= _WINDOW * sums)
+    return float(max(sums[outside[0] if outside.size else -1], 1.0))  # below 1 would claim more than independent draws
 
 
-def length_in_taus(draws: FloatArray) -> float:
-    """Return the length of ensembles in autocorrelation times, of the slowest parameter in the slowest of them.
+@dataclass
+class Length:
+    """How long growing ensembles are in autocorrelation times, looked at as far as it takes to say: not long enough.
 
-    Parameters
+    The parameter that was too slow last time is looked at first, for mostly it is still.
+
+    Attributes
     ----------
-    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
-        After burn-in.
+    slow : (int, int)
+        Ensemble and parameter of the last one that was too slow.
     """
-    return draws.shape[1] / max(float(autocorrelation_time(ensemble).max()) for ensemble in draws)
+
+    slow: tuple[int, int] = (0, 0)
+
+    def in_taus(self, parts: Sequence[FloatArray], wanted: float) -> float:
+        """Return the length in autocorrelation times of a parameter that is too slow; of the slowest if none is.
+
+        Parameters
+        ----------
+        parts : sequence of (n_ensembles, n_steps, n_walkers, n_dim) arrays
+            Draws after burn-in, one part behind the other.
+        wanted : float
+            Autocorrelation times that are long enough.
+        """
+        n_ensembles, _, _, n_dim = parts[0].shape
+        shortest = np.inf
+        for ensemble, dim in (self.slow, *product(range(n_ensembles), range(n_dim))):
+            series = np.concatenate([part[ensemble, :, :, dim] for part in parts])
+            shortest = min(shortest, len(series) / _time_of(series))
+            if shortest < wanted:
+                self.slow = ensemble, dim
+                break
+        return float(shortest)
 
 
 def split_rhat(draws: FloatArray) -> FloatArray:

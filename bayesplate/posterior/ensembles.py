@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import cycle, islice
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +121,7 @@ def advance(
     n_ensembles, n_walkers, n_dim = coords.shape
     n_together = n_ensembles * n_walkers
     # The moves have the density, and know it wherever a walker is: emcee has none to evaluate.
-    sampler = emcee.EnsembleSampler(n_together, n_dim, None, moves=move, vectorize=True)
+    sampler = _sampler_type()(n_together, n_dim, None, moves=move, vectorize=True)
     found = None if blobs is None else blobs.reshape(n_together, blobs.shape[-1])
     start = emcee.State(coords.reshape(-1, n_dim), log_prob=log_prob.ravel(), blobs=found)
     sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
@@ -127,3 +129,11 @@ def advance(
     parts = chain, densities, np.empty((*densities.shape, 0)) if kept is None else kept
     shape = (n_steps, n_ensembles, n_walkers)
     return Chunk(*(np.moveaxis(part.reshape(*shape, *part.shape[2:]), 1, 0) for part in parts))
+
+
+@cache
+def _sampler_type() -> Any:
+    """emcee's sampler without the random numbers whose state it writes down at every step: the moves have their own."""
+    import emcee
+
+    return type("Sampler", (emcee.EnsembleSampler,), {"random_state": None})

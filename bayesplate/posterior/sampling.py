@@ -14,10 +14,10 @@ from bayesplate.posterior.checkpoint import Checkpoint, Chunk
 from bayesplate.posterior.convergence import (
     Convergence,
     Gate,
+    Length,
     acceptance_by_walker,
     assess,
     burn_in_steps,
-    length_in_taus,
 )
 from bayesplate.posterior.ensembles import Learnt, advance, correcting, crossed, stepping
 from bayesplate.posterior.moves import CorrectedSteps, Steps
@@ -122,7 +122,8 @@ class Progress:
     n_steps, max_steps : int
         Steps done and allowed.
     n_taus : float or None
-        Length of the ensembles in autocorrelation times when it was last computed; None before.
+        Length of the ensembles in autocorrelation times when it was last looked at, by the first parameter that was
+        found too slow; None before.
     stage : str
         What of a longer run is being done; empty if it is nothing but this sampling.
     done : float or None
@@ -234,16 +235,18 @@ def sample(
             )
         learnt = None
         convergence = n_taus = None
-        warm_up = WarmUp()
+        warm_up, length = WarmUp(), Length()
         while True:
             n_steps = len(chunks) * settings.chunk_steps
             is_taught = warm_up.follow(chunks)
             is_over = warm_up.first is not None
             at_end = n_steps >= settings.max_steps
             if at_end or (is_over and _gate_is_due(n_steps, warm_up.end * settings.chunk_steps, settings.chunk_steps)):
-                chains = _joined(chunks, warm_up.end, is_corrected=cheap is not None)
-                n_taus = length_in_taus(chains.kept)
+                burn_in = _burn_in(chunks, warm_up.end, is_corrected=cheap is not None)
+                kept = _after(burn_in, [chunk.draws for chunk in chunks])
+                n_taus = length.in_taus(kept, settings.gate.tau_count_min)
                 if at_end or n_taus >= settings.gate.tau_count_min:  # the rule that takes longest: the others can wait
+                    chains = _joined(chunks, burn_in)
                     convergence = assess(chains.kept, settings.gate, names=names)
             if progress is not None and chunks:
                 progress(Progress(n_steps, settings.max_steps, n_taus))
@@ -280,16 +283,22 @@ def _gate_is_due(n_steps: int, warm_up: int, chunk_steps: int) -> bool:
     return due == n_steps
 
 
-def _joined(chunks: list[Chunk], n_warm: int, *, is_corrected: bool) -> Chains:
-    """All draws; behind a surrogate's warm-up a sixth of the corrected steps is discarded too."""
+def _burn_in(chunks: Sequence[Chunk], n_warm: int, *, is_corrected: bool) -> int:
+    """Steps to discard: the warm-up at least, and behind that of a surrogate a sixth of the corrected steps too."""
+    n_steps = sum(chunk.draws.shape[1] for chunk in chunks)
+    warm_up = min(n_warm, len(chunks) - 1) * chunks[0].draws.shape[1]
+    return warm_up + -(-(n_steps - warm_up) // 6) if is_corrected else max(warm_up, burn_in_steps(n_steps))
+
+
+def _after(burn_in: int, parts: Sequence[FloatArray]) -> list[FloatArray]:
+    """What stands behind the burn-in of parts of a run, (n_ensembles, n_steps, ...) arrays of equal length."""
+    n_whole, n_steps = divmod(burn_in, parts[0].shape[1])
+    return [parts[n_whole][:, n_steps:], *parts[n_whole + 1 :]]
+
+
+def _joined(chunks: Sequence[Chunk], burn_in: int) -> Chains:
+    """All chunks of a run in one."""
     draws = np.concatenate([chunk.draws for chunk in chunks], axis=1)
     log_prob = np.concatenate([chunk.log_prob for chunk in chunks], axis=1)
-    n_steps = draws.shape[1]
-    n_warm = min(n_warm, len(chunks) - 1)
-    warm_up = n_warm * chunks[0].draws.shape[1]
-    if not is_corrected:
-        return Chains(draws, log_prob, max(warm_up, burn_in_steps(n_steps)))
-    behind = -(-(n_steps - warm_up) // 6)
-    found = [chunk.blobs for chunk in chunks[n_warm:]]
-    blobs = np.concatenate(found, axis=1)[:, behind:] if all(one.shape[-1] for one in found) else None
-    return Chains(draws, log_prob, warm_up + behind, blobs)
+    found = _after(burn_in, [chunk.blobs for chunk in chunks])
+    return Chains(draws, log_prob, burn_in, np.concatenate(found, axis=1) if all(b.shape[-1] for b in found) else None)

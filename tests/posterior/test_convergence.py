@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from bayesplate.posterior import convergence
 from bayesplate.posterior.convergence import (
     Gate,
+    Length,
     acceptance_by_walker,
     assess,
     autocorrelation_time,
     burn_in_steps,
-    length_in_taus,
     split_rhat,
 )
 
@@ -49,7 +50,25 @@ def test_the_autocorrelation_time_is_that_of_emcee():
 
 def test_the_length_that_a_run_waits_for_is_the_one_that_is_judged():
     draws = renewal_draws(n_steps=200)
-    assert length_in_taus(draws) == assess(draws).n_taus < Gate().tau_count_min
+    parts = draws[:, :70], draws[:, 70:]
+    assert Length().in_taus(parts, wanted=0.0) == assess(draws).n_taus < Gate().tau_count_min
+
+
+def test_one_slow_parameter_keeps_a_run_waiting_and_is_looked_at_first_again(monkeypatch):
+    draws = renewal_draws(n_steps=200, n_dim=3)
+    draws[2, :, :, 1] = np.cumsum(draws[2, :, :, 1], axis=0)
+    looked_at: list[int] = []
+    time_of = convergence._time_of
+    monkeypatch.setattr(convergence, "_time_of", lambda series: looked_at.append(1) or time_of(series))
+    told = assess(draws).n_taus
+    looked_at.clear()
+
+    length = Length()
+    assert length.in_taus([draws], 1.5 * told) == told
+    assert len(looked_at) == 1 + 2 * 3 + 2  # the first twice, two ensembles of three, and two of the third
+    assert length.slow == (2, 1)
+    assert length.in_taus([draws], 1.5 * told) == told
+    assert len(looked_at) == 1 + 2 * 3 + 2 + 1
 
 
 def test_a_walker_that_stays_apart_lengthens_the_time():
