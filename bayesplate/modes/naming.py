@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.plate import Beams, Parity, PlateMatrices, Weights, is_rigid
+from bayesplate.modes.plate import Beams, Parity, PlateMatrices, Weights
 from bayesplate.modes.solve import ClassModes, Modes, solve_classes
 
 CERTAIN = 0.75
@@ -87,8 +86,7 @@ def beam_parts(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity
     beams_x = plate.line_x.beams.T @ plate.line_x.mass
     beams_y = plate.line_y.beams.T @ plate.line_y.mass
     correlations = beams_x @ shapes @ beams_y.T
-    products = [beams for beams in _elastic_products(plate) if plate.parity(beams) == parity]
-    return {(i, j): correlations[:, i, j] for i, j in products}
+    return {(i, j): correlations[:, i, j] for i, j in plate.elastic_products[parity]}
 
 
 def name_parts(parts: NDArray[np.float64]) -> list[tuple[int, float]]:
@@ -159,7 +157,7 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
     """
     names = list(wanted)
     # With as many modes as products a class has given all its names, and with more some modes would have none.
-    most = Counter(plate.parity(beams) for beams in _elastic_products(plate))
+    most = {parity: len(products) for parity, products in plate.elastic_products.items()}
     counts = {p: min(n + _SPARE, most[p]) for p, n in _expected_ranks(plate, weights, names).items()}
     found: dict[Beams, Found] = {}
     while counts:
@@ -178,24 +176,17 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
     return {name: found[name] for name in names}
 
 
-def _elastic_products(plate: PlateMatrices) -> list[Beams]:
-    """Orders of all products of beam functions that bend."""
-    shape = plate.line_x.beams.shape[1], plate.line_y.beams.shape[1]
-    return [beams for beams in np.ndindex(shape) if not is_rigid(beams, plate.line_x.ends, plate.line_y.ends)]
-
-
 def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) -> dict[Parity, int]:
     """How many products of each class lie at or below the highest wanted one, by their Rayleigh quotients."""
     values = np.tensordot(weights.stiffness[:4], product_coefficients(plate), axes=1)
-    elastic = _elastic_products(plate)
-    unknown = [name for name in names if name not in elastic]
+    unknown = [name for name in names if name not in plate.elastic_products[plate.parity(name)]]
     if unknown:
         raise KeyError(unknown)
     highest: dict[Parity, float] = {}
     for name in names:
         parity = plate.parity(name)
         highest[parity] = max(highest.get(parity, 0.0), values[name])
-    return {p: sum(bool(values[b] <= top) for b in elastic if plate.parity(b) == p) for p, top in highest.items()}
+    return {p: sum(bool(values[b] <= top) for b in plate.elastic_products[p]) for p, top in highest.items()}
 
 
 def _found(plate: PlateMatrices, solved: Mapping[Parity, ClassModes]) -> dict[Beams, Found]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -191,6 +191,16 @@ class PlateMatrices:
     def parity(self, beams: Beams) -> Parity:
         """Symmetry class to which a product of beam functions belongs."""
         return Parity(beams[0] % 2 if self.line_x.is_symmetric else 0, beams[1] % 2 if self.line_y.is_symmetric else 0)
+
+    @cached_property
+    def elastic_products(self) -> dict[Parity, list[Beams]]:
+        """Orders of those products of beam functions that bend, by symmetry class."""
+        shape = self.line_x.beams.shape[1], self.line_y.beams.shape[1]
+        found: dict[Parity, list[Beams]] = {block.parity: [] for block in self.blocks}
+        for beams in np.ndindex(shape):
+            if not is_rigid(beams, self.line_x.ends, self.line_y.ends):
+                found[self.parity(beams)].append(beams)
+        return found
 
     def block(self, parity: Parity) -> Block:
         """The block of a class."""
