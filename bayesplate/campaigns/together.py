@@ -163,11 +163,11 @@ class Together:
             mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
             draws = np.concatenate([draws, mirrored])
         mixture = Proposal.fitted(np.random.default_rng(_LINE).permutation(draws))
-        (whole,) = Proposal.one_fitted(draws).parts
+        whole = Proposal.one_fitted(draws)
         reach = whole.squared_distances(draws).max()
 
         def log_density(z: Floats) -> Floats:
-            inside = (z >= bounds).all(axis=1) & (whole.squared_distances(z) <= reach)
+            inside = (z >= bounds).all(axis=1) & (whole.squared_distances(z)[0] <= reach)
             return np.where(inside, mixture.log_density(z), -np.inf)
 
         return log_density

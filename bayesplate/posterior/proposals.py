@@ -32,49 +32,6 @@ _FLOOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Student:
-    """A multivariate Student distribution.
-
-    Attributes
-    ----------
-    centre : (n_dim,) array
-    factor : (n_dim, n_dim) array
-        Lower Cholesky factor of the scale matrix.
-    """
-
-    centre: FloatArray
-    factor: FloatArray
-
-    @classmethod
-    def with_scale(cls, centre: FloatArray, scale_matrix: FloatArray) -> Student:
-        """From centre and scale matrix, whatever the units of the parameters."""
-        scale = np.sqrt(np.diagonal(scale_matrix))
-        correlation = scale_matrix / np.outer(scale, scale)
-        return cls(centre, scale[:, None] * np.linalg.cholesky(correlation + 1e-10 * np.eye(centre.size)))
-
-    @cached_property
-    def whitening(self) -> FloatArray:
-        """Inverse of the factor, transposed; a triangular solve at each step would wake threads that cost ten steps."""
-        return np.asarray(np.linalg.inv(self.factor).T, dtype=np.float64)
-
-    @cached_property
-    def _log_peak(self) -> float:
-        n_dim, nu = self.centre.size, DEGREES_OF_FREEDOM
-        log_volume = float(np.log(np.diagonal(self.factor)).sum())
-        return lgamma(0.5 * (nu + n_dim)) - lgamma(0.5 * nu) - 0.5 * n_dim * np.log(nu * np.pi) - log_volume
-
-    def squared_distances(self, points: FloatArray) -> FloatArray:
-        """Squared Mahalanobis distances in units of the scale matrix: (...) array from (..., n_dim) points."""
-        z = (points - self.centre) @ self.whitening
-        return np.asarray(np.einsum("...i,...i->...", z, z))
-
-    def log_density(self, points: FloatArray) -> FloatArray:
-        """Logarithm of the density: (...) array from (..., n_dim) points."""
-        power = 0.5 * (DEGREES_OF_FREEDOM + self.centre.size)
-        return np.asarray(self._log_peak - power * np.log1p(self.squared_distances(points) / DEGREES_OF_FREEDOM))
-
-
-@dataclass(frozen=True, eq=False)
 class Proposal:
     """A mixture of Student distributions to propose from.
 
@@ -82,17 +39,20 @@ class Proposal:
     ----------
     weights : (n_parts,) array
         Sum to one.
-    parts : tuple of Student
+    centres : (n_parts, n_dim) array
+    factors : (n_parts, n_dim, n_dim) array
+        Lower Cholesky factors of the scale matrices.
     """
 
     weights: FloatArray
-    parts: tuple[Student, ...]
+    centres: FloatArray
+    factors: FloatArray
 
     @classmethod
     def with_covariance(cls, centre: FloatArray, covariance: FloatArray) -> Proposal:
         """One Student distribution of that mean and covariance."""
         shrink = (DEGREES_OF_FREEDOM - 2.0) / DEGREES_OF_FREEDOM
-        return cls(np.ones(1), (Student.with_scale(centre, shrink * covariance),))
+        return cls(np.ones(1), centre[None], _cholesky(shrink * covariance)[None])
 
     @classmethod
     def one_fitted(cls, draws: FloatArray) -> Proposal:
@@ -111,46 +71,73 @@ class Proposal:
         flat = flat[:: -(-len(flat) // _MOST_FITTED)]
         n_dim = flat.shape[1]
         n_parts = min(N_PARTS, len(flat) // (_DRAWS_PER_NUMBER * n_dim * (n_dim + 3) // 2))
-        whole = cls.one_fitted(flat)
+        mixture = cls.one_fitted(flat)
         if n_parts < 2:
-            return whole
+            return mixture
         floor = _FLOOR * np.cov(flat.T).reshape(n_dim, n_dim)
-        order = np.argsort(np.argsort(whole.parts[0].squared_distances(flat)))
+        order = np.argsort(np.argsort(mixture.squared_distances(flat)[0]))
         shares = np.eye(n_parts)[order * n_parts // len(flat)].T * 0.9 + 0.1 / n_parts
-        mixture, pulls = whole, np.ones_like(shares)
+        pulls = np.ones_like(shares)
         for _ in range(_N_PASSES):
             mixture = cls._of_shares(flat, shares, pulls, floor)
-            logs = np.stack([part.log_density(flat) for part in mixture.parts]) + np.log(mixture.weights)[:, None]
+            distances = mixture.squared_distances(flat)
+            logs = mixture._log_shares(distances)
             shares = np.exp(logs - np.logaddexp.reduce(logs, axis=0))
-            distances = np.stack([part.squared_distances(flat) for part in mixture.parts])
             pulls = (DEGREES_OF_FREEDOM + n_dim) / (DEGREES_OF_FREEDOM + distances)
         return mixture
 
     @classmethod
     def _of_shares(cls, flat: FloatArray, shares: FloatArray, pulls: FloatArray, floor: FloatArray) -> Proposal:
         """The mixture of greatest likelihood given which part each draw belongs to, in (n_parts, n_draws) shares."""
-        parts = []
+        centres, factors = [], []
         for share, weight in zip(shares, shares * pulls, strict=True):
-            centre = weight @ flat / weight.sum()
-            away = flat - centre
-            parts.append(Student.with_scale(centre, (weight[:, None] * away).T @ away / share.sum() + floor))
-        return cls(shares.mean(axis=1), tuple(parts))
+            centres.append(weight @ flat / weight.sum())
+            away = flat - centres[-1]
+            factors.append(_cholesky((weight[:, None] * away).T @ away / share.sum() + floor))
+        return cls(shares.mean(axis=1), np.stack(centres), np.stack(factors))
+
+    @cached_property
+    def _whitenings(self) -> FloatArray:
+        """Inverses of the factors, transposed: solving at each step would wake threads that cost ten steps."""
+        return np.swapaxes(np.linalg.inv(self.factors), 1, 2)
+
+    @cached_property
+    def _log_peaks(self) -> FloatArray:
+        """Logarithm of each part's density at its centre, times its weight: (n_parts,) array."""
+        n_dim, nu = self.centres.shape[1], DEGREES_OF_FREEDOM
+        log_volumes = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
+        of_all = lgamma(0.5 * (nu + n_dim)) - lgamma(0.5 * nu) - 0.5 * n_dim * np.log(nu * np.pi)
+        return np.log(self.weights) + of_all - log_volumes
+
+    def squared_distances(self, points: FloatArray) -> FloatArray:
+        """Squared Mahalanobis distances in units of the scale matrices: (n_parts, n) array from (n, n_dim) points."""
+        z = (points - self.centres[:, None]) @ self._whitenings
+        return np.einsum("kni,kni->kn", z, z)
+
+    def _log_shares(self, distances: FloatArray) -> FloatArray:
+        """Logarithm of what each part has of the density, from squared distances: (n_parts, n) array."""
+        power = 0.5 * (DEGREES_OF_FREEDOM + self.centres.shape[1])
+        return np.asarray(self._log_peaks[:, None] - power * np.log1p(distances / DEGREES_OF_FREEDOM))
 
     def log_density(self, points: FloatArray) -> FloatArray:
         """Logarithm of the density: (...) array from (..., n_dim) points."""
-        if len(self.parts) == 1:
-            return self.parts[0].log_density(points)
-        logs = [np.log(w) + part.log_density(points) for w, part in zip(self.weights, self.parts, strict=True)]
-        return np.asarray(np.logaddexp.reduce(logs, axis=0))
+        logs = self._log_shares(self.squared_distances(points.reshape(-1, points.shape[-1])))
+        return np.asarray(np.logaddexp.reduce(logs, axis=0)).reshape(points.shape[:-1])
 
     def points(self, n_points: int, rng: np.random.Generator) -> FloatArray:
         """Draws: (n_points, n_dim) array."""
-        n_dim = self.parts[0].centre.size
-        normal = rng.standard_normal((n_points, n_dim))
+        normal = rng.standard_normal((n_points, self.centres.shape[1]))
         normal *= np.sqrt(DEGREES_OF_FREEDOM / rng.chisquare(DEGREES_OF_FREEDOM, n_points))[:, None]
         chosen = np.searchsorted(np.cumsum(self.weights)[:-1], rng.random(n_points), side="right")
         result = np.empty_like(normal)
-        for i, part in enumerate(self.parts):
+        for i, (centre, factor) in enumerate(zip(self.centres, self.factors, strict=True)):
             own = chosen == i
-            result[own] = part.centre + normal[own] @ part.factor.T
+            result[own] = centre + normal[own] @ factor.T
         return result
+
+
+def _cholesky(scale_matrix: FloatArray) -> FloatArray:
+    """Lower Cholesky factor of a scale matrix, whatever the units of the parameters: (n_dim, n_dim) array."""
+    scale = np.sqrt(np.diagonal(scale_matrix))
+    correlation = scale_matrix / np.outer(scale, scale)
+    return np.asarray(scale[:, None] * np.linalg.cholesky(correlation + 1e-10 * np.eye(scale.size)))

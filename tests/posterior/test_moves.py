@@ -56,17 +56,18 @@ def test_the_log_density_of_one_part_is_that_of_the_student_distribution():
 
 def test_one_distribution_fitted_to_draws_has_their_mean_and_covariance():
     draws = np.random.default_rng(3).multivariate_normal(MEAN, COVARIANCE, (4, 25, 32))
-    (part,) = Proposal.one_fitted(draws).parts
+    found = Proposal.one_fitted(draws)
+    (centre,), (factor,) = found.centres, found.factors
     flat = draws.reshape(-1, 3)
-    scale = part.factor @ part.factor.T * DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2)
-    np.testing.assert_allclose(part.centre, flat.mean(axis=0))
+    scale = factor @ factor.T * DEGREES_OF_FREEDOM / (DEGREES_OF_FREEDOM - 2)
+    np.testing.assert_allclose(centre, flat.mean(axis=0))
     np.testing.assert_allclose(scale, np.cov(flat.T), rtol=1e-8)
 
 
 def test_a_mixture_is_normalised_and_its_points_follow_it():
     """Importance weights of a known density have a mean of one, with an error that they tell themselves."""
     mixture = Proposal.fitted(banana(3000, seed=1))
-    assert len(mixture.parts) == N_PARTS
+    assert len(mixture.weights) == N_PARTS
     points = mixture.points(20_000, np.random.default_rng(5))
     weights = np.exp(one_density(points) - mixture.log_density(points))
     assert abs(weights.mean() - 1.0) < 4 * weights.std() / np.sqrt(len(weights))
@@ -84,7 +85,7 @@ def test_a_mixture_fits_a_curved_posterior_better_than_one_distribution():
 
 
 def test_few_draws_get_one_distribution():
-    assert len(Proposal.fitted(banana(60, seed=1)).parts) == 1
+    assert len(Proposal.fitted(banana(60, seed=1)).weights) == 1
 
 
 def test_differences_of_an_archive_are_as_probable_as_their_opposites():
