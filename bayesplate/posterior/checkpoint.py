@@ -26,7 +26,7 @@ from bayesplate.errors import CheckpointError
 
 FloatArray = NDArray[np.float64]
 
-FORMAT = 4  # to be raised whenever the same seed would give other chunks, so that two programs never share one run
+FORMAT = 5  # to be raised whenever the same seed would give other chunks, so that two programs never share one run
 
 
 @dataclass(frozen=True)

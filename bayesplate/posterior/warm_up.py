@@ -28,8 +28,11 @@ Where they are, it scatters by the square root of half the number of parameters 
 """
 _AGAIN = 16
 """Chunks after which draws are judged for the first time; each next time after twice as many."""
-_SLOW = 20.0
-"""Autocorrelation time, steps, from which on the proposals are learnt anew."""
+_FEWEST_TAUS = 20.0
+"""Autocorrelation times that draws have to hold when they are judged, or proposals are learnt anew from them.
+
+Two fifths of what a run must have in the end: most of the way is to go still, and better proposals make up for it.
+"""
 
 
 @dataclass
@@ -66,7 +69,7 @@ class WarmUp:
                 if n >= FEWEST and (n == MOST or _rise(chunks[n - TAUGHT : n]) < _RISE):
                     self.first, self.end, self._taught, self._trial = n, n, n - TAUGHT, n
             elif n == self._trial + self._interval:
-                if _slowness(chunks[self.end : n]) > _SLOW:
+                if _length_in_taus(chunks[self.end : n]) < _FEWEST_TAUS:
                     self._taught, self.end = self.end, n
                 self._trial, self._interval = n, 2 * self._interval
         return self.end > before
@@ -81,7 +84,7 @@ def _rise(chunks: Sequence[Chunk]) -> float:
     return float(chunks[-1].log_prob.mean() - chunks[0].log_prob.mean())
 
 
-def _slowness(chunks: Sequence[Chunk]) -> float:
-    """Autocorrelation time of the slowest parameter, steps, averaged over ensembles."""
+def _length_in_taus(chunks: Sequence[Chunk]) -> float:
+    """Length in autocorrelation times of the slowest parameter, averaged over ensembles."""
     draws = np.concatenate([chunk.draws for chunk in chunks], axis=1)
-    return float(np.max(np.mean([autocorrelation_time(each) for each in draws], axis=0)))
+    return draws.shape[1] / float(np.max(np.mean([autocorrelation_time(each) for each in draws], axis=0)))

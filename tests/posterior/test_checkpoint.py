@@ -200,7 +200,7 @@ def test_another_run_is_refused_and_the_difference_named(folder):
 def test_a_newer_format_is_refused(folder):
     path = folder / "manifest.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"format": 99}))
-    with pytest.raises(CheckpointError, match="differs in its format: wanted 4, got 99"):
+    with pytest.raises(CheckpointError, match=f"differs in its format: wanted {checkpoint_module.FORMAT}, got 99"):
         n_usable_chunks(folder)
 
 

@@ -35,6 +35,11 @@ def followed(made):
     return [(warm_up.follow(made[:n]), warm_up.first, warm_up.end) for n in range(1, len(made) + 1)], warm_up
 
 
+def taught_after(ends):
+    """Numbers of chunks after which something was learnt."""
+    return [n for n, (taught, _, _) in enumerate(ends, start=1) if taught]
+
+
 def test_it_lasts_until_the_density_no_longer_rises():
     ends, warm_up = followed(chunks([0.0] * 9))
     assert [first for _, first, _ in ends] == [None] * (FEWEST - 1) + [FEWEST] * 4
@@ -60,8 +65,15 @@ def test_draws_that_hang_together_become_a_further_warm_up(tau, is_again):
 def test_they_are_judged_at_doubled_intervals():
     made = chunks([0.0] * (FEWEST + 7 * AGAIN + 1), 200.0)
     ends, _ = followed(made)
-    again = [n for n, (taught, _, _) in enumerate(ends, start=1) if taught]
-    assert again == [FEWEST, FEWEST + AGAIN, FEWEST + 3 * AGAIN, FEWEST + 7 * AGAIN]
+    assert taught_after(ends) == [FEWEST, FEWEST + AGAIN, FEWEST + 3 * AGAIN, FEWEST + 7 * AGAIN]
+
+
+def test_draws_that_are_long_enough_for_their_time_are_kept():
+    """Twice as many draws may depend on each other over twice as many steps."""
+    ends, _ = followed(chunks([0.0] * (FEWEST + 3 * AGAIN + 1), 28.0))
+    assert taught_after(ends) == [FEWEST, FEWEST + AGAIN]
+    ends, _ = followed(chunks([0.0] * (FEWEST + 3 * AGAIN + 1), 60.0))
+    assert taught_after(ends) == [FEWEST, FEWEST + AGAIN, FEWEST + 3 * AGAIN]
 
 
 def test_a_run_that_is_resumed_has_the_same():
