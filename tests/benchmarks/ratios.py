@@ -22,6 +22,8 @@ FEW_BOARDS, MANY_BOARDS = 5, 100
 FEW_MODES, MANY_MODES = 6, 12
 FEW_CANDIDATES = ("attached_mass", "poisson_ratio", "grain_angle")
 ACCURACY = 1e-4
+EFFECTIVE, POINTS_A_SIDE = 4000, 100
+"""Draws of a posterior that is sampled with one solve each, and the grid of MAGPIE's own examples."""
 
 HEAD = """# Benchmarks
 
@@ -77,6 +79,10 @@ def ratios(repeats: int) -> Iterator[Ratio]:
         plain = median(timing.plain_emcee(problem, seed) for seed in SEEDS)
         yield Ratio(f"effective draws per second beside plain emcee, {what}", ours / plain, limit, at_least=True)
     unit = timing.unit(repeats)
+    solves = EFFECTIVE * timing.finite_differences(POINTS_A_SIDE, FEW_MODES)
+    what = f"{EFFECTIVE:,} solves by finite differences on {POINTS_A_SIDE} x {POINTS_A_SIDE} points, one per effective "
+    what += f"draw, in cold processes `fit {LINEAR_BOARD}`"
+    yield Ratio(what, solves / timing.whole_fit(LINEAR_BOARD, repeats=repeats), 1.0, at_least=True)
     options = ("--no-report",)
     for name, limit, more, words in (
         (LINEAR_BOARD, 1.2, options, ""),

@@ -133,6 +133,18 @@ def assembly(problem: PosedProblem, repeats: int = 5) -> float:
     return best(run, repeats)
 
 
+def finite_differences(n_points: int, n_modes: int, repeats: int = 5) -> float:
+    """The lowest modes of a supported plate of so many points a side: the stencil of thirteen points and shift-invert,
+    as MAGPIE solves a plate (https://github.com/Nemus-Project/magpie-python), whose building is left out."""
+    from scipy.sparse import diags_array, eye_array, kron
+    from scipy.sparse.linalg import eigs
+
+    line_of = diags_array([np.ones(n_points - 1), np.full(n_points, -2.0), np.ones(n_points - 1)], offsets=[-1, 0, 1])
+    laplacian = kron(line_of, eye_array(n_points)) + kron(eye_array(n_points), line_of)
+    biharmonic = (laplacian @ laplacian).tocsc()
+    return best(lambda: eigs(biharmonic, k=n_modes, sigma=0.0, which="LR"), repeats)
+
+
 def to_accuracy(plate: ritz.Plate, error: float) -> tuple[float, float]:
     """The lowest twelve modes of a plate to a relative error, each way on the least that has it: seconds of the finite
     elements, matrices included, and of the Ritz method in Legendre polynomials, which is independent of them.
