@@ -241,8 +241,9 @@ def sample(
             is_taught = warm_up.follow(chunks)
             is_over = warm_up.first is not None
             at_end = n_steps >= settings.max_steps
-            if at_end or (is_over and _gate_is_due(n_steps, warm_up.end * settings.chunk_steps, settings.chunk_steps)):
-                burn_in = _burn_in(chunks, warm_up.end, is_corrected=cheap is not None)
+            n_warm = min(warm_up.end, len(chunks) - 1) * settings.chunk_steps
+            if at_end or (is_over and _gate_is_due(n_steps, n_warm, settings.chunk_steps)):
+                burn_in = _burn_in(n_steps, n_warm, is_corrected=cheap is not None)
                 kept = _after(burn_in, [chunk.draws for chunk in chunks])
                 n_taus = length.in_taus(kept, settings.gate.tau_count_min)
                 if at_end or n_taus >= settings.gate.tau_count_min:  # the rule that takes longest: the others can wait
@@ -283,10 +284,8 @@ def _gate_is_due(n_steps: int, warm_up: int, chunk_steps: int) -> bool:
     return due == n_steps
 
 
-def _burn_in(chunks: Sequence[Chunk], n_warm: int, *, is_corrected: bool) -> int:
+def _burn_in(n_steps: int, warm_up: int, *, is_corrected: bool) -> int:
     """Steps to discard: the warm-up at least, and behind that of a surrogate a sixth of the corrected steps too."""
-    n_steps = sum(chunk.draws.shape[1] for chunk in chunks)
-    warm_up = min(n_warm, len(chunks) - 1) * chunks[0].draws.shape[1]
     return warm_up + -(-(n_steps - warm_up) // 6) if is_corrected else max(warm_up, burn_in_steps(n_steps))
 
 
