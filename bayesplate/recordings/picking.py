@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ _BEYOND = 60.0
 _FEWEST_LINES = 5
 _PART = 0.5
 """Probability from which on a part of another peak is fitted together with it as one mode."""
+_SAME = 3.0
+"""Decay rates within which a mode is found again in a fit without the parts."""
 _PRIOR_GROUPS = 8.0
 """Hits or places without scatter of their own that stand beside those that were taken, so that few tell little."""
 
@@ -127,42 +129,87 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
         raise InputError(Fault(place, wanted, str(n_lines), "--lowest and --highest look elsewhere"))
     by_width, paths = find_modes(spectra, lowest, min(highest + _BEYOND, float(spectra.frequency[-1])))
     modes = fit_modes(spectra, joined(by_width, spectra), by_width, lowest, highest)
-    answered = answers(spectra, modes)
-    judged = verdicts(spectra, modes, answered)
-    parts = {m: one.part_of for m, one in enumerate(judged) if one.part_of >= 0 and one.spurious > _PART}
-    whole = _without_parts(spectra, modes, [*parts], by_width, (lowest, highest)) if parts else {}
-    strongest = max((one.strength for one in answered), default=1.0)
-    picked = []
-    for m, mode in enumerate(modes):
-        other, doubt = mode, 0.0
-        if m in parts.values() and m in whole:
-            other, doubt = whole[m], max(judged[k].spurious for k, of in parts.items() if of == m)
-        picked.append(_picked(spectra, (mode, other, doubt), answered[m], judged[m], strongest))
-    return Picked(tuple(picked), spectra, tuple(paths), lowest, highest)
+    kept, parts = _without_parts(spectra, modes, by_width, (lowest, highest))
+    every = sorted((*kept, *parts), key=lambda peak: peak.mode.frequency)
+    strongest = max((peak.answer.strength for peak in every), default=1.0)
+    return Picked(tuple(_picked(spectra, one, strongest) for one in every), spectra, tuple(paths), lowest, highest)
+
+
+@dataclass(frozen=True, eq=False)
+class _Peak:
+    """A mode as it was fitted and judged last; `other`, as it was with a part of it as a mode of its own.
+
+    `doubt` is the probability that the part is none.
+    """
+
+    mode: Mode
+    answer: Answer
+    verdict: Verdict
+    other: Mode
+    doubt: float = 1.0
 
 
 def _without_parts(
-    spectra: Spectra, modes: Sequence[Mode], parts: Sequence[int], by_width: list[Floats], band: tuple[float, float]
-) -> dict[int, Mode]:
-    """The modes again, by their number, where parts of a peak are left to the mode that they are of."""
-    kept = [m for m in range(len(modes)) if m not in parts]
-    start = np.array([[modes[m].frequency, modes[m].decay] for m in kept])
-    again = fit_modes(spectra, start, by_width, *band)
-    if not again:
-        return {}
-    off = np.abs(np.array([modes[m].frequency for m in kept])[:, None] - [one.frequency for one in again])
-    of_old, of_new = off.argmin(axis=1), off.argmin(axis=0)
-    return {m: again[of_old[i]] for i, m in enumerate(kept) if of_new[of_old[i]] == i}
+    spectra: Spectra, modes: Sequence[Mode], by_width: list[Floats], band: tuple[float, float]
+) -> tuple[list[_Peak], list[_Peak]]:
+    """Modes fitted again without those that are rather parts of the peaks of others than modes; and those parts.
+
+    Parts are left out once and not again: where a peak is not simple in earnest, its modes come out right only beside
+    something that takes up the rest.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    before = _judged(spectra, modes)
+    leaving = whole_peaks([one.verdict for one in before])
+    left = [m for m in range(len(modes)) if m not in leaving]
+    beside = [m for m in left if any(_overlap(modes[m], modes[k]) for k in leaving)]
+    if not beside:
+        return [before[m] for m in left], [before[m] for m in leaving]
+    start = np.array([[modes[m].frequency, modes[m].decay] for m in left])
+    again = _judged(spectra, fit_modes(spectra, start, by_width, *band))
+    apart = np.abs(start[:, :1] - [one.mode.frequency for one in again]) / start[:, 1:]
+    kept = {m: before[m] for m in left}
+    for i, new in zip(*linear_sum_assignment(np.minimum(apart, _SAME)), strict=True):
+        m = left[i]
+        if m in beside and apart[i, new] < _SAME:
+            kept[m] = _joined(before, m, again[new], [k for k, of in leaving.items() if of == m])
+    return list(kept.values()), [before[m] for m in leaving]
 
 
-def _picked(
-    spectra: Spectra, fits: tuple[Mode, Mode, float], answer: Answer, verdict: Verdict, strongest: float
-) -> PickedMode:
-    """A mode averaged over two fits, the second with a probability: with a part of its peak as a mode, and without."""
-    one, other, doubt = fits
-    frequency = (1.0 - doubt) * one.frequency + doubt * other.frequency
-    split = abs(one.frequency - other.frequency) * float(np.sqrt(doubt * (1.0 - doubt)))
-    mode = other if doubt > _PART else one
+def _overlap(one: Mode, other: Mode) -> bool:
+    """Whether two modes lie within their widths of each other."""
+    return abs(one.frequency - other.frequency) < one.decay + other.decay
+
+
+def whole_peaks(verdicts: Sequence[Verdict]) -> dict[int, int]:
+    """Numbers of those modes that are rather parts than modes, each with the number of that which it is a part of.
+
+    What is a part of a part is not among them: beside the whole peak it may be a mode.
+    """
+    part_of = {m: one.part_of for m, one in enumerate(verdicts) if one.spurious > _PART}
+    return {m: of for m, of in part_of.items() if of >= 0 and part_of.get(of, -1) < 0}
+
+
+def _judged(spectra: Spectra, modes: Sequence[Mode]) -> list[_Peak]:
+    answered = answers(spectra, modes)
+    judged = zip(modes, answered, verdicts(spectra, modes, answered), strict=True)
+    return [_Peak(mode, answer, verdict, mode) for mode, answer, verdict in judged]
+
+
+def _joined(before: Sequence[_Peak], m: int, now: _Peak, parts: Sequence[int]) -> _Peak:
+    """A peak after parts of it were left out, with what it was before: that of its modes that lies nearest."""
+    if not parts:
+        return now
+    other = min((before[k].mode for k in (m, *parts)), key=lambda one: abs(one.frequency - now.mode.frequency))
+    return replace(now, other=other, doubt=max(before[k].verdict.spurious for k in parts))
+
+
+def _picked(spectra: Spectra, peak: _Peak, strongest: float) -> PickedMode:
+    """A mode averaged over two fits: with a part of its peak as a mode, and without."""
+    mode, other, doubt = peak.mode, peak.other, peak.doubt
+    answer, verdict = peak.answer, peak.verdict
+    frequency = doubt * mode.frequency + (1.0 - doubt) * other.frequency
+    split = abs(mode.frequency - other.frequency) * float(np.sqrt(doubt * (1.0 - doubt)))
     noise = float(np.sqrt(mode.covariance[0, 0]))
     scatter = noise * np.sqrt(max(_excess(spectra, mode, 0) - 1.0, 0.0))
     damping_sd = float(np.sqrt(mode.covariance[1, 1] * max(_excess(spectra, mode, 1), 1.0))) / mode.frequency

@@ -1,8 +1,9 @@
 """How probable it is that what was fitted is no mode of the board, and why: noise, hum, a split peak, a faint line.
 
 What is not said by the records themselves comes from how modes of boards differ from everything else: their residues
-are real, they are alike from hit to hit, they are rarely a hundred times weaker than others nearby, and where the peak
-of one mode is not simple, a fit gives it a weaker neighbour within its own width that moves as it does.
+are real, they are alike from hit to hit, they are rarely a hundred times weaker than others nearby, they are damped
+about alike, and where the peak of one mode is not simple, a fit gives it a weaker neighbour within its own width that
+moves as it does.
 """
 
 from __future__ import annotations
@@ -27,6 +28,11 @@ REACH = 3.0
 """Widths (both decay rates together) within which a second part lies."""
 _REAL, _REAL_SHARE = 12.0, 0.85
 """Degrees by which a mode's residue is complex, and how often this holds."""
+_BROAD_ODDS, _BROAD, _BROAD_FACTOR = 0.03, 0.03, 1.7
+"""Of something broad on which modes stand, against a mode, before its damping is looked at; median and factor of its
+damping ratio, log-normal."""
+_ALIKE_FACTOR, _ALIKE_MODES = 1.8, 6.0
+"""By how much the damping ratios of a board's modes differ, before they are seen, and what that counts, in modes."""
 _UNSTABLE = 3.0
 """Odds that are added to what only windows of one width show."""
 _MAINS = (50.0, 60.0)
@@ -46,8 +52,8 @@ class Verdict:
     spurious : float
         Probability that it is none.
     kind : str
-        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint"; empty where nothing speaks of
-        it.
+        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint", "broad"; empty where nothing
+        speaks of it.
     part_of : int
         Number of the mode of which it is likeliest a part; -1 if of none.
     """
@@ -78,6 +84,7 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
     strong = hertz[strengths > 0.2 * usual]
     spacing = float(np.ptp(strong)) / max(strong.size - 1, 1) if strong.size > 1 else 50.0
     spare = spectra.places.size - len(spectra.between)
+    broad = broad_odds(np.array([mode.damping for mode in modes]), strengths / usual)
     found = []
     for m, mode in enumerate(modes):
         reasons = {"noise": mode.expected / (1.0 + mode.expected)}
@@ -85,6 +92,7 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
         reasons |= _of_lines(mode, spectra.duration, reasons["not alike from hit to hit"])
         faint, split, part_of = _odds(m, modes, answered, usual, spacing, has_force=spectra.force is not None)
         unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
+        reasons["broad"] = 1.0 - 1.0 / (1.0 + broad[m])
         reasons["faint"] = 1.0 - 1.0 / (1.0 + faint * unstable)
         reasons["part"] = 1.0 - 1.0 / (1.0 + split * unstable)
         spurious = 1.0 - float(np.prod([1.0 - one for one in reasons.values()]))
@@ -100,6 +108,37 @@ def _usual(hertz: Floats, strengths: Floats) -> Floats:
     """Strength of the stronger modes within an octave of each: (n_modes,) array."""
     near = np.abs(np.log2(hertz[:, None] / hertz)) <= 1.0
     return np.array([np.quantile(strengths[row], 0.7) for row in near])
+
+
+def broad_odds(damping: Floats, strengths: Floats) -> Floats:
+    """Odds that modes are something broad on which others stand, from their damping beside the others'.
+
+    Wood damps the modes of one board about alike; what a fit needs besides, as the tail of modes that it did not find,
+    is broader.
+
+    Parameters
+    ----------
+    damping : (n_modes,) array
+        Ratios.
+    strengths : (n_modes,) array
+        Over the usual ones, by which modes tell how a board damps.
+
+    Returns
+    -------
+    (n_modes,) array
+    """
+    logs, weights = np.log(damping), np.minimum(strengths, 1.0)
+    order = np.argsort(logs)
+    middle = logs[order][np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())]
+    off = np.minimum(np.abs(logs - middle), 2.0 * np.log(_ALIKE_FACTOR))  # some of them are no modes
+    variance = _ALIKE_MODES * np.log(_ALIKE_FACTOR) ** 2 + np.sum(weights * off**2)
+    sd = float(np.sqrt(variance / (_ALIKE_MODES + weights.sum())))
+    of_mode = _normal(np.maximum(logs - middle, 0.0), sd)
+    return np.asarray(_BROAD_ODDS * _normal(logs - np.log(_BROAD), np.log(_BROAD_FACTOR)) / np.maximum(of_mode, 1e-12))
+
+
+def _normal(off: Floats, sd: float) -> Floats:
+    return np.asarray(np.exp(-0.5 * (off / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
 def _of_lines(mode: Mode, duration: float, unlike: float) -> dict[str, float]:

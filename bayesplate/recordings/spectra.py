@@ -104,13 +104,24 @@ def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: flo
     )
 
 
-def response_spectra(responses: Sequence[FrequencyResponse], highest: float) -> Spectra:
-    """Frequency responses as they are, up to somewhat above the highest frequency; all on one grid."""
+def response_spectra(responses: Sequence[FrequencyResponse], highest: float, every: int = 1) -> Spectra:
+    """Frequency responses as they are, up to somewhat above the highest frequency.
+
+    Parameters
+    ----------
+    responses : sequence of FrequencyResponse
+        All on one grid.
+    highest : float, Hz
+        Up to which modes are looked for.
+    every : int
+        Only lines at multiples of so many spacings: the others are padding.
+    """
     first = responses[0]
-    kept = first.frequency <= _ABOVE * highest
+    spacing = every * float(first.frequency[1] - first.frequency[0])
+    lines = np.rint(every * first.frequency / spacing).astype(np.intp)
+    kept = (first.frequency <= _ABOVE * highest) & (lines % every == 0)
     between = [(one.hammer, one.sensor) for one in responses]
     places, distinct = _grouped(between, [one.name for one in responses])
-    spacing = float(first.frequency[1] - first.frequency[0])
     values = np.stack([one.values[kept] for one in responses], axis=1).astype(complex)
     return Spectra(
         frequency=first.frequency[kept],

@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, usable
+from bayesplate.recordings.padding import common_padding
 from bayesplate.recordings.reading import Read
 from bayesplate.recordings.signals import FrequencyResponse, Recording
 from bayesplate.recordings.spectra import Spectra, decay_spectra, response_spectra
@@ -62,7 +63,9 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
         faults = _response_faults(every, responses)
         if faults:
             raise InputError(faults)
-        return Heard(response_spectra(responses, highest), (), ())
+        one_of = common_padding(responses)
+        told = f"{responses[0].name}: of every {one_of} lines one was measured and is used, the others are interpolated"
+        return Heard(response_spectra(responses, highest, one_of), (), (told,) if one_of > 1 else ())
     recordings = [one for one in every if isinstance(one, Recording)]
     faults = _recording_faults(recordings, highest)
     heard: list[tuple[Recording, list[Hit]]] = []
