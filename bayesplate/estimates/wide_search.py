@@ -59,6 +59,8 @@ _RANGE = 0.005
 _SPARE = 8
 _MODES_PER_PEAK = 2.2
 _JUMP, _JITTER = 0.7, 1e-3
+_AT_ONCE = 128
+"""Members whose ways to take the peaks are looked at together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,10 +259,11 @@ class _Tabled:
         """The likeliest mode of each peak at each member, -1 for none: (n, n_peaks) array, setup by setup."""
         ways = []
         for there, peaks in self._there(x):
+            parts = np.array_split(there, -(-len(there) // _AT_ONCE))
             for one in peaks:
-                each = (one.probabilities(row[None], np.array([noise])) for row in there)
-                ways.append([np.where(p.max(axis=1) > 1.0 - p.sum(axis=1), p.argmax(axis=1), -1) for p in each])
-        return np.concatenate(ways, axis=1)
+                each = [one.probabilities_of_each(some, np.full(len(some), noise)) for some in parts]
+                ways += [[np.where(p.max(axis=1) > 1.0 - p.sum(axis=1), p.argmax(axis=1), -1) for p in each]]
+        return np.concatenate([np.concatenate(way, axis=1) for way in ways]).T
 
     def _there(self, x: Floats) -> Iterator[tuple[Floats, tuple[PeakLikelihood, ...]]]:
         for table, peaks in self.every:

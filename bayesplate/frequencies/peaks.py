@@ -189,17 +189,25 @@ class PeakLikelihood:
             ln f (Hz), all of them finite.
         noise : (n_draws,) array
         """
+        total = np.zeros(self.log_prior.shape)
+        for start in range(0, len(noise), _DRAWS_AT_ONCE):
+            some = slice(start, start + _DRAWS_AT_ONCE)
+            total += self.probabilities_of_each(every_log_frequency[some], noise[some]).sum(axis=2)
+        return total / len(noise)
+
+    def probabilities_of_each(self, every_log_frequency: Floats, noise: Floats) -> Floats:
+        """The same at each draw: (n_peaks, n_modes, n_draws) array."""
         from scipy.special import softmax
 
         there = every_log_frequency[:, self.columns]
         every = self._assignments(there, noise, self._missed(there, noise))
         weights = softmax(sum(one.log_sums(order.taking) for order, _, one in every), axis=0)
-        result = np.zeros(self.log_prior.shape)
+        result = np.zeros((*self.log_prior.shape, len(noise)))
         for order, modes, one in every:
             for taken, weight in zip(order.taking, weights, strict=True):
                 by_mode = np.zeros((int(taken.sum()), self.columns.size, len(noise)))
                 np.put_along_axis(by_mode, modes[None], one.of(taken).pairs(), axis=1)
-                result[order.peaks[taken]] += by_mode @ weight / len(noise)
+                result[order.peaks[taken]] += by_mode * weight
         return result
 
     def log_density_alone(self, reading: int) -> float:

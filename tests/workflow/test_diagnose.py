@@ -258,7 +258,7 @@ def test_three_modes_are_fitted_and_leave_nothing_to_judge_by(tmp_path, monkeypa
     """The fit is there with its page; what a search would tell is null, and is said to be."""
     with monkeypatch.context() as patch:
         quickly(patch, page=True)
-        card = card_of_few(tmp_path, "finnish-spruce-cantilever", ("(1,0)", "(1,1)", "(1,2)"))
+        card = card_of_few(tmp_path, "fiemme-spruce-clamped", ("(1,0)", "(0,2)", "(1,1)"))
         run = diagnose(tmp_path / "out", card)
     assert run.exit_code == 0, run.stderr
     found = told(run)
