@@ -5,7 +5,8 @@ by another method. The data have no stated licence and are not part of the proje
 says so and ends with exit code 0. Otherwise 0: all peaks found within 0.3 % or the listed spread, their signs agree but
 for one polarity, and no more than two further peaks are rather modes than not by the recordings; 1: not, with what is
 missed; 2: usage. The listing need not be complete: it is told which of the further ones are modes that the board of the
-card has. `--publish` writes the same to a page.
+card has. Nor need it be right: where a listed peak of a frequency response is missed, it is told where fits of one pole
+have it that share nothing with `pick`. `--publish` writes the same to a page.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is imported
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import numpy as np
 from calibration.records import publish
+from scipy.optimize import least_squares
 
 import bayesplate
 from bayesplate.recordings.contract import PickedRow
@@ -35,7 +38,32 @@ AT = {"hammer": [(0.020, 0.020)], "sensor": [(0.560, 0.197)]}
 """Where the listing says that hammer and sensor were, m."""
 
 
-def compared(words: str, peaks: Sequence[dict[str, Any]], picked: Sequence[PickedRow]) -> tuple[list[str], bool]:
+HALF_WIDTHS, DEGREES = (10.0, 15.0, 20.0, 25.0), (1, 2, 3)
+"""Of the windows of plain fits, Hz, and of the polynomial for everything else in them."""
+EVERY = 2
+"""Lines of the responses for each line of their records, which were padded with zeros to twice their length."""
+
+
+def plain_fits(frequency: np.ndarray, values: np.ndarray, hertz: float) -> list[float]:
+    """Where one pole lies that is fitted beside a polynomial to windows about a frequency, Hz: one for each way."""
+    found = []
+    for half in HALF_WIDTHS:
+        kept = np.abs(frequency - hertz) <= half
+        f, h, x = frequency[kept], values[kept], (frequency[kept] - hertz) / half
+        for degree in DEGREES:
+
+            def left(pole: np.ndarray, f: np.ndarray = f, h: np.ndarray = h, x: np.ndarray = x, n: int = degree) -> Any:
+                basis = np.stack([1.0 / (1j * (f - pole[0]) + pole[1]), *(x**k for k in range(n + 1))], axis=1)
+                rest = h - basis @ np.linalg.lstsq(basis, h, rcond=None)[0]
+                return np.concatenate([rest.real, rest.imag])
+
+            found.append(float(least_squares(left, [hertz, 0.01 * hertz]).x[0]))
+    return found
+
+
+def compared(
+    words: str, peaks: Sequence[dict[str, Any]], picked: Sequence[PickedRow], response: np.ndarray | None
+) -> tuple[list[str], bool]:
     """Line by line how picked modes agree with listed peaks, and whether they do."""
     likely = [peak for peak in picked if peak.is_likely]
     off = sorted((abs(mode.hz - peak["f_hz"]), i, j) for i, peak in enumerate(peaks) for j, mode in enumerate(likely))
@@ -50,6 +78,12 @@ def compared(words: str, peaks: Sequence[dict[str, Any]], picked: Sequence[Picke
         if mode is None or abs(mode.hz - peak["f_hz"]) > reach:
             nearest = "none" if mode is None else f"{mode.hz:.2f} +- {mode.sd_hz:.2f} Hz"
             lines.append(f"  missed: {peak['f_hz']:.2f} Hz (within {reach:.2f} Hz), nearest {nearest}")
+            if response is not None:
+                plain = plain_fits(response[:, 0], response[:, 1] + 1j * response[:, 2], peak["f_hz"])
+                lines.append(
+                    f"    one pole beside a polynomial, {len(plain)} windows and degrees: "
+                    f"{min(plain):.2f} to {max(plain):.2f} Hz"
+                )
             continue
         found += 1
         if peak["sign"] in "+-" and mode.sign:
@@ -100,7 +134,8 @@ def main() -> int:
     for words, name, files, rate in every:
         card = f"spruce-free-{name}"
         picked = bayesplate.pick(files, card=card, rate=rate, highest=HIGHEST, polarity="opposite", **AT).summary
-        lines, agrees = compared(words, listed[name], picked.peaks)
+        response = None if rate else np.genfromtxt(files[0], delimiter=",", skip_header=2)[::EVERY]
+        lines, agrees = compared(words, listed[name], picked.peaks, response)
         print("\n".join(lines), flush=True)
         is_right, told = is_right and agrees, [*told, *lines, ""]
     if options.publish is not None:
