@@ -46,7 +46,7 @@ TRUTH = {"E_x": 10.7e9, "E_y": 0.716e9, "G_xy": 0.50e9}
 NOISE = 0.008
 """Relative sd of a simulated frequency: the median of the default prior for clamped boards."""
 SHEAR = ["transverse_shear"]
-N_DRAWS = 3000
+N_DRAWS = 2000
 WIDER, DEGREES = 1.3, 6.0
 LEVELS = {"68": (0.16, 0.84), "90": (0.05, 0.95)}
 NORMAL = {"68": 1.0, "90": 1.645}
