@@ -9,6 +9,7 @@ import pytest
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy is imported
     os.environ.setdefault(name, "1")
 
+
 def pytest_collection_finish():
     """What was loaded by now stays: looking for cycles among it again and again takes a twentieth of the time."""
     gc.collect()
