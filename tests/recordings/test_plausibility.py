@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from bayesplate.recordings import picking
+from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.picking import whole_peaks
-from bayesplate.recordings.plausibility import Verdict, broad_odds
+from bayesplate.recordings.plausibility import Verdict, broad_odds, verdicts
+from bayesplate.recordings.spectra import Spectra
+from bayesplate.recordings.strength import Answer
 
 
 def part(of: int, spurious: float = 0.8) -> Verdict:
@@ -13,6 +18,16 @@ def part(of: int, spurious: float = 0.8) -> Verdict:
 
 
 MODE = Verdict(0.02, "")
+
+
+def mode(frequency: float, damping: float = 0.007) -> Mode:
+    one, none = np.ones(1, dtype=complex), np.zeros((1, 2))
+    decay = damping * frequency
+    return Mode(frequency, decay, 1e-4 * np.eye(2), none, none + 1.0, one, np.ones(1), 1e4, 0.0, 0.0, 1.0)
+
+
+def answer(strength: float = 1.0) -> Answer:
+    return Answer(np.full(1, strength, dtype=complex), np.full(1, 0.01), 1.0)
 
 
 def test_parts_of_a_peak_leave_it_and_a_part_of_a_part_stays():
@@ -47,3 +62,44 @@ def test_broad_things_do_not_tell_how_the_board_damps_where_they_are_weak():
     weak = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05, 0.05])
 
     assert broad_odds(damping, weak)[3:].min() > 1.0
+
+
+def test_a_verdict_says_that_something_is_broad():
+    hertz = np.arange(20.0, 1000.0, 0.5)
+    values = np.ones((hertz.size, 1), dtype=complex)
+    spectra = Spectra(hertz, values, values, ("frf",), np.zeros(1, dtype=np.intp), ((None, None),), "acceleration", 2.0)
+    modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
+    found = verdicts(spectra, modes, [answer() for _ in modes])
+
+    assert (found[-1].kind, found[-1].spurious > 0.5) == ("broad", True)
+    assert max(one.spurious for one in found[:-1]) < 0.1
+
+
+@pytest.fixture
+def left_out(monkeypatch):
+    """Two modes and a part between them, another far off; fitted again without the part, each has moved."""
+    before = [mode(401.94), mode(402.79), mode(404.65), mode(430.0)]
+    again = [mode(401.73), mode(404.22), mode(431.0)]
+    words = {404.65: part(1)}
+
+    def judged(_, modes):
+        return [picking._Peak(one, answer(), words.get(one.frequency, MODE), one) for one in modes]
+
+    monkeypatch.setattr(picking, "_judged", judged)
+    monkeypatch.setattr(picking, "fit_modes", lambda *_: again)
+    return picking._without_parts(None, before, [], (20.0, 1000.0))
+
+
+def test_modes_beside_a_part_are_those_of_a_fit_without_it_and_others_stay(left_out):
+    kept, parts = left_out
+
+    assert [peak.mode.frequency for peak in kept] == [401.73, 404.22, 430.0]
+    assert [peak.mode.frequency for peak in parts] == [404.65]
+
+
+def test_a_mode_is_averaged_with_what_was_nearest_to_it_while_the_part_was_there(left_out):
+    """The part may have had its place, and the mode have been what was left."""
+    kept, _ = left_out
+
+    assert kept[1].other.frequency == 404.65
+    assert kept[1].doubt == 0.8
