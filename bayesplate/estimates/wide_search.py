@@ -59,8 +59,6 @@ _RANGE = 0.005
 _SPARE = 8
 _MODES_PER_PEAK = 2.2
 _JUMP, _JITTER = 0.7, 1e-3
-_AT_ONCE = 128
-"""Members whose ways to take the peaks are looked at together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,11 +257,11 @@ class _Tabled:
         """The likeliest mode of each peak at each member, -1 for none: (n, n_peaks) array, setup by setup."""
         ways = []
         for there, peaks in self._there(x):
-            parts = np.array_split(there, -(-len(there) // _AT_ONCE))
             for one in peaks:
-                each = [one.probabilities_of_each(some, np.full(len(some), noise)) for some in parts]
-                ways += [[np.where(p.max(axis=1) > 1.0 - p.sum(axis=1), p.argmax(axis=1), -1) for p in each]]
-        return np.concatenate([np.concatenate(way, axis=1) for way in ways]).T
+                is_mode = one.probabilities_of_each(there, np.full(len(there), noise))
+                is_none = 1.0 - is_mode.sum(axis=1)
+                ways.append(np.where(is_mode.max(axis=1) > is_none, is_mode.argmax(axis=1), -1))
+        return np.concatenate(ways).T
 
     def _there(self, x: Floats) -> Iterator[tuple[Floats, tuple[PeakLikelihood, ...]]]:
         for table, peaks in self.every:

@@ -9,7 +9,7 @@ there it breaks off, while what merely decays falls ever more slowly.
 
 Reference
 ---------
-Oppenheim and Schafer, Discrete-Time Signal Processing, 3rd edition, 2010, 8.4 and 10.2: sampling a transform.
+Oppenheim and Schafer, Discrete-Time Signal Processing, 3rd edition, 2010, 8.4: sampling the Fourier transform.
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from bayesplate.recordings.signals import FrequencyResponse
 
-Floats = NDArray[np.float64]
-
 _FACTORS = (8, 4, 3, 2)
 """Lengths that padded records have, in their own."""
 _SILENT = 0.1
@@ -32,31 +30,30 @@ _EARLIER, _BEFORE, _BEHIND = (0.7, 0.8), (0.9, 1.0), (1.05, 1.15)
 _FEWEST_LINES = 640
 
 
-def padding(frequency: Floats, values: NDArray[np.complex128]) -> int:
+def padding_of(values: NDArray[np.complex128]) -> int:
     """How many times as many lines a response has as its record.
 
     Parameters
     ----------
-    frequency : (n_lines,) array, Hz
-        Evenly spaced.
     values : (n_lines,) complex array
+        At evenly spaced frequencies.
 
     Returns
     -------
     int
         1 where nothing tells that it was padded.
     """
-    if frequency.size < _FEWEST_LINES:
+    if values.size < _FEWEST_LINES:
         return 1
     over_time = np.abs(np.fft.ifft(values * np.hanning(values.size))) ** 2
     for factor in _FACTORS:
         ends = np.rint(np.array([_EARLIER, _BEFORE, _BEHIND]) * values.size / factor).astype(np.intp)
         earlier, before, behind = (over_time[first:last].mean() for first, last in ends)
-        if behind < _SILENT * before * min(before / earlier, 1.0) ** 2:
+        if behind * earlier**2 < _SILENT * before * min(before, earlier) ** 2:
             return factor
     return 1
 
 
 def common_padding(responses: Sequence[FrequencyResponse]) -> int:
     """The same of responses on one grid: the least of them, for nothing that one of them knows is left out."""
-    return min(padding(one.frequency, one.values) for one in responses)
+    return min(padding_of(one.values) for one in responses)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.recordings.plausibility import weighted_median
+
 Floats = NDArray[np.float64]
 
 SHAPE_ERROR = 0.05
@@ -90,7 +92,7 @@ def _log_likelihood(
     sizes, shapes = np.linalg.norm(measured, axis=1), np.linalg.norm(predicted, axis=1)
     ratio = np.log(np.maximum(sizes[:, None], 1e-300) / np.maximum(shapes, SHAPE_ERROR * largest))
     weights = likely * np.minimum(shapes / largest, 1.0)
-    centre = _median(ratio.ravel(), weights.ravel() + 1e-9)
+    centre = weighted_median(ratio.ravel(), weights.ravel() + 1e-9)
     spread = _GAIN_SD if has_force else _FREE_GAIN_SD
     z = np.linspace(-2.5, 2.5, _N_GAINS)
     gains = np.exp(centre + spread * z)
@@ -98,12 +100,6 @@ def _log_likelihood(
     sd = np.hypot(measured_sd[:, None, None, :], SHAPE_ERROR * gains[:, None] * largest[None, :, None, None])
     each = np.sum(-0.5 * (off / sd) ** 2 - np.log(sd), axis=3) - 0.5 * z**2
     return np.asarray(logsumexp(each, axis=2))
-
-
-def _median(values: Floats, weights: Floats) -> float:
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _summed(each: Floats, likely: Floats) -> Floats:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.modes_found import Mode, Path, find_modes, fit_modes, joined
-from bayesplate.recordings.plausibility import Verdict, complexity, verdicts
+from bayesplate.recordings.plausibility import Verdict, complexity, part_words, verdicts
 from bayesplate.recordings.spectra import Spectra
 from bayesplate.recordings.strength import Answer, answers
 
@@ -148,6 +148,11 @@ class _Peak:
     other: Mode
     doubt: float = 1.0
 
+    @property
+    def frequency(self) -> float:
+        """Averaged over both, Hz."""
+        return self.doubt * self.mode.frequency + (1.0 - self.doubt) * self.other.frequency
+
 
 def _without_parts(
     spectra: Spectra, modes: Sequence[Mode], by_width: list[Floats], band: tuple[float, float]
@@ -161,19 +166,18 @@ def _without_parts(
 
     before = _judged(spectra, modes)
     leaving = whole_peaks([one.verdict for one in before])
-    left = [m for m in range(len(modes)) if m not in leaving]
-    beside = [m for m in left if any(_overlap(modes[m], modes[k]) for k in leaving)]
-    if not beside:
-        return [before[m] for m in left], [before[m] for m in leaving]
-    start = np.array([[modes[m].frequency, modes[m].decay] for m in left])
-    again = _judged(spectra, fit_modes(spectra, start, by_width, *band))
-    apart = np.abs(start[:, :1] - [one.mode.frequency for one in again]) / start[:, 1:]
-    kept = {m: before[m] for m in left}
-    for i, new in zip(*linear_sum_assignment(np.minimum(apart, _SAME)), strict=True):
-        m = left[i]
-        if m in beside and apart[i, new] < _SAME:
-            kept[m] = _joined(before, m, again[new], [k for k, of in leaving.items() if of == m])
-    return list(kept.values()), [before[m] for m in leaving]
+    kept = {m: one for m, one in enumerate(before) if m not in leaving}
+    beside = [m for m in kept if any(_overlap(modes[m], modes[k]) for k in leaving)]
+    if beside:
+        left = list(kept)
+        start = np.array([[modes[m].frequency, modes[m].decay] for m in left])
+        again = _judged(spectra, fit_modes(spectra, start, by_width, *band))
+        apart = np.abs(start[:, :1] - [one.mode.frequency for one in again]) / start[:, 1:]
+        for i, new in zip(*linear_sum_assignment(np.minimum(apart, _SAME)), strict=True):
+            m = left[i]
+            if m in beside and apart[i, new] < _SAME:
+                kept[m] = _whole(again[new], [before[k] for k in (m, *leaving) if k == m or leaving[k] == m])
+    return list(kept.values()), [_part_of(before[k], kept[of]) for k, of in leaving.items()]
 
 
 def _overlap(one: Mode, other: Mode) -> bool:
@@ -196,20 +200,27 @@ def _judged(spectra: Spectra, modes: Sequence[Mode]) -> list[_Peak]:
     return [_Peak(mode, answer, verdict, mode) for mode, answer, verdict in judged]
 
 
-def _joined(before: Sequence[_Peak], m: int, now: _Peak, parts: Sequence[int]) -> _Peak:
-    """A peak after parts of it were left out, with what it was before: that of its modes that lies nearest."""
+def _whole(now: _Peak, before: Sequence[_Peak]) -> _Peak:
+    """A peak after parts of it were left out, with what it was before: first the mode, then its parts.
+
+    That of them counts as what it was which lies nearest.
+    """
+    _, *parts = before
     if not parts:
         return now
-    other = min((before[k].mode for k in (m, *parts)), key=lambda one: abs(one.frequency - now.mode.frequency))
-    return replace(now, other=other, doubt=max(before[k].verdict.spurious for k in parts))
+    other = min((one.mode for one in before), key=lambda one: abs(one.frequency - now.mode.frequency))
+    return replace(now, other=other, doubt=max(one.verdict.spurious for one in parts))
+
+
+def _part_of(part: _Peak, whole: _Peak) -> _Peak:
+    """A part that is told by the frequency of its peak as that came out."""
+    return replace(part, verdict=replace(part.verdict, kind=part_words(whole.frequency)))
 
 
 def _picked(spectra: Spectra, peak: _Peak, strongest: float) -> PickedMode:
     """A mode averaged over two fits: with a part of its peak as a mode, and without."""
-    mode, other, doubt = peak.mode, peak.other, peak.doubt
-    answer, verdict = peak.answer, peak.verdict
-    frequency = doubt * mode.frequency + (1.0 - doubt) * other.frequency
-    split = abs(mode.frequency - other.frequency) * float(np.sqrt(doubt * (1.0 - doubt)))
+    mode, answer, verdict = peak.mode, peak.answer, peak.verdict
+    split = abs(mode.frequency - peak.other.frequency) * float(np.sqrt(peak.doubt * (1.0 - peak.doubt)))
     noise = float(np.sqrt(mode.covariance[0, 0]))
     scatter = noise * np.sqrt(max(_excess(spectra, mode, 0) - 1.0, 0.0))
     damping_sd = float(np.sqrt(mode.covariance[1, 1] * max(_excess(spectra, mode, 1), 1.0))) / mode.frequency
@@ -217,7 +228,7 @@ def _picked(spectra: Spectra, peak: _Peak, strongest: float) -> PickedMode:
     window = float(np.hypot(mode.shift / np.sqrt(2.0), split))
     turned = answer.mobility
     return PickedMode(
-        frequency=frequency,
+        frequency=peak.frequency,
         sd=float(np.sqrt(noise**2 + scatter**2 + window**2)),
         noise_sd=noise,
         scatter_sd=float(scatter),

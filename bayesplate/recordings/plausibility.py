@@ -52,8 +52,8 @@ class Verdict:
     spurious : float
         Probability that it is none.
     kind : str
-        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint", "broad"; empty where nothing
-        speaks of it.
+        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint", "something broad";
+        empty where nothing speaks of it.
     part_of : int
         Number of the mode of which it is likeliest a part; -1 if of none.
     """
@@ -92,16 +92,21 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
         reasons |= _of_lines(mode, spectra.duration, reasons["not alike from hit to hit"])
         faint, split, part_of = _odds(m, modes, answered, usual, spacing, has_force=spectra.force is not None)
         unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
-        reasons["broad"] = 1.0 - 1.0 / (1.0 + broad[m])
+        reasons["something broad"] = 1.0 - 1.0 / (1.0 + broad[m])
         reasons["faint"] = 1.0 - 1.0 / (1.0 + faint * unstable)
         reasons["part"] = 1.0 - 1.0 / (1.0 + split * unstable)
         spurious = 1.0 - float(np.prod([1.0 - one for one in reasons.values()]))
         worst = max(reasons, key=lambda name: reasons[name])
         kind = "" if reasons[worst] < 0.05 else worst
         is_part = kind == "part"
-        words = f"part of {modes[part_of].frequency:.1f} Hz" if is_part else kind
+        words = part_words(modes[part_of].frequency) if is_part else kind
         found.append(Verdict(min(spurious, 1.0), words, part_of if is_part else -1))
     return found
+
+
+def part_words(hertz: float) -> str:
+    """What a part of the peak of another mode is called."""
+    return f"part of {hertz:.1f} Hz"
 
 
 def _usual(hertz: Floats, strengths: Floats) -> Floats:
@@ -128,17 +133,19 @@ def broad_odds(damping: Floats, strengths: Floats) -> Floats:
     (n_modes,) array
     """
     logs, weights = np.log(damping), np.minimum(strengths, 1.0)
-    order = np.argsort(logs)
-    middle = logs[order][np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())]
+    middle = weighted_median(logs, weights)
     off = np.minimum(np.abs(logs - middle), 2.0 * np.log(_ALIKE_FACTOR))  # some of them are no modes
     variance = _ALIKE_MODES * np.log(_ALIKE_FACTOR) ** 2 + np.sum(weights * off**2)
     sd = float(np.sqrt(variance / (_ALIKE_MODES + weights.sum())))
-    of_mode = _normal(np.maximum(logs - middle, 0.0), sd)
-    return np.asarray(_BROAD_ODDS * _normal(logs - np.log(_BROAD), np.log(_BROAD_FACTOR)) / np.maximum(of_mode, 1e-12))
+    broad = _normal(logs - np.log(_BROAD), np.log(_BROAD_FACTOR))
+    return np.asarray(_BROAD_ODDS * broad / np.maximum(_normal(np.maximum(logs - middle, 0.0), sd), 1e-12))
 
 
-def _normal(off: Floats, sd: float) -> Floats:
-    return np.asarray(np.exp(-0.5 * (off / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
+def weighted_median(values: Floats, weights: Floats) -> float:
+    """The value with half of the weight on either side."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _of_lines(mode: Mode, duration: float, unlike: float) -> dict[str, float]:
@@ -195,8 +202,11 @@ def _odds(
 
 def _log_normal(value: float, median: float, factor: float) -> float:
     """Density of the logarithm; above the median as far as it is exceeded only."""
-    z = np.log(value / median) / np.log(factor)
-    return float(np.exp(-0.5 * max(z, 0.0) ** 2) / (np.log(factor) * np.sqrt(2.0 * np.pi)))
+    return float(_normal(np.maximum(np.log(value / median), 0.0), np.log(factor)))
+
+
+def _normal(off: Floats, sd: float) -> Floats:
+    return np.asarray(np.exp(-0.5 * (off / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
 def complexity(answer: Answer) -> float:
@@ -213,8 +223,7 @@ def _uniform(reach: float) -> float:
 
 def _of_real(angle: float) -> float:
     """Density of the angle of a mode's residue, per degree."""
-    normal = np.exp(-0.5 * (angle / _REAL) ** 2) / (_REAL * np.sqrt(2.0 * np.pi))
-    return float(_REAL_SHARE * normal + (1.0 - _REAL_SHARE) / 180.0)
+    return float(_REAL_SHARE * _normal(np.asarray(angle), _REAL) + (1.0 - _REAL_SHARE) / 180.0)
 
 
 def _pattern(one: Answer, other: Answer) -> float:

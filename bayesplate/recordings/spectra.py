@@ -104,7 +104,7 @@ def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: flo
     )
 
 
-def response_spectra(responses: Sequence[FrequencyResponse], highest: float, every: int = 1) -> Spectra:
+def response_spectra(responses: Sequence[FrequencyResponse], highest: float, padding: int = 1) -> Spectra:
     """Frequency responses as they are, up to somewhat above the highest frequency.
 
     Parameters
@@ -113,13 +113,13 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, eve
         All on one grid.
     highest : float, Hz
         Up to which modes are looked for.
-    every : int
-        Only lines at multiples of so many spacings: the others are padding.
+    padding : int
+        How many times as many lines there are as in the records: those at multiples of so many spacings are theirs.
     """
     first = responses[0]
-    spacing = every * float(first.frequency[1] - first.frequency[0])
-    lines = np.rint(every * first.frequency / spacing).astype(np.intp)
-    kept = (first.frequency <= _ABOVE * highest) & (lines % every == 0)
+    spacing = float(first.frequency[1] - first.frequency[0])
+    lines = np.rint(first.frequency / spacing).astype(np.intp)
+    kept = (first.frequency <= _ABOVE * highest) & (lines % padding == 0)
     between = [(one.hammer, one.sensor) for one in responses]
     places, distinct = _grouped(between, [one.name for one in responses])
     values = np.stack([one.values[kept] for one in responses], axis=1).astype(complex)
@@ -131,7 +131,7 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, eve
         places=places,
         between=distinct,
         motion=first.motion,
-        duration=1.0 / spacing,
+        duration=1.0 / (padding * spacing),
     )
 
 

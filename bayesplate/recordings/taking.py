@@ -63,9 +63,11 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
         faults = _response_faults(every, responses)
         if faults:
             raise InputError(faults)
-        one_of = common_padding(responses)
-        told = f"{responses[0].name}: of every {one_of} lines one was measured and is used, the others are interpolated"
-        return Heard(response_spectra(responses, highest, one_of), (), (told,) if one_of > 1 else ())
+        padding = common_padding(responses)
+        told = (
+            f"{responses[0].name}: of every {padding} lines one was measured and is used, the others are interpolated"
+        )
+        return Heard(response_spectra(responses, highest, padding), (), (told,) if padding > 1 else ())
     recordings = [one for one in every if isinstance(one, Recording)]
     faults = _recording_faults(recordings, highest)
     heard: list[tuple[Recording, list[Hit]]] = []

@@ -47,5 +47,5 @@ def picked_table(report: PickReport) -> Table:
 
 
 def _aside(peak: PickedRow) -> str:
-    reason = {"noise": "no stronger than noise", "broad": "broader than modes are"}.get(peak.kind, peak.kind)
+    reason = "no stronger than noise" if peak.kind == "noise" else peak.kind
     return f"{peak.hz:.1f} Hz, {reason} (no mode: {percent(peak.spurious_probability)})"

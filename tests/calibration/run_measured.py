@@ -16,6 +16,7 @@ import os
 import sys
 import tomllib
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -36,29 +37,27 @@ WITHIN, MOST_FURTHER, HIGHEST, RATHER = 3e-3, 2, 1000.0, 0.5
 TITLE = "Peaks picked from measured recordings, against those that another method read off"
 AT = {"hammer": [(0.020, 0.020)], "sensor": [(0.560, 0.197)]}
 """Where the listing says that hammer and sensor were, m."""
-
-
 HALF_WIDTHS, DEGREES = (10.0, 15.0, 20.0, 25.0), (1, 2, 3)
 """Of the windows of plain fits, Hz, and of the polynomial for everything else in them."""
 EVERY = 2
-"""Lines of the responses for each line of their records, which were padded with zeros to twice their length."""
+"""Lines of the responses for each line of their records, as the listing says how they were padded."""
 
 
 def plain_fits(frequency: np.ndarray, values: np.ndarray, hertz: float) -> list[float]:
     """Where one pole lies that is fitted beside a polynomial to windows about a frequency, Hz: one for each way."""
     found = []
-    for half in HALF_WIDTHS:
+    for half, degree in product(HALF_WIDTHS, DEGREES):
         kept = np.abs(frequency - hertz) <= half
-        f, h, x = frequency[kept], values[kept], (frequency[kept] - hertz) / half
-        for degree in DEGREES:
-
-            def left(pole: np.ndarray, f: np.ndarray = f, h: np.ndarray = h, x: np.ndarray = x, n: int = degree) -> Any:
-                basis = np.stack([1.0 / (1j * (f - pole[0]) + pole[1]), *(x**k for k in range(n + 1))], axis=1)
-                rest = h - basis @ np.linalg.lstsq(basis, h, rcond=None)[0]
-                return np.concatenate([rest.real, rest.imag])
-
-            found.append(float(least_squares(left, [hertz, 0.01 * hertz]).x[0]))
+        given = frequency[kept], values[kept], ((frequency[kept] - hertz) / half)[:, None] ** np.arange(degree + 1)
+        found.append(float(least_squares(_rest, [hertz, 0.01 * hertz], args=given).x[0]))
     return found
+
+
+def _rest(pole: np.ndarray, frequency: np.ndarray, values: np.ndarray, powers: np.ndarray) -> np.ndarray:
+    """What a pole (frequency and decay rate, Hz) and a polynomial leave of a window."""
+    basis = np.column_stack([1.0 / (1j * (frequency - pole[0]) + pole[1]), powers])
+    rest = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    return np.concatenate([rest.real, rest.imag])
 
 
 def compared(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_recordings import SENSOR, board, hits
 
-from bayesplate.recordings.padding import common_padding, padding
+from bayesplate.recordings.padding import common_padding, padding_of
 from bayesplate.recordings.picking import pick_modes
 from bayesplate.recordings.signals import FrequencyResponse
 from bayesplate.recordings.taking import take
@@ -31,9 +31,7 @@ def response(padded: int) -> FrequencyResponse:
 
 @pytest.mark.parametrize("padded", [1, 2, 3, 4, 8])
 def test_a_padded_record_is_told_from_a_long_one(padded):
-    frf = response(padded)
-
-    assert padding(frf.frequency, frf.values) == padded
+    assert padding_of(response(padded).values) == padded
 
 
 @pytest.mark.parametrize("spacing", [0.25, 0.5])
@@ -45,7 +43,7 @@ def test_a_response_without_noise_that_was_never_cut_off_is_not_taken_for_padded
         axis=1,
     )
 
-    assert padding(hertz, values) == 1
+    assert padding_of(values) == 1
 
 
 def test_what_one_response_of_several_knows_is_not_left_out():
