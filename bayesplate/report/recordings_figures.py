@@ -10,6 +10,7 @@ import numpy as np
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.modes_found import Path
 from bayesplate.recordings.responses import Averaged
+from bayesplate.report.spectrum import short_label
 from bayesplate.report.style import (
     BLUE,
     DARK,
@@ -96,7 +97,7 @@ def spectra_picture(report: PickReport, averaged: Sequence[Averaged]) -> Picture
     )
     caption = (
         "One curve for each pair of places, averaged over the hits; the upright number above each line is the picked "
-        "frequency in Hz, with its likeliest mode where a card was given. "
+        "frequency in Hz, with its likeliest mode where a card was given (? where that has no name). "
         + (
             "The coherence is the share of the response that the force explains: it falls where only noise is heard."
             if coherent
@@ -183,7 +184,7 @@ def _names(panel: Axes, peaks: Sequence[PickedRow]) -> None:
     wanted = (np.log([peak.hz for peak in peaks]) - low) / (high - low)
     for place, true, peak in zip(moved_apart(wanted, _APART), wanted, peaks, strict=True):
         panel.plot([true, place], [1.0, 1.04], transform=panel.transAxes, color=DARK, lw=0.4, clip_on=False)
-        label = f" {peak.labels[0].label}" if peak.labels and peak.labels[0].probability > 0.5 else ""
+        label = f" {short_label(peak.labels[0].label)}" if peak.labels and peak.labels[0].probability > 0.5 else ""
         words = f"{peak.hz:.1f}{label}"
         at: dict[str, Any] = {"transform": panel.transAxes, "rotation": 90, "ha": "center", "va": "bottom"}
         panel.text(place, 1.05, words, fontsize=SMALL - 1.5, **at)

@@ -60,7 +60,7 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
         panel.plot(ends, [_MODES_AT] * 2, color=BLUE if is_seen else GREY, lw=5, solid_capstyle="butt")
         face = BLUE if is_seen else "white"
         panel.plot(mode.predicted_hz.mean, _MODES_AT, "o", mfc=face, mec=BLUE if is_seen else GREY, ms=4)
-    _write(panel, [mode.predicted_hz.mean for mode in shown], [_short(mode.label) for mode in shown], -0.1, "top")
+    _write(panel, [mode.predicted_hz.mean for mode in shown], [short_label(mode.label) for mode in shown], -0.1, "top")
     _write(panel, [peak.hz for peak in peaks], [f"{peak.hz:.4g}" for peak in peaks], 1.1, "bottom")
     ticks = [tick for tick in (20, 50, 100, 200, 500, 1000, 2000, 5000) if 0.93 * lowest < tick < 1.07 * highest]
     panel.set_xticks(ticks, [str(tick) for tick in ticks])
@@ -94,5 +94,6 @@ def _write(panel: Axes, at: Sequence[float], names: Sequence[str], height: float
         panel.text(x, outer, names[i], rotation=90, ha="center", va=side, fontsize=SMALL - 1.5)
 
 
-def _short(label: str) -> str:
+def short_label(label: str) -> str:
+    """A label as figures have it, where a mode without a name is a question mark."""
     return "?" if label == UNNAMED else label
