@@ -26,7 +26,7 @@ from bayesplate.errors import CheckpointError
 
 FloatArray = NDArray[np.float64]
 
-FORMAT = 5  # to be raised whenever the same seed would give other chunks, so that two programs never share one run
+FORMAT = 6  # to be raised whenever the same seed would give other chunks, so that two programs never share one run
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Checkpoint:
         Parameters
         ----------
         **identity : int
-            The sampler settings that decide the draws: seed, n_ensembles, n_walkers, n_dim, chunk_steps.
+            The sampler settings that decide the draws: seed, n_ensembles, n_walkers, n_corrected, n_dim, chunk_steps.
 
         Raises
         ------
@@ -261,21 +261,21 @@ def _write_atomically(path: Path, content: bytes) -> None:
 def _read_chunk(path: Path, identity: Mapping[str, int]) -> tuple[Chunk | None, str]:
     """Read and verify a chunk; otherwise None and what is wrong with it."""
     n_ensembles, n_steps = identity["n_ensembles"], identity["chunk_steps"]
-    n_walkers, n_dim = identity["n_walkers"], identity["n_dim"]
-    shapes = {
-        "draws": (n_ensembles, n_steps, n_walkers, n_dim),
-        "log_prob": (n_ensembles, n_steps, n_walkers),
-    }
+    names = "draws", "log_prob", "blobs"
     try:
         content = path.read_bytes()
         if _side(path).read_bytes() != f"{hashlib.sha256(content).hexdigest()}  {path.name}\n".encode():
             return None, "does not match its hash"
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            chunk = Chunk(**{name: arrays[name] for name in (*shapes, "blobs")})
+            chunk = Chunk(**{name: arrays[name] for name in names})
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         return None, "cannot be read or has no hash beside it"
-    shapes["blobs"] = (*shapes["log_prob"], chunk.blobs.shape[-1])
-    if any(getattr(chunk, name).shape != shape for name, shape in shapes.items()):
+    last_of = {"draws": (identity["n_dim"],), "log_prob": (), "blobs": chunk.blobs.shape[-1:]}
+    shapes = {name: getattr(chunk, name).shape for name in names}
+    if not any(
+        shapes == {name: (n_ensembles, n_steps, identity[walkers], *last) for name, last in last_of.items()}
+        for walkers in ("n_walkers", "n_corrected")
+    ):
         return None, "has other shapes than this run"
     if not all(np.isfinite(one).all() for one in (chunk.draws, chunk.log_prob)):
         return None, "holds numbers that are not finite"

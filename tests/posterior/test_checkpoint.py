@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,10 @@ from bayesplate.errors import CheckpointError
 from bayesplate.posterior import checkpoint as checkpoint_module
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.sampling import SamplerSettings, sample
+from bayesplate.posterior.warm_up import FEWEST
 
 CHUNK = 10
-IDENTITY = {"seed": 4, "n_ensembles": 2, "n_walkers": 8, "n_dim": 2, "chunk_steps": CHUNK}
+IDENTITY = {"seed": 4, "n_ensembles": 2, "n_walkers": 8, "n_corrected": 8, "n_dim": 2, "chunk_steps": CHUNK}
 
 
 def settings(max_steps=50, seed=4, n_walkers=8):
@@ -80,13 +82,15 @@ def test_a_run_stopped_in_or_after_its_warm_up_continues_to_the_same_bytes(tmp_p
     """In the warm-up, at its end, and where proposals are fixed or walks are corrected."""
 
     def drawn(max_steps, checkpoint=None):
-        target = (log_posterior, np.zeros(2), np.eye(2), settings(max_steps))
+        target = (log_posterior, np.zeros(2), np.eye(2), replace(settings(max_steps), n_corrected=5))
         chains, _ = sample(*target, surrogate=stand_in, evaluate=evaluate, checkpoint=checkpoint)
         assert (chains.blobs is not None) == (stand_in is not None and max_steps > 60)
         found = b"" if chains.blobs is None else chains.blobs.tobytes()
         return chains.draws.tobytes() + chains.log_prob.tobytes() + found
 
     drawn(stopped_at, Checkpoint(tmp_path / "checkpoint", "f"))
+    walkers = [np.load(path)["log_prob"].shape[2] for path in sorted(tmp_path.glob("checkpoint/chunk-*.npz"))]
+    assert walkers == [8 if stand_in is None or i < FEWEST else 5 for i in range(stopped_at // CHUNK)]
     assert drawn(120, Checkpoint(tmp_path / "checkpoint", "f")) == drawn(120)
 
 

@@ -144,6 +144,7 @@ def test_a_singular_covariance_is_not_identifiable(covariance):
     [
         ({"n_walkers": 6}, "n_walkers: wanted an even number of at least 8, got 6"),
         ({"n_walkers": 33}, "n_walkers: wanted an even number"),
+        ({"n_corrected": 0}, "n_corrected: wanted at least 1, got 0"),
         ({"n_ensembles": 1}, "n_ensembles: wanted at least 2"),
         ({"seed": -1}, "seed: wanted a number that is not negative"),
         ({"chunk_steps": 0}, "chunk_steps"),
