@@ -102,6 +102,7 @@ def weighted_least_squares(
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
     tried: list[Estimate] = []
+    before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     for _ in range(most_steps):
         rigidities = np.exp(log_next)
         values = inputs | dict(zip(RIGIDITIES, rigidities, strict=True))
@@ -114,11 +115,13 @@ def weighted_least_squares(
             break
         if of_round := _round(tried):
             return min(of_round, key=lambda one: float(np.sum((one.residuals / scales) ** 2)))
-        step = np.linalg.lstsq(sensitivities / scales[:, None], residuals / scales, rcond=1e-8)[0]
+        wanted = np.linalg.lstsq(sensitivities / scales[:, None], residuals / scales, rcond=1e-8)[0]
+        step = wanted / (_overshoot(before, wanted) if before and _are_at_same_places(tried[-2:]) else 1.0)
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
         while not _is_material(log_next + step, inputs) and np.abs(step).max() > _CONVERGED:
             step *= 0.5
         log_next = log_next + step
+        before = wanted, step
         size = float(np.abs(step).max())
         settled, previous = has_settled(size, previous, accepted), size
     return tried[-1]
@@ -132,6 +135,22 @@ def _round(tried: Sequence[Estimate]) -> Sequence[Estimate]:
         if np.abs(log_rigidities[-1] - log_rigidities[first]).max() < _BACK * steps[first:].max():
             return tried[first + 1 :]
     return ()
+
+
+def _overshoot(before: tuple[NDArray[np.float64], NDArray[np.float64]], wanted: NDArray[np.float64]) -> float:
+    """By how much a step is too long, at least 1: what the last one, taken as it was, left of what was wanted before.
+
+    Near a veering the slopes turn within a step; where the residuals are large there, steps go to and fro and hardly
+    shrink. The secant through the last two of them tells by how much they overshoot.
+    """
+    wanted_before, taken = before
+    return max(1.0, float((wanted_before - wanted) @ taken / (taken @ taken)))
+
+
+def _are_at_same_places(two: Sequence[Estimate]) -> bool:
+    """Whether all labels are at the same places among the modes of both estimates: no names were exchanged."""
+    first, second = ([(p.parity, p.rank) for model in one.models for p in model.places] for one in two)
+    return first == second
 
 
 def _is_material(log_rigidities: NDArray[np.float64], inputs: Values) -> bool:

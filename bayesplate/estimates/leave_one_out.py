@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict, most_likely
+from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict, most_likely, sensitivities
 
 _FEWEST = 4
 
@@ -47,26 +47,34 @@ def prediction_errors(
     target : (n_modes,) array
         ln of the measured frequencies.
     starts : (n_starts, n_free) array
-        Within the bounds. Each fit begins at the one where its own sum of squares is lowest: Student's likelihood may
-        have another peak without the mode.
+        Within the bounds. Each fit begins at the one where its own sum of squares is lowest, or at the fit of all
+        modes: Student's likelihood may have another peak without the mode.
 
     Returns
     -------
     Errors
     """
 
-    squares = misfit(predict(starts))[0] ** 2
-    inputs = np.sum(starts[:, N_CONSTANTS:] ** 2, axis=1)
+    def best(starts: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(starts[np.nanargmin(squares.sum(axis=1) + np.sum(starts[:, N_CONSTANTS:] ** 2, axis=1))])
 
-    def error(left_out: Sequence[int] = ()) -> NDArray[np.float64]:
-        used = np.delete(squares, left_out, axis=1)
-        start = starts[np.nanargmin(used.sum(axis=1) + inputs)]
-        fitted = most_likely(predict, misfit, start, bounds, left_out)
-        return np.asarray(target - predict(fitted[None, :])[0])
+    def squared(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return misfit(predict(x))[0] ** 2
 
+    squares = squared(starts)
+    whole = most_likely(predict, misfit, best(starts, squares), bounds)
+    in_sample = np.asarray(target - predict(whole[None, :])[0])
     left_out = np.full(target.size, np.nan)
     modes = [(reading,) for reading in range(target.size)] if modes is None else modes
     if len(modes) >= _FEWEST:
+        starts, squares = (np.concatenate(both) for both in ((starts, whole[None]), (squares, squared(whole[None]))))
+        there = sensitivities(predict, whole)  # most of the fits begin here: its slopes are found once
+
+        def slopes(x: NDArray[np.float64]) -> NDArray[np.float64]:
+            return there if np.array_equal(x, whole) else sensitivities(predict, x)
+
         for mode in map(list, modes):
-            left_out[mode] = error(mode)[mode]
-    return Errors(error(), left_out)
+            start = best(starts, np.delete(squares, mode, axis=1))
+            fitted = most_likely(predict, misfit, start, bounds, mode, slopes)
+            left_out[mode] = (target - predict(fitted[None, :])[0])[mode]
+    return Errors(in_sample, left_out)

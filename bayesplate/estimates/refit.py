@@ -81,7 +81,12 @@ def deviance_misfit(errors: Sequence[ReadingErrors], noise: Sequence[float] | Fl
 
 
 def most_likely(
-    predict: Predict, misfit: Misfit, start: Floats, bounds: Bounds | None = None, left_out: Sequence[int] = ()
+    predict: Predict,
+    misfit: Misfit,
+    start: Floats,
+    bounds: Bounds | None = None,
+    left_out: Sequence[int] = (),
+    slopes: Callable[[Floats], Floats] | None = None,
 ) -> Floats:
     """Parameters that minimise the squares of a misfit.
 
@@ -96,6 +101,8 @@ def most_likely(
     bounds : Bounds, optional
     left_out : sequence of int, optional
         Readings that are not used.
+    slopes : callable, optional
+        What `sensitivities` finds at a point, where some of it is known already.
 
     Returns
     -------
@@ -110,7 +117,8 @@ def most_likely(
         return np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[N_CONSTANTS:]])
 
     def jacobian(x: Floats) -> Floats:
-        chained = misfit(predict(x[None, :])[0])[1][:, None] * sensitivities(predict, x)
+        found = sensitivities(predict, x) if slopes is None else slopes(x)
+        chained = misfit(predict(x[None, :])[0])[1][:, None] * found
         return np.concatenate([without(chained), np.eye(x.size)[N_CONSTANTS:]])
 
     if bounds is None or bounds.are_open:

@@ -29,6 +29,8 @@ _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
 _N_HELD_OUT = 6
 _INSIDE = 0.1
+_ROUGH_CENTS = 1.0
+"""Error of the law that finds the place where it is then made for good: small beside what any reading scatters."""
 _MOST_LEVELS = 20
 _SAME_LEVEL = 1e-3
 """Change of the logarithm of the noise below which a fit of the inputs is not made again."""
@@ -91,8 +93,10 @@ def laplace_approximation(
         residuals = log_measured(board) - np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         scales = scales / np.sqrt(student_weights(residuals / scales))
     covariance = _covariance(board, models, "linear", scales, centre, spread)
-    models = exact_models(board, models, centre, covariance, is_rough=bool(parameters.inputs))
-    if parameters.inputs:  # what is rough finds the place where the models are then made for good
+    if not parameters.inputs:
+        models = exact_models(board, models, centre, covariance)
+    else:  # what is rough finds the place where the models are then made for good
+        models = exact_models(board, models, centre, covariance, is_rough=True, accepted_cents=_ROUGH_CENTS)
         columns = parameters.fitted_columns
         centre = centre.copy()
         predict = predictor(board, models, "exact", centre)

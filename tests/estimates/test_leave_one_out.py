@@ -7,9 +7,10 @@ import pytest
 from bars import meets
 from scipy import optimize, stats
 
+from bayesplate.estimates import leave_one_out
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.leave_one_out import prediction_errors
-from bayesplate.estimates.refit import design, deviance_misfit, most_likely, normal_misfit, refit
+from bayesplate.estimates.refit import design, deviance_misfit, most_likely, normal_misfit, refit, sensitivities
 from bayesplate.plate.densities import DEGREES_OF_FREEDOM
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.inference import pose
@@ -148,8 +149,11 @@ def test_the_fit_with_deviances_is_the_most_likely_point(problem, step, robust):
     errors = ReadingErrors(hertz, np.zeros(N_MODES), np.full(N_MODES, step), robust)
     misfit = deviance_misfit([errors], [NOISE])
     found = prediction_errors(lambda x: 5.0 + x @ slopes.T, np.log(hertz), misfit, ORIGIN)
+    whole = most_likely(lambda x: 5.0 + x @ slopes.T, misfit, ORIGIN[0])
     for left_out in ([], [2], [5]):
-        fitted = most_likely(lambda x: 5.0 + x @ slopes.T, misfit, ORIGIN[0], None, left_out)
+        starts = [ORIGIN[0], whole] if left_out else [ORIGIN[0]]
+        start = min(starts, key=lambda x: np.delete(misfit(5.0 + slopes @ x)[0] ** 2, left_out).sum() + x[3] ** 2)
+        fitted = most_likely(lambda x: 5.0 + x @ slopes.T, misfit, start, None, left_out)
         arguments = (slopes, hertz, step, robust, left_out)
         best = optimize.minimize(loss, fitted + 0.01, arguments, "Nelder-Mead",
                                  options={"xatol": 1e-10, "fatol": 1e-13, "maxfev": 8000})  # fmt: skip
@@ -197,3 +201,18 @@ def test_a_fit_of_several_peaks_begins_at_the_best_start():
     assert found.left_out[:4] == pytest.approx([-0.2, -0.2, 0.2, 0.2], abs=0.005)
     alone = prediction_errors(lambda x: 5.0 + x @ slopes.T, log_f, misfit, starts[:1])
     assert np.abs(alone.left_out[:2]).max() < 0.01  # control: from the lower start alone it stays there
+
+
+def test_the_slopes_at_the_fit_of_all_modes_are_found_once(problem, monkeypatch):
+    slopes, scales, target = problem
+    asked = []
+
+    def counted(predict, at):
+        asked.append(at)
+        return sensitivities(predict, at)
+
+    monkeypatch.setattr(leave_one_out, "sensitivities", counted)
+    prediction_errors(lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN)
+    (first, *later) = asked
+    assert len(later) >= N_MODES
+    assert not any(np.array_equal(first, at) for at in later)
