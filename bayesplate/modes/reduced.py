@@ -26,8 +26,8 @@ SPARE = 2
 """Modes above the highest wanted one of a class that the basis is made for too."""
 WHOLE = 40
 """Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
-_BATCH, _SMALL_BATCH = 16, 512
-"""Draws whose large or small matrices are held at once: those of a whole posterior would not fit any cache."""
+_BATCH, _SMALL_BATCH = 24, 512
+"""Draws whose large or small matrices are held at once, at most: those of a whole posterior would not fit any cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class ReducedBlock:
         All r - n_rigid of them, or n_kept - n_rigid where the others are condensed.
         """
         is_large = self.stiffness.shape[-1] > WHOLE
-        starts = range(0, max(len(weights.stiffness), 1), _BATCH if is_large else _SMALL_BATCH)
+        starts = _starts(len(weights.stiffness)) if is_large else range(0, max(len(weights.stiffness), 1), _SMALL_BATCH)
         parts = [Weights(*(w[start : start + starts.step] for w in weights)) for start in starts]
         found = in_threads(self._eigenvalues, parts) if is_large else [self._eigenvalues(part) for part in parts]
         return np.concatenate(found)
@@ -138,6 +138,12 @@ class ReducedBlock:
         if len(self.masses):
             return _weighted(weights.mass, self.masses)
         return weights.mass[:, :1, None] * np.eye(self.stiffness.shape[-1])
+
+
+def _starts(n_draws: int) -> range:
+    """First draws of batches of equal size, an even number of them: no core waits for another."""
+    n_batches = 2 * max(-(-n_draws // (2 * _BATCH)), 1)
+    return range(0, max(n_draws, 1), max(-(-n_draws // n_batches), 1))
 
 
 def _weighted(weights: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.float64]:

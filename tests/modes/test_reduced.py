@@ -15,7 +15,8 @@ from bayesplate.frequencies.laws import ExactLaw, LinearLaw
 from bayesplate.modes import reduction
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import Weights
+from bayesplate.modes.plate import Parity, Weights
+from bayesplate.modes.reduced import WHOLE, ReducedBlock
 from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.modes.solve import solve_class
 from bayesplate.modes.thin import thin_plate
@@ -180,6 +181,19 @@ def test_many_draws_are_the_draws_one_by_one(name):
     one_by_one = [reduced.eigenvalues(together([draws.at(i)]))[0] for i in range(len(draws.stiffness))]
 
     np.testing.assert_allclose(reduced.eigenvalues(draws), one_by_one, rtol=1e-12)
+
+
+@pytest.mark.parametrize("n_draws", [0, 1, 2, 23, 48, 49, 130])
+def test_of_a_large_basis_too_however_many_they_are(n_draws):
+    """Draws of a basis above `WHOLE` vectors are taken in batches, on all cores."""
+    rng = np.random.default_rng(3)
+    forms = rng.standard_normal((2, WHOLE + 1, 2 * WHOLE))
+    stiffness = forms @ np.swapaxes(forms, 1, 2)
+    block = ReducedBlock(Parity(0, 0), stiffness, np.empty((0, WHOLE + 1, WHOLE + 1)), np.zeros((WHOLE + 1, 0)), ())
+    weights = rng.uniform(0.5, 2.0, (n_draws, 2))
+    found = block.eigenvalues(Weights(weights, np.ones((n_draws, 1))))
+    alone = [np.linalg.eigvalsh(np.tensordot(one, stiffness, axes=1)) for one in weights]
+    np.testing.assert_allclose(found, np.reshape(alone, (n_draws, WHOLE + 1)), rtol=1e-10)
 
 
 @pytest.mark.parametrize("name", WANTED)
