@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import design, refit
-from bayesplate.frequencies.laws import LawName, cents
+from bayesplate.frequencies.laws import ExactLaw, LawName, cents
 from bayesplate.frequencies.model import SetupModel, are_twins, setup_model, with_exact, with_exact_of, with_others
 from bayesplate.frequencies.peaks import takes_part
 from bayesplate.frequencies.predictor import Predictor
@@ -94,29 +94,56 @@ def laplace_approximation(
         scales = scales / np.sqrt(student_weights(residuals / scales))
     covariance = _covariance(board, models, "linear", scales, centre, spread)
     if not parameters.inputs:
-        models = exact_models(board, models, centre, covariance)
-    else:  # what is rough finds the place where the models are then made for good
-        models = exact_models(board, models, centre, covariance, is_rough=True, accepted_cents=_ROUGH_CENTS)
-        columns = parameters.fitted_columns
-        centre = centre.copy()
-        predict = predictor(board, models, "exact", centre)
-        bounds = parameters.fitted_bounds
-        target = log_measured(board)
-        for _ in range(_MOST_LEVELS):
-            start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
-            centre[columns] = refit(predict, target, scales, start, bounds)
-            if robust:
-                break
-            before, noise = noise, medians * noise_widenings(board, target - predict(centre[None, columns])[0])
-            scales = reading_sd(board.setups, noise)
-            if np.abs(np.log(noise / before)).max() < _SAME_LEVEL:
-                break
-        centre[N_RIGIDITIES : parameters.first_input] = np.log(noise)
-        values = {name: np.ravel(value)[0] for name, value in parameters.values(centre[None, :]).items()}
-        models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
-        covariance = _covariance(board, models, "linear", scales, centre, spread)
-        models = exact_models(board, models, centre, covariance)
+        return LaplaceApproximation(centre, covariance, exact_models(board, models, centre, covariance))
+    # What is rough finds the place where the models are then made for good, and where these look once more.
+    models = exact_models(board, models, centre, covariance, is_rough=True, accepted_cents=_ROUGH_CENTS)
+    centre, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
+    values = _values_at(parameters, centre)
+    models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
+    covariance = _covariance(board, models, "linear", scales, centre, spread)
+    models = exact_models(board, models, centre, covariance)
+    noise = np.exp(parameters.log_noise(centre[None])[0])
+    again, _ = _fitted(board, models, centre, noise, scales, is_once=robust)
+    values = parameters.values(np.stack([again, centre]))
+    if all(_names_stay(model, values) for model in models):
+        centre, models = again, tuple(model.tangent(parameters.values(again[None])) for model in models)
     return LaplaceApproximation(centre, covariance, models)
+
+
+def _fitted(
+    board: Board, models: Sequence[SetupModel], centre: Floats, noise: Floats, scales: Floats, *, is_once: bool
+) -> tuple[Floats, Floats]:
+    """Where rigidities and inputs fit best under the exact law, noises as the residuals tell them: theta and scales.
+
+    Once where the scales are Student's, at the noise that goes with them.
+    """
+    parameters, target = Parameters(board), log_measured(board)
+    medians = np.array([setup.noise.median for setup in board.setups])
+    columns, bounds = parameters.fitted_columns, parameters.fitted_bounds
+    predict, centre = predictor(board, models, "exact", centre), centre.copy()
+    for _ in range(_MOST_LEVELS):
+        start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
+        centre[columns] = refit(predict, target, scales, start, bounds)
+        if is_once:
+            break
+        before, noise = noise, medians * noise_widenings(board, target - predict(centre[None, columns])[0])
+        scales = reading_sd(board.setups, noise)
+        if np.abs(np.log(noise / before)).max() < _SAME_LEVEL:
+            break
+    centre[N_RIGIDITIES : parameters.first_input] = np.log(noise)
+    return centre, scales
+
+
+def _names_stay(model: SetupModel, values: Values) -> bool:
+    """Whether all labels of a setup are of the same modes at two points; a label means the mode it had at first."""
+    assert isinstance(model.exact, ExactLaw)
+    ranks = model.exact.reduced.ranks(model.system.weights(values))
+    return all(np.ptp(ranks[one.beams]) == 0 for one in model.setup.readings)
+
+
+def _values_at(parameters: Parameters, theta: Floats) -> dict[str, Any]:
+    """Constants and inputs at one point."""
+    return {name: np.ravel(value)[0] for name, value in parameters.values(theta[None, :]).items()}
 
 
 def _with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:
