@@ -266,8 +266,7 @@ def _widening(board: Board) -> float:
 
 def _identifiable_at(board: Board, approximation: LaplaceApproximation, estimate: Estimate) -> Identifiability:
     """What the readings tell where the posterior lies; modes may stand there in another order than at the estimate."""
-    values = Parameters(board).values(approximation.centre[None, :])
-    there = {name: np.ravel(value)[0] for name, value in values.items()}
+    there = Parameters(board).values_at(approximation.centre)
     return identifiability(np.concatenate([m.sensitivities(there) for m in approximation.models]), estimate.scales)
 
 

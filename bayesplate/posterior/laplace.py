@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import design, refit
-from bayesplate.frequencies.laws import ExactLaw, LawName, cents
+from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, are_twins, setup_model, with_exact, with_exact_of, with_others
 from bayesplate.frequencies.peaks import takes_part
 from bayesplate.frequencies.predictor import Predictor
@@ -31,6 +31,9 @@ _N_HELD_OUT = 6
 _INSIDE = 0.1
 _ROUGH_CENTS = 1.0
 """Error of the law that finds the place where it is then made for good: small beside what any reading scatters."""
+_MOST_PLACES = 3
+_SAME_PLACE = 0.1
+"""Of a standard error: by how much the models that are made at a place may disagree with those that found it."""
 _MOST_LEVELS = 20
 _SAME_LEVEL = 1e-3
 """Change of the logarithm of the noise below which a fit of the inputs is not made again."""
@@ -61,8 +64,8 @@ def laplace_approximation(
 
     The rigidities have the covariance of the weighted fit, widened where the residuals exceed the expected noise as
     far as its prior lets them; noise has its prior's. Where inputs are uncertain the fit may move them, which tells the
-    noise anew, and the models are made anew at the point it finds. Under Student's errors a reading far off weighs
-    little.
+    noise anew, and the models are made anew at the point it finds, until they find it themselves: a rough law, or names
+    that modes exchange at a veering, may have led astray. Under Student's errors a reading far off weighs little.
 
     Parameters
     ----------
@@ -95,18 +98,17 @@ def laplace_approximation(
     covariance = _covariance(board, models, "linear", scales, centre, spread)
     if not parameters.inputs:
         return LaplaceApproximation(centre, covariance, exact_models(board, models, centre, covariance))
-    # What is rough finds the place where the models are then made for good, and where these look once more.
     models = exact_models(board, models, centre, covariance, is_rough=True, accepted_cents=_ROUGH_CENTS)
-    centre, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
-    values = _values_at(parameters, centre)
-    models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
-    covariance = _covariance(board, models, "linear", scales, centre, spread)
-    models = exact_models(board, models, centre, covariance)
-    noise = np.exp(parameters.log_noise(centre[None])[0])
-    again, _ = _fitted(board, models, centre, noise, scales, is_once=robust)
-    values = parameters.values(np.stack([again, centre]))
-    if all(_names_stay(model, values) for model in models):
-        centre, models = again, tuple(model.tangent(parameters.values(again[None])) for model in models)
+    found, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
+    for _ in range(_MOST_PLACES):
+        centre, values = found, parameters.values_at(found)
+        models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
+        covariance = _covariance(board, models, "linear", scales, centre, spread)
+        models = exact_models(board, models, centre, covariance)
+        noise = np.exp(parameters.log_noise(centre[None])[0])
+        found, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
+        if np.all(np.abs(found - centre) <= _SAME_PLACE * np.sqrt(np.diagonal(covariance))):
+            break
     return LaplaceApproximation(centre, covariance, models)
 
 
@@ -132,18 +134,6 @@ def _fitted(
             break
     centre[N_RIGIDITIES : parameters.first_input] = np.log(noise)
     return centre, scales
-
-
-def _names_stay(model: SetupModel, values: Values) -> bool:
-    """Whether all labels of a setup are of the same modes at two points; a label means the mode it had at first."""
-    assert isinstance(model.exact, ExactLaw)
-    ranks = model.exact.reduced.ranks(model.system.weights(values))
-    return all(np.ptp(ranks[one.beams]) == 0 for one in model.setup.readings)
-
-
-def _values_at(parameters: Parameters, theta: Floats) -> dict[str, Any]:
-    """Constants and inputs at one point."""
-    return {name: np.ravel(value)[0] for name, value in parameters.values(theta[None, :]).items()}
 
 
 def _with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:

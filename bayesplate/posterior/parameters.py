@@ -101,6 +101,10 @@ class Parameters:
         values.update((name, np.exp(theta[:, i])) for i, name in enumerate(RIGIDITIES))
         return values
 
+    def values_at(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Constants and inputs at one point, each a number, from its (n_dim,) columns."""
+        return {name: np.asarray(np.ravel(value)[0]) for name, value in self.values(theta[None, :]).items()}
+
     def log_noise(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """ln of the relative noise: (n_draws, n_setups) array."""
         return theta[:, N_RIGIDITIES : self.first_input]

@@ -211,7 +211,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     predict = every_predictor(board, models, "exact", problem.centre)
     at = problem.centre[columns]
     slopes = sensitivities(predict, at)
-    values = {name: np.asarray(np.ravel(v)[0]) for name, v in parameters.values(problem.centre[None, :]).items()}
+    values = parameters.values_at(problem.centre)
     input_slopes, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], at[N_RIGIDITIES:])
     discrepancies = [np.broadcast_to(one.discrepancies(values)[0], len(one.every_place)) for one in models]
     spectrum = Spectrum(

@@ -139,8 +139,7 @@ def constants_predictor(problem: PosedProblem) -> Predictor:
 def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, dict[str, float]]:
     """ln f of all modes with one more effect at its nominal size, by full solves; and that size."""
     board = declare(replace(problem.board, effects=(*problem.board.effects, name)))
-    at_estimate = problem.parameters.values(problem.centre[None, :])
-    values = {key: np.asarray(np.ravel(value)[0]) for key, value in at_estimate.items()}
+    values = problem.parameters.values_at(problem.centre)
     size: dict[str, float] = {}
     for setup in board.setups:
         for effect in effects_of(board, setup):
