@@ -17,6 +17,12 @@ MOST_ORTHOTROPIC = 100.0
 LIGHTEST_WOOD = 90.0
 """Density in kg m^-3 below which only foams and honeycombs lie."""
 
+HEAVIEST_FIBRES = 2300.0
+"""Density in kg m^-3 above which no wood and no fibre composite lies, but metals, ceramics and stone."""
+
+LIKE_METAL = 2.0
+"""E_x over E_y, either way, that these do not reach, rolled or not."""
+
 _STIFFER_ACROSS = 1.5
 _USUAL = (0.001, 0.999)
 
@@ -68,5 +74,11 @@ def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ..
     elif rho < LIGHTEST_WOOD:
         found.append(
             f"the density comes out as {rho:.3g} kg/m3, lighter than balsa: are the mass and the three lengths right?"
+        )
+    elif rho > HEAVIEST_FIBRES and max(ratio, 1.0 / ratio) > LIKE_METAL:
+        found.append(
+            f"the density comes out as {rho:.0f} kg/m3, more than that of any wood or fibre composite, and no metal is "
+            f"{max(ratio, 1.0 / ratio):.3g} times as stiff one way as the other: are the mass and the three lengths "
+            "right?"
         )
     return tuple(found)

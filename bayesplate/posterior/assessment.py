@@ -18,8 +18,13 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.posterior.mode_errors import median_noise, mode_errors
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
+from bayesplate.posterior.target import Posterior
+from bayesplate.posterior.veerings import contradicted_labels
 
 Floats = NDArray[np.float64]
+
+_N_NAMED = 32
+"""Draws on which modes are named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +49,7 @@ class Assessment:
     means : dict of (dict of float, float)
         By law: posterior means of E_x ... D_s, and how many draws of equal weight they rest on.
     doubts : tuple of str
-        Labels that hardly fit, and signs that contradict them.
+        Labels that the fit contradicts or that hardly fit, and signs that contradict them.
     """
 
     left_out: Floats
@@ -87,8 +92,16 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
         exact_worst=worst_cents(models),
         surrogate_errors=_surrogate_errors(inference, draws),
         means={law: means_under(inference, draws, law, errors) for law in get_args(LawName)},
-        doubts=(*doubtful_labels(models), *conflicts),
+        doubts=(*contradictions(problem.posterior, draws), *doubtful_labels(models), *conflicts),
     )
+
+
+def contradictions(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
+    """A sentence per setup whose labels the draws contradict; under the linear law labels follow the shapes."""
+    if posterior.law == "linear":
+        return ()
+    some = draws.flat[:: max(1, len(draws.flat) // _N_NAMED)]
+    return contradicted_labels(posterior.models, posterior.parameters.values(some))
 
 
 def _surrogate_errors(inference: Inference, draws: Draws) -> Floats:

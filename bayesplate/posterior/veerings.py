@@ -6,6 +6,9 @@ the far side, and which side the board lies on is not known. That does no harm w
 reading is the higher mode's: the frequencies are in the right order whatever the shapes are called. Otherwise the label
 is one that may be wrong, with the share of plausible plates in which it names another mode; it takes part like any
 other doubtful one (`bayesplate.frequencies.peaks`).
+
+Where something is wrong, the posterior may move on to where the modes of those ranks plainly have each other's figures:
+then it contradicts the labels that it rests on, and that is told.
 """
 
 from __future__ import annotations
@@ -14,11 +17,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.frequencies.model import SetupModel
+from bayesplate.labels import Label
 from bayesplate.modes.plate import Beams
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.setup import Setup
+
+_CONTRADICTED = 0.95
+"""Share of the plates of a fit that name a label's mode otherwise, from which on the fit contradicts the label."""
 
 
 def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> Board:
@@ -62,15 +70,58 @@ def veering_remarks(before: Board, doubted: Board) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def contradicted_labels(models: Sequence[SetupModel], values: Values) -> tuple[str, ...]:
+    """A sentence per setup with sure labels that a fit contradicts: which figures its modes have instead.
+
+    Parameters
+    ----------
+    models : sequence of SetupModel
+        With the exact law.
+    values : dict of (n_draws,) array
+        D_x, D_y, D_s (N m), the board's inputs and the effects' parameters: draws of the posterior under that law.
+    """
+    sentences = []
+    for model in models:
+        setup, first = model.setup, model.setup.first_label
+        others = {at: Label(i + first.m, j + first.n) for at, (i, j) in _named_otherwise(model, values).items()}
+        read = [
+            f"the mode at {setup.measured[at]:.5g} Hz, read as {setup.readings[at].label}, has that of {label}"
+            for at, label in others.items()
+        ]
+        if read:
+            where = f" of setup {setup.name}" if len(models) > 1 else ""
+            sentences.append(
+                f"the constants are those of a plate with other figures than the labels{where} say: {'; '.join(read)}; "
+                "do not trust them before the labels, these and the others, have been looked at again"
+            )
+    return tuple(sentences)
+
+
+def _named_otherwise(model: SetupModel, values: Values) -> dict[int, Beams]:
+    """By reading whose label is sure: what its mode is called where nearly no draw has it under that label."""
+    every, found = _ranks(model, values), {}
+    for at, (one, place) in enumerate(zip(model.setup.readings, model.places, strict=True)):
+        is_other = every[one.beams] != place.rank
+        if one.is_sure and is_other.size and is_other.mean() >= _CONTRADICTED:
+            of_class = [beams for beams in every if model.plate.parity(beams) == place.parity]
+            found[at] = max(of_class, key=lambda beams: int(np.sum(every[beams] == place.rank)))
+    return found
+
+
+def _ranks(model: SetupModel, values: Values) -> dict[Beams, NDArray[np.intp]]:
+    """Rank in its class of the mode that each product of beam functions names, at those draws that are a plate."""
+    assert model.exact is not None
+    every = model.exact.reduced.ranks(model.system.weights(values))
+    is_plate = np.all([one >= 0 for one in every.values()], axis=0)
+    return {beams: one[is_plate] for beams, one in every.items()}
+
+
 def _confidences(model: SetupModel, values: Values) -> dict[Beams, float]:
     """How sure each label is that may be another mode's: the share of plates that agree with the estimate."""
     sure = {one.beams: one.frequency.mean for one in model.setup.readings if one.is_sure}
     if not sure:
         return {}
-    assert model.exact is not None
-    every = model.exact.reduced.ranks(model.system.weights(values))
-    is_plate = np.all([one >= 0 for one in every.values()], axis=0)
-    ranks = {beams: one[is_plate] for beams, one in every.items()}
+    ranks = _ranks(model, values)
     found = {}
     for beams, hertz in sure.items():
         others = [one for one in ranks if one != beams and _are_of_one_class(model.setup, one, beams)]

@@ -20,7 +20,7 @@ from bayesplate.estimates.plausibility import (
     prior_predictive,
     require_plausible,
 )
-from bayesplate.estimates.unusual import LIGHTEST_WOOD, MOST_ORTHOTROPIC, unusual
+from bayesplate.estimates.unusual import HEAVIEST_FIBRES, LIGHTEST_WOOD, MOST_ORTHOTROPIC, unusual
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board, density, made_board
 from bayesplate.plate.from_card import board_from_card
@@ -253,3 +253,17 @@ def test_what_is_unusual_is_told_and_what_is_usual_is_not():
     for share, is_told in ((0.98, True), (1.02, False)):
         mass = share * LIGHTEST_WOOD * plate.L_x * plate.L_y * plate.h
         assert ("lighter than balsa" in told(plate, board.with_priors({"mass": Quantity.exact(mass)}))) is is_told
+
+
+@pytest.mark.parametrize("is_turned", [False, True])
+@pytest.mark.parametrize(
+    ("share", "ratio", "is_told"), [(1.02, 2.04, True), (0.98, 2.04, False), (1.02, 1.96, False), (4.0, 5.0, True)]
+)
+def test_a_mass_that_only_metals_have_is_told_of_a_plate_that_no_metal_makes(share, ratio, is_told, is_turned):
+    plate, board = of_spruce(E_x=70e9, E_y=70e9 * (ratio if is_turned else 1.0 / ratio))
+    mass = share * HEAVIEST_FIBRES * plate.L_x * plate.L_y * plate.h
+    heavy = board.with_priors({"mass": Quantity.exact(mass)})
+    prior = load_prior("weakly-informative")
+    told = " ".join(unusual(heavy, prior, np.array([plate.D_x, plate.D_y, plate.D_s])))
+
+    assert ("any wood or fibre composite" in told) is is_told

@@ -17,8 +17,9 @@ from scipy.optimize import minimize
 
 from bayesplate.cards import load_prior
 from bayesplate.frequencies.laws import LawName
+from bayesplate.posterior.assessment import contradictions
 from bayesplate.posterior.inference import PosedProblem, pose
-from bayesplate.posterior.veerings import with_doubts
+from bayesplate.posterior.veerings import contradicted_labels, with_doubts
 
 AT_THE_VEERING, BESIDE_IT = 0.0632, 0.08
 """E_y / E_x at which (2,0) and (0,2), of one class, have half of each other's shape; and where they have little."""
@@ -154,3 +155,40 @@ def test_modes_of_different_classes_cross_and_leave_labels_sure():
     clamped = {(2, 2): [0, 1], (2, 1): [1, 0]}
     assert named_apart(clamped, {(2, 2): 100.0}) == {}
     assert named_apart(clamped, {(2, 2): 100.0}, ("clamped", "free")) == {(2, 2): 0.5}
+
+
+def draws_beyond(problem: PosedProblem, n_draws: int, n_beyond: int) -> np.ndarray:
+    """Draws of a plate, the last ones far on the other side of the veering: E_y there is half as large."""
+    theta = np.tile(problem.centre, (n_draws, 1))
+    theta[n_draws - n_beyond :, 1] -= np.log(2.0)
+    return theta
+
+
+@pytest.mark.parametrize(("n_beyond", "is_told"), [(0, False), (37, False), (38, True), (40, True)])
+def test_labels_are_contradicted_where_nearly_all_plates_have_each_others_figures(n_beyond, is_told):
+    problem = posed(BESIDE_IT, {}, "exact")
+    values = problem.parameters.values(draws_beyond(problem, 40, n_beyond))
+    told = contradicted_labels(problem.posterior.models, values)
+
+    assert len(told) == is_told
+    for sentence in told:
+        _, hertz = plate(BESIDE_IT)
+        assert f"{hertz[FIRST]:.5g} Hz, read as (2,0), has that of (0,2)" in sentence
+        assert f"{hertz[SECOND]:.5g} Hz, read as (0,2), has that of (2,0)" in sentence
+        assert sentence.count("read as") == 2
+
+
+def test_a_label_in_doubt_is_not_contradicted():
+    problem = posed(AT_THE_VEERING, {SECOND: None}, "exact")
+    values = problem.parameters.values(draws_beyond(problem, 5, 5))
+
+    assert list(in_doubt(problem)) == [FIRST]
+    assert contradicted_labels(problem.posterior.models, values) == ()
+
+
+@pytest.mark.parametrize(("law", "n_told"), [("exact", 1), ("linear", 0)])
+def test_a_fit_tells_of_them_under_the_law_whose_labels_are_ranks(law, n_told):
+    problem = posed(BESIDE_IT, {}, law)
+    draws: Any = SimpleNamespace(flat=draws_beyond(problem, 1000, 1000))
+
+    assert len(contradictions(problem.posterior, draws)) == n_told
