@@ -18,7 +18,7 @@ from bayesplate.labels import Label
 from bayesplate.modes.line import N_BEAMS
 from bayesplate.plate.board import Board, density
 from bayesplate.plate.material import RIGIDITIES
-from bayesplate.plate.setup import Reading
+from bayesplate.plate.measured import NO_OFFSET, Reading
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +44,8 @@ class Suspect:
         Two inputs, or two rigidities, that stand for each other.
     is_transposed : bool
         Whether all labels (m,n) are written as (n,m).
+    first_label : (int, int)
+        Where the labels begin, of a card that does not say so.
     """
 
     question: str
@@ -51,6 +53,7 @@ class Suspect:
     wrong: tuple[tuple[str, float], ...] = ()
     exchanged: tuple[str, ...] = ()
     is_transposed: bool = False
+    first_label: Label = NO_OFFSET
 
     @property
     def is_of_a_unit(self) -> bool:
@@ -74,6 +77,8 @@ class Suspect:
     def beams(self, reading: Reading, first: Label) -> tuple[int, int]:
         """Orders of the beam functions that a label would name; negative where there is no such mode."""
         label = reading.label
+        if self.first_label != NO_OFFSET:
+            return (label.m - self.first_label.m, label.n - self.first_label.n) if first == NO_OFFSET else (-1, -1)
         return (label.n - first.m, label.m - first.n) if self.is_transposed else reading.beams
 
 
@@ -91,6 +96,9 @@ SUSPECTS = (
     Suspect("are length_x_mm and length_y_mm exchanged: is x along the grain?", exchanged=_SIDES),
     Suspect("is y along the grain? x should be", exchanged=("D_x", "D_y")),
     Suspect("are all labels (m,n) written as (n,m)?", is_transposed=True),
+    Suspect("does m count from 1 in all labels? then first_label = [1, 0]", first_label=Label(1, 0)),
+    Suspect("does n count from 1 in all labels? then first_label = [0, 1]", first_label=Label(0, 1)),
+    Suspect("do m and n count from 1 in all labels? then first_label = [1, 1]", first_label=Label(1, 1)),
 )
 """What makes all frequencies wrong by one mistake, and lengths and constants that one mistake exchanges."""
 

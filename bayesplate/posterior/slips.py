@@ -36,6 +36,8 @@ _LEAST_LOG_SD = 0.7
 OCTAVES, DECIMALS = (2.0, 0.5), (10.0, 0.1)
 _ANYWHERE = np.log(16.0)
 """Width in ln f over which a reading of something else may lie: two octaves either way."""
+_OPEN = 1e-6
+"""Sensitivity of ln f to the logarithm of a constant, in its best combination of readings, below which it is open."""
 _NOISE_SDS = np.linspace(-3.0, 14.0, 69)
 
 
@@ -183,7 +185,13 @@ class SlipSearch:
         return _Fit(target - self._predict(x[None, :])[0], sensitivities(self._predict, x), x[N_CONSTANTS:])
 
     def _log_evidence(self, fit: _Fit, left_out: tuple[int, ...], shifts: Floats | float = 0.0) -> Floats:
-        """ln of the probability of the readings over all noise levels; one per row of shifts of the residuals."""
+        """ln of the probability of the readings over all noise levels; one per row of shifts of the residuals.
+
+        Minus infinity where they leave a constant open: then a slip cannot be weighed.
+        """
+        kept = np.setdiff1d(np.arange(self.target.size), left_out)
+        if np.linalg.matrix_rank(fit.slopes[kept, :N_CONSTANTS], tol=_OPEN) < N_CONSTANTS:
+            return np.full(np.shape(shifts)[:-1], -np.inf)
         return np.asarray(logsumexp(self._by_noise(fit, left_out, shifts), axis=0) - len(left_out) * np.log(_ANYWHERE))
 
     def _by_noise(self, fit: _Fit, left_out: tuple[int, ...], shifts: Floats | float = 0.0) -> Floats:

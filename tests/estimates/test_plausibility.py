@@ -198,6 +198,31 @@ def test_exchanged_lengths_labels_or_grain_are_asked_about(case):
         require_plausible(change(board), load_prior("spruce"), np.random.default_rng(0))
 
 
+def one_more(board: Board, more: tuple[int, int], stated: tuple[int, int] = (0, 0)) -> Board:
+    """The same where the labels name modes so many higher, whatever the card states for the first."""
+    setups = []
+    for setup in board.setups:
+        beams = [(one.beams[0] + more[0], one.beams[1] + more[1]) for one in setup.readings]
+        both = zip(setup.readings, beams, strict=True)
+        readings = (replace(r, label=Label(i + stated[0], j + stated[1]), beams=(i, j)) for r, (i, j) in both)
+        setups.append(replace(setup, readings=tuple(readings), first_label=Label(*stated)))
+    return replace(board, setups=tuple(setups))
+
+
+COUNTED = [("finnish-spruce-cantilever", (1, 0), p) for p in PRIORS] + [
+    (None, more, "spruce") for more in ((1, 0), (0, 1), (1, 1))
+]
+
+
+@pytest.mark.parametrize(("name", "more", "prior"), COUNTED)
+def test_labels_that_count_from_one_are_asked_about_where_the_card_does_not_say_so(name, more, prior):
+    board = of_spruce()[1] if name is None else board_of(name, prior)
+
+    assert asked(board, prior) == ""
+    assert f"then first_label = [{more[0]}, {more[1]}]" in asked(one_more(board, more), prior)
+    assert "first_label" not in asked(one_more(board, more, stated=(1, 1)), prior)
+
+
 @pytest.mark.parametrize("case", ["lengths", "grain"])
 def test_a_plate_of_no_material_is_refused_under_any_prior_and_no_unit_is_blamed(case):
     """nu_xy nu_yx above 1: such a plate has no frequencies, so there is nothing to be fitted."""

@@ -212,3 +212,18 @@ def test_a_slip_mends_what_was_read():
     np.testing.assert_allclose(np.exp(Slip((0, 2)).mended(target)), [40.0, 20.0, 10.0])
     np.testing.assert_allclose(np.exp(Slip((1,), 2.0).mended(target)), [10.0, 10.0, 40.0])
     assert (Slip((1,)).left_out, Slip((1,), 2.0).left_out, Slip((0, 1)).left_out) == ((1,), (), ())
+
+
+def test_a_slip_that_leaves_a_constant_open_is_not_weighed(monkeypatch):
+    """A refit may run to where no reading knows a constant any more; then the readings have no probability."""
+    search = SlipSearch(as_read().posterior, as_read().centre)
+    assert search.disordered() is None
+    slip = Slip((0,), 2.0)
+    assert np.isfinite(search._refitted_best([slip]).log_odds)
+    fit = search.refitted(slip)
+    slopes = fit.slopes.copy()
+    slopes[:, 2] = 0.0
+    monkeypatch.setattr(SlipSearch, "refitted", lambda *_: replace(fit, slopes=slopes))
+
+    assert search._refitted_best([slip]).log_odds == -np.inf
+    assert search.likeliest() is None
