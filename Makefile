@@ -15,9 +15,8 @@ export MKL_NUM_THREADS := 1
 fit: $(VENV)/installed
 	$(BIN)/bayesplate fit finnish-spruce-cantilever --force
 
-# Compiled modules are kept in the environment, whatever the shell says: many tests start the package anew.
+# Compiled modules are kept, whatever the shell says: many tests start the package anew.
 test slow: export PYTHONDONTWRITEBYTECODE :=
-test slow: export PYTHONPYCACHEPREFIX := $(abspath $(VENV))/pycache
 
 test: $(VENV)/tested-with
 	$(BIN)/ruff check .
