@@ -105,8 +105,8 @@ class ReducedBlock:
             values, vectors = pencil_modes(*pencil, self.shift, n_wanted)
         return values[:, self.n_rigid :], vectors[:, :, self.n_rigid :]
 
-    def ranks(self, weights: Weights, n_modes: int) -> NDArray[np.intp]:
-        """Which of the lowest elastic modes each of `products` names, at many draws.
+    def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
+        """Which of the lowest elastic modes each of `products` names, with at least that correlation, at many draws.
 
         Returns
         -------
@@ -117,8 +117,9 @@ class ReducedBlock:
         values, vectors = self.modes(weights, n_modes)
         for draw in np.flatnonzero(np.isfinite(values).all(axis=1)):
             found[draw] = n_modes
-            named = [product for product, _ in name_parts(vectors[draw].T @ self.parts)]
-            found[draw, named] = np.arange(vectors.shape[2])
+            for mode, (product, correlation) in enumerate(name_parts(vectors[draw].T @ self.parts)):
+                if correlation >= least:
+                    found[draw, product] = mode
         return found
 
     def energies(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -177,8 +178,14 @@ class ReducedOrderModel:
             values[:, columns] = block.eigenvalues(weights)[:, [self.places[i].rank for i in columns]]
         return values
 
-    def ranks(self, weights: Weights) -> dict[Beams, NDArray[np.intp]]:
+    def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
         """Rank in its class of the mode that each product of beam functions names, at many draws.
+
+        Parameters
+        ----------
+        weights : Weights
+        least : float
+            Correlation of its shape with the product from which on a mode has that name.
 
         Returns
         -------
@@ -189,7 +196,7 @@ class ReducedOrderModel:
         found: dict[Beams, NDArray[np.intp]] = {}
         for block in self.blocks:
             highest = max(place.rank for place in self.places if place.parity == block.parity)
-            found |= dict(zip(block.products, block.ranks(weights, highest + 1 + SPARE).T, strict=True))
+            found |= dict(zip(block.products, block.ranks(weights, highest + 1 + SPARE, least).T, strict=True))
         return found
 
     def energies(self, weights: Weights) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

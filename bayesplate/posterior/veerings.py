@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
+from bayesplate.modes.naming import CERTAIN
 from bayesplate.modes.plate import Beams
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.setup import Setup
 
 _CONTRADICTED = 0.95
-"""Share of the plates of a fit that name a label's mode otherwise, from which on the fit contradicts the label."""
+"""Share of a fit's plates on which a label's mode certainly has another name, from which on it contradicts that."""
 
 
 def with_doubts(board: Board, models: Sequence[SetupModel], values: Values) -> Board:
@@ -98,20 +99,20 @@ def contradicted_labels(models: Sequence[SetupModel], values: Values) -> tuple[s
 
 
 def _named_otherwise(model: SetupModel, values: Values) -> dict[int, Beams]:
-    """By reading whose label is sure: what its mode is called where nearly no draw has it under that label."""
-    every, found = _ranks(model, values), {}
+    """By reading whose label is sure: what its mode is certainly called instead on nearly all draws."""
+    every, found = _ranks(model, values, CERTAIN), {}
     for at, (one, place) in enumerate(zip(model.setup.readings, model.places, strict=True)):
-        is_other = every[one.beams] != place.rank
-        if one.is_sure and is_other.size and is_other.mean() >= _CONTRADICTED:
-            of_class = [beams for beams in every if model.plate.parity(beams) == place.parity]
-            found[at] = max(of_class, key=lambda beams: int(np.sum(every[beams] == place.rank)))
+        for beams, ranks in every.items():
+            is_other = beams != one.beams and model.plate.parity(beams) == place.parity and ranks.size > 0
+            if one.is_sure and is_other and np.mean(ranks == place.rank) >= _CONTRADICTED:
+                found[at] = beams
     return found
 
 
-def _ranks(model: SetupModel, values: Values) -> dict[Beams, NDArray[np.intp]]:
+def _ranks(model: SetupModel, values: Values, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
     """Rank in its class of the mode that each product of beam functions names, at those draws that are a plate."""
     assert model.exact is not None
-    every = model.exact.reduced.ranks(model.system.weights(values))
+    every = model.exact.reduced.ranks(model.system.weights(values), least)
     is_plate = np.all([one >= 0 for one in every.values()], axis=0)
     return {beams: one[is_plate] for beams, one in every.items()}
 

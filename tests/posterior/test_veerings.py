@@ -118,7 +118,7 @@ def named_apart(ranks: dict[tuple[int, int], list[int]], hertz: dict[tuple[int, 
     every = {beams: np.array(one) for beams, one in ranks.items()}
     model: Any = SimpleNamespace(
         setup=board.setups[0],
-        exact=SimpleNamespace(reduced=SimpleNamespace(ranks=lambda _: every)),
+        exact=SimpleNamespace(reduced=SimpleNamespace(ranks=lambda *_: every)),
         system=SimpleNamespace(weights=lambda _: None),
     )
     found = with_doubts(board, [model], {})
@@ -176,6 +176,19 @@ def test_labels_are_contradicted_where_nearly_all_plates_have_each_others_figure
         assert f"{hertz[FIRST]:.5g} Hz, read as (2,0), has that of (0,2)" in sentence
         assert f"{hertz[SECOND]:.5g} Hz, read as (0,2), has that of (2,0)" in sentence
         assert sentence.count("read as") == 2
+
+
+def test_figures_that_are_half_of_each_others_contradict_no_label():
+    """Just beyond the veering, where which is which cannot be told."""
+    problem = posed(BESIDE_IT, {}, "exact")
+    theta = np.tile(problem.centre, (5, 1))
+    theta[:, 1] += np.log((AT_THE_VEERING - 0.001) / BESIDE_IT)
+    values = problem.parameters.values(theta)
+    model = problem.posterior.models[0]
+    ranks = model.exact.reduced.ranks(model.system.weights(values))
+
+    assert np.all(ranks[FIRST] > ranks[SECOND])
+    assert contradicted_labels(problem.posterior.models, values) == ()
 
 
 def test_a_label_in_doubt_is_not_contradicted():
