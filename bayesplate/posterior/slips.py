@@ -163,7 +163,7 @@ class SlipSearch:
         return [Slip(pair) for first, last in pairwise(ends.tolist()) for pair in combinations(range(first, last), 2)]
 
     def _refitted_best(self, slips: Sequence[Slip]) -> Slip | None:
-        """The likeliest of some slips to first order, with its odds after a refit."""
+        """The likeliest of some slips to first order, with its odds after a refit; None if it cannot be weighed."""
         if not slips:
             return None
         keeping = [slip for slip in slips if not slip.left_out]
@@ -172,7 +172,7 @@ class SlipSearch:
         log_evidence |= {s: float(self._log_evidence(self.as_read, s.left_out)) for s in slips if s.left_out}
         best = max(log_evidence, key=lambda slip: log_evidence[slip])
         odds = self._log_evidence(self.refitted(best), best.left_out) - self._log_evidence(self.as_read, ())
-        return replace(best, log_odds=float(odds))
+        return replace(best, log_odds=float(odds)) if np.isfinite(odds) else None
 
     def refitted(self, slip: Slip) -> _Fit:
         """Residuals of the most likely constants where a slip is mended."""

@@ -225,5 +225,5 @@ def test_a_slip_that_leaves_a_constant_open_is_not_weighed(monkeypatch):
     slopes[:, 2] = 0.0
     monkeypatch.setattr(SlipSearch, "refitted", lambda *_: replace(fit, slopes=slopes))
 
-    assert search._refitted_best([slip]).log_odds == -np.inf
+    assert search._refitted_best([slip]) is None
     assert search.likeliest() is None
