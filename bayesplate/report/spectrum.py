@@ -43,7 +43,7 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
     figure, (panel,) = stacked([2.6], left=0.2, right=0.2, bottom=0.4, top=0.1)
     highest = max(peak.hz for peak in peaks)
     shown = [mode for mode in spectrum.modes if mode.predicted_hz.mean < 1.05 * highest]
-    lowest = min(min(peak.hz for peak in peaks), shown[0].predicted_hz.mean)
+    lowest = min([*(peak.hz for peak in peaks), *(mode.predicted_hz.mean for mode in shown)])
     panel.set(xscale="log", xlim=(0.93 * lowest, 1.07 * highest), ylim=(-0.62, 1.42), yticks=[])
     panel.spines["left"].set_visible(False)
     hertz = {mode.label: mode.predicted_hz.mean for mode in shown}
@@ -69,7 +69,10 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
     alone = [peak for peak in peaks if peak.spurious_probability > _LEAST_SEEN]
     missed = [mode.label for mode in shown if mode.seen_probability <= _LEAST_SEEN]
     told = f"{len(peaks)} peaks, {len(peaks) - len(alone)} of them likely a mode of the plate. "
-    told += f"Modes without a likely peak: {', '.join(missed)}." if missed else "Every mode has a likely peak."
+    if not shown:
+        told += "The plate has no mode so low that it is open which peak is its."
+    else:
+        told += f"Modes without a likely peak: {', '.join(missed)}." if missed else "Every mode has a likely peak."
     caption = (
         "Above, triangles: the peaks that were read, orange where a peak is likely no mode of the plate. Below, with "
         "their 90 % intervals: the modes that the fitted plate has, hollow where no peak is likely theirs. A line "

@@ -84,6 +84,17 @@ def test_names_that_crowd_at_the_upper_end_stay_within_the_figure():
         assert not any(box.overlaps(other) for other in boxes[:i])
 
 
+def test_peaks_below_all_modes_that_they_may_be_are_drawn_alone():
+    """As where every mode so low has a label that is sure, and peaks of something else were read."""
+    peaks = tuple(replace(one, assignments=(), spurious_probability=1.0) for one in PEAKS)
+    made = replace(SUMMARY, peaks=peaks, spectra=(Spectrum("bench", 0.2, 0.02, MODES[-1:]),))
+    (picture,) = spectrum_pictures(made)
+    (panel,) = picture.figure.axes
+
+    assert [text.get_text() for text in panel.texts] == ["100", "180", "260"]
+    assert picture.alt.endswith("The plate has no mode so low that it is open which peak is its.")
+
+
 def test_one_picture_per_setup_with_peaks():
     assert [one.name for one in spectrum_pictures(SUMMARY)] == ["spectrum"]
     assert spectrum_pictures(replace(SUMMARY, peaks=(), spectra=())) == []
