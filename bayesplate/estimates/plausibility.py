@@ -45,7 +45,7 @@ class Suspect:
     is_transposed : bool
         Whether all labels (m,n) are written as (n,m).
     first_label : (int, int)
-        Where the labels begin, of a card that does not say so.
+        Where the labels begin, if not where the card says.
     """
 
     question: str
@@ -78,7 +78,7 @@ class Suspect:
         """Orders of the beam functions that a label would name; negative where there is no such mode."""
         label = reading.label
         if self.first_label != NO_OFFSET:
-            return (label.m - self.first_label.m, label.n - self.first_label.n) if first == NO_OFFSET else (-1, -1)
+            return label.m - self.first_label.m, label.n - self.first_label.n
         return (label.n - first.m, label.m - first.n) if self.is_transposed else reading.beams
 
 

@@ -75,10 +75,9 @@ def unusual(board: Board, prior: PriorCard, rigidities: Floats) -> tuple[str, ..
         found.append(
             f"the density comes out as {rho:.3g} kg/m3, lighter than balsa: are the mass and the three lengths right?"
         )
-    elif rho > HEAVIEST_FIBRES and max(ratio, 1.0 / ratio) > LIKE_METAL:
+    elif rho > HEAVIEST_FIBRES and (either_way := max(ratio, 1.0 / ratio)) > LIKE_METAL:
         found.append(
             f"the density comes out as {rho:.0f} kg/m3, more than that of any wood or fibre composite, and no metal is "
-            f"{max(ratio, 1.0 / ratio):.3g} times as stiff one way as the other: are the mass and the three lengths "
-            "right?"
+            f"{either_way:.3g} times as stiff one way as the other: are the mass and the three lengths right?"
         )
     return tuple(found)

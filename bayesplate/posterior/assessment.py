@@ -92,11 +92,11 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
         exact_worst=worst_cents(models),
         surrogate_errors=_surrogate_errors(inference, draws),
         means={law: means_under(inference, draws, law, errors) for law in get_args(LawName)},
-        doubts=(*contradictions(problem.posterior, draws), *doubtful_labels(models), *conflicts),
+        doubts=(*labels_contradicted(problem.posterior, draws), *doubtful_labels(models), *conflicts),
     )
 
 
-def contradictions(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
+def labels_contradicted(posterior: Posterior, draws: Draws) -> tuple[str, ...]:
     """A sentence per setup whose labels the draws contradict; under the linear law labels follow the shapes."""
     if posterior.law == "linear":
         return ()

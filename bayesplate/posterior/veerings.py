@@ -100,12 +100,15 @@ def contradicted_labels(models: Sequence[SetupModel], values: Values) -> tuple[s
 
 def _named_otherwise(model: SetupModel, values: Values) -> dict[int, Beams]:
     """By reading whose label is sure: what its mode is certainly called instead on nearly all draws."""
-    every, found = _ranks(model, values, CERTAIN), {}
+    found: dict[int, Beams] = {}
+    every = _ranks(model, values, CERTAIN)
+    if not next(iter(every.values())).size:  # no draw is a plate
+        return found
     for at, (one, place) in enumerate(zip(model.setup.readings, model.places, strict=True)):
-        for beams, ranks in every.items():
-            is_other = beams != one.beams and model.plate.parity(beams) == place.parity and ranks.size > 0
-            if one.is_sure and is_other and np.mean(ranks == place.rank) >= _CONTRADICTED:
-                found[at] = beams
+        of_class = [beams for beams in every if beams != one.beams and model.plate.parity(beams) == place.parity]
+        certain = [beams for beams in of_class if np.mean(every[beams] == place.rank) >= _CONTRADICTED]
+        if one.is_sure and certain:  # one at most: a mode has one name
+            found[at] = certain[0]
     return found
 
 

@@ -70,7 +70,7 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
     missed = [mode.label for mode in shown if mode.seen_probability <= _LEAST_SEEN]
     told = f"{len(peaks)} peaks, {len(peaks) - len(alone)} of them likely a mode of the plate. "
     if not shown:
-        told += "The plate has no mode so low that it is open which peak is its."
+        told += "Every mode of the plate up to there has a label that is sure."
     else:
         told += f"Modes without a likely peak: {', '.join(missed)}." if missed else "Every mode has a likely peak."
     caption = (

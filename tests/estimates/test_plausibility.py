@@ -215,12 +215,14 @@ COUNTED = [("finnish-spruce-cantilever", (1, 0), p) for p in PRIORS] + [
 
 
 @pytest.mark.parametrize(("name", "more", "prior"), COUNTED)
-def test_labels_that_count_from_one_are_asked_about_where_the_card_does_not_say_so(name, more, prior):
+def test_labels_that_count_from_one_are_asked_about_where_the_card_says_otherwise(name, more, prior):
     board = of_spruce()[1] if name is None else board_of(name, prior)
 
     assert asked(board, prior) == ""
     assert f"then first_label = [{more[0]}, {more[1]}]" in asked(one_more(board, more), prior)
-    assert "first_label" not in asked(one_more(board, more, stated=(1, 1)), prior)
+    if more != (1, 1):  # the card says so of the other number alone
+        stated = (1 - more[0], 1 - more[1])
+        assert "then first_label = [1, 1]" in asked(one_more(board, more, stated), prior)
 
 
 @pytest.mark.parametrize("case", ["lengths", "grain"])

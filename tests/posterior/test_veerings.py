@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from bayesplate.cards import load_prior
 from bayesplate.frequencies.laws import LawName
-from bayesplate.posterior.assessment import contradictions
+from bayesplate.posterior.assessment import labels_contradicted
 from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.veerings import contradicted_labels, with_doubts
 
@@ -204,4 +204,4 @@ def test_a_fit_tells_of_them_under_the_law_whose_labels_are_ranks(law, n_told):
     problem = posed(BESIDE_IT, {}, law)
     draws: Any = SimpleNamespace(flat=draws_beyond(problem, 1000, 1000))
 
-    assert len(contradictions(problem.posterior, draws)) == n_told
+    assert len(labels_contradicted(problem.posterior, draws)) == n_told

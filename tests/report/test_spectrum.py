@@ -92,7 +92,7 @@ def test_peaks_below_all_modes_that_they_may_be_are_drawn_alone():
     (panel,) = picture.figure.axes
 
     assert [text.get_text() for text in panel.texts] == ["100", "180", "260"]
-    assert picture.alt.endswith("The plate has no mode so low that it is open which peak is its.")
+    assert picture.alt.endswith("Every mode of the plate up to there has a label that is sure.")
 
 
 def test_one_picture_per_setup_with_peaks():
