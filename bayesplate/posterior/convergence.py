@@ -284,19 +284,18 @@ def _faults_of_parameters(
     if not found.n_taus >= gate.tau_count_min:
         reasons.append(
             f"The ensembles hold {found.n_taus:.1f} autocorrelation times of "
-            f"{names[int(np.argmax(found.tau))]}, {gate.tau_count_min:.0f} are wanted: allow "
-            f"{found.suggested_steps} steps after burn-in."
+            f"{names[int(np.argmax(found.tau))]}, {gate.tau_count_min:.0f} are wanted: "
+            f"{found.suggested_steps} steps after burn-in would do."
         )
     if not found.rhat_max <= gate.rhat_max:
         reasons.append(
             f"The ensembles disagree about {names[int(np.argmax(found.rhat))]} (R-hat {found.rhat_max:.3f}, at most "
-            f"{gate.rhat_max:g} is wanted): allow more steps; if it stays, the posterior has several peaks, and the "
-            "labels, the starting estimate or the prior need a look."
+            f"{gate.rhat_max:g} is wanted): the posterior may have several peaks; look at labels, sizes and prior."
         )
     if not found.ess_min >= gate.ess_min:
         reasons.append(
             f"The effective sample size of {names[int(np.argmin(found.ess))]} is {found.ess_min:.0f}, "
-            f"{gate.ess_min:.0f} is wanted: allow more steps."
+            f"{gate.ess_min:.0f} is wanted: more steps would do."
         )
     return reasons
 
@@ -313,7 +312,7 @@ def _faults_of_walkers(by_walker: FloatArray, gate: Gate) -> list[str]:
     n_stuck = int(np.sum(by_walker < gate.walker_acceptance_min))
     if n_stuck:
         reasons.append(
-            f"{n_stuck} of {by_walker.size} walkers hardly ever move: they sit far from the others; allow more steps "
-            "or change the seed, and check the data if it stays."
+            f"{n_stuck} of {by_walker.size} walkers hardly ever move: they sit far from the others; change the seed, "
+            "and check the data if it stays."
         )
     return reasons

@@ -47,7 +47,7 @@ class SamplerSettings:
     chunk_steps : int
         Steps between two checkpoints.
     max_steps : int
-        Where to stop without convergence; rounded up to whole chunks.
+        Where to stop without convergence; rounded up to whole chunks. Sooner where twice as many would not suffice.
     gate : Gate
         When to stop with it.
     """
@@ -162,7 +162,7 @@ def sample(
     checkpoint: Checkpoint | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> tuple[Chains, Convergence]:
-    """Sample until the gate passes or `settings.max_steps` are made.
+    """Sample until the gate passes, `settings.max_steps` are made, or more than twice as many would be needed.
 
     The draws depend on the seed alone: a run that was killed and continued from its checkpoint gives the same bytes.
 
@@ -192,7 +192,7 @@ def sample(
     -------
     chains : Chains
     convergence : Convergence
-        `passed` is False if the steps did not suffice: then nothing may be printed from the chains.
+        `passed` is False if the steps did not suffice, or never would: then nothing may be printed from the chains.
 
     Raises
     ------
@@ -256,6 +256,7 @@ def sample(
                 burn_in = _burn_in(n_steps, n_warm, is_corrected=cheap is not None)
                 kept = _after(burn_in, [chunk.draws for chunk in chunks])
                 n_taus = length.in_taus(kept, settings.gate.tau_count_min)
+                at_end |= is_hopeless(n_taus, n_steps - burn_in, settings)
                 if at_end or n_taus >= settings.gate.tau_count_min:  # the rule that takes longest: the others can wait
                     chains = _joined(chunks, burn_in)
                     convergence = assess(chains.kept, settings.gate, names=names)
@@ -282,6 +283,22 @@ def sample(
             if checkpoint is not None:
                 checkpoint.append(chunk)
             chunks.append(chunk)
+
+
+def is_hopeless(n_taus: float, n_kept: int, settings: SamplerSettings) -> bool:
+    """Whether not even twice the steps allowed would hold the autocorrelation times that are wanted.
+
+    Draws of fewer steps than an autocorrelation time show less of it, never more, so that it is not said too early.
+
+    Parameters
+    ----------
+    n_taus : float
+        Length of the draws that are kept, in autocorrelation times of a slow parameter.
+    n_kept : int
+        The same in steps.
+    settings : SamplerSettings
+    """
+    return settings.gate.tau_count_min * n_kept > 2 * settings.max_steps * n_taus
 
 
 def _gate_is_due(n_steps: int, warm_up: int, chunk_steps: int) -> bool:

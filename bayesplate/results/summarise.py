@@ -65,7 +65,7 @@ def unconverged_summary(
         model=model_header(problem),
         converged=False,
         sampler=sampler_health(chains, convergence),
-        warnings=(*convergence.reasons, f"suggested steps: {convergence.suggested_steps}"),
+        warnings=(*convergence.reasons, f"suggested steps: {convergence.suggested_steps}", *problem.doubts),
         request=request,
     )
 

@@ -25,7 +25,6 @@ from bayesplate.campaigns.summary import (
 )
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.posterior.assessment import assess
-from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import (
@@ -38,7 +37,7 @@ from bayesplate.results.summarise import sampler_health, summarise
 from bayesplate.results.versions import versions
 from bayesplate.workflow.campaign import Campaign
 from bayesplate.workflow.campaign_result import CampaignFitResult, write_campaign_pages
-from bayesplate.workflow.fitting import Fitted, fitted
+from bayesplate.workflow.fitting import Fitted, fitted, not_converged
 from bayesplate.workflow.stages import Stages
 
 _FIT, _SHARED = 3.0, 1.0
@@ -156,7 +155,7 @@ def _together(
     members = [Member(one.inference, one.draws, campaign.shared) for one in alone.values()]
     learnt = learn(members, SamplerSettings(seed=seed), stages.sampled)
     if not learnt.convergence.passed:
-        _refuse("what the boards share", learnt.convergence)
+        raise not_converged(learnt.convergence, of="what the boards share")
     boards, effective = {}, {}
     for i, member in enumerate(learnt.members):
         rng = np.random.default_rng([seed, _BOARD_LINE, i])
@@ -182,7 +181,7 @@ def _population(
     constants = [BoardConstants.of(one.inference, one.draws, z[name]) for name, one in boards.items()]
     population = find_population(constants, campaign.population, SamplerSettings(seed=seed), common)
     if not population.convergence.passed:
-        _refuse("the population of the boards' constants", population.convergence)
+        raise not_converged(population.convergence, of="the population of the boards' constants")
     return population
 
 
@@ -215,11 +214,6 @@ def _summary(
 
 def _refusing(name: str) -> Callable[[Inference], None]:
     def refuse(inference: Inference) -> None:
-        _refuse(f"board {name}", inference.convergence)
+        raise not_converged(inference.convergence, inference.problem.doubts, of=f"board {name}")
 
     return refuse
-
-
-def _refuse(what: str, convergence: Convergence) -> None:
-    reasons = "\n".join(convergence.reasons)
-    raise NotConvergedError(f"the sampler did not converge for {what}, so no constants are given:\n{reasons}")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, get_args
 
 from bayesplate.effects import EFFECTS
-from bayesplate.errors import NotConvergedError
 from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
@@ -28,6 +27,7 @@ from bayesplate.results.store import posterior_archive
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.check import expected_sd
+from bayesplate.workflow.fitting import not_converged
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_compare
@@ -186,6 +186,5 @@ def _posteriors(
 def _sampled(problem: PosedProblem, settings: SamplerSettings, progress: Tell) -> tuple[Inference, Draws]:
     inference = infer(problem, settings, progress=progress)
     if not inference.convergence.passed:
-        reasons = "\n".join(inference.convergence.reasons)
-        raise NotConvergedError(f"the sampler did not converge, so nothing is compared:\n{reasons}")
+        raise not_converged(inference.convergence, problem.doubts, so="nothing is compared")
     return with_likely_labels(inference, settings.seed)

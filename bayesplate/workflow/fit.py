@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.errors import NotConvergedError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
@@ -24,7 +23,7 @@ from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
-from bayesplate.workflow.fitting import Fitted, fitted, opened, request_of
+from bayesplate.workflow.fitting import Fitted, fitted, not_converged, opened, request_of
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.shown import show_fit
@@ -191,6 +190,4 @@ def refuse_unconverged(inference: Inference, seed: int, problem: Problem, folder
             inference.problem, inference.chains, convergence, seed, versions(), sha256, request
         )
         write_text(folder / SUMMARY, json_text(summary))
-    raise NotConvergedError(
-        "the sampler did not converge, so no constants are given:\n" + "\n".join(convergence.reasons)
-    )
+    raise not_converged(convergence, inference.problem.doubts)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bayesplate.errors import CheckpointError
+from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.certificate import certify
 from bayesplate.posterior.checkpoint import Checkpoint
+from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
@@ -168,6 +169,25 @@ def fitted(
     sha256 = problem.prepared.card.sha256
     summary = summarise(inference, draws, assessment, seed, versions(), sha256, certificate, request_of(problem))
     return Fitted(problem, inference, draws, summary)
+
+
+def not_converged(
+    convergence: Convergence, doubts: Sequence[str] = (), *, of: str = "", so: str = "no constants are given"
+) -> NotConvergedError:
+    """The error of draws that failed the gate.
+
+    Parameters
+    ----------
+    convergence : Convergence
+    doubts : sequence of str
+        What is unusual about the board that they are of: the likeliest cause.
+    of : str
+        What was sampled, where a run samples more than one board.
+    so : str
+        What follows.
+    """
+    what = f"the sampler did not converge{f' for {of}' if of else ''}, so {so}:"
+    return NotConvergedError("\n".join((what, *convergence.reasons, *(f"A likely cause: {doubt}" for doubt in doubts))))
 
 
 def request_of(problem: Problem) -> Request:

@@ -110,7 +110,7 @@ def test_a_short_run_is_told_how_long_it_should_be():
     convergence = assess(renewal_draws(n_steps=200))
     assert not convergence.passed
     assert convergence.suggested_steps == pytest.approx(100 * TAU, rel=0.3)
-    assert f"allow {convergence.suggested_steps} steps" in convergence.reasons[0]
+    assert f"{convergence.suggested_steps} steps after burn-in would do" in convergence.reasons[0]
 
 
 def test_the_effective_size_can_be_asked_for():

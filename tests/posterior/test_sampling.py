@@ -9,7 +9,7 @@ from statistics_checks import differences_from_normal
 from bayesplate.errors import BayesplateError, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.posterior import sampling
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.sampling import SamplerSettings, sample
+from bayesplate.posterior.sampling import SamplerSettings, is_hopeless, sample
 
 MEAN = np.array([3.0, -1.0, 0.0, 10.0])
 SD = np.array([1.0, 0.01, 30.0, 2.0])
@@ -158,7 +158,7 @@ def test_unusable_settings_are_refused(changes, place):
 def test_too_few_steps_do_not_pass_and_say_how_many_are_needed():
     chains, convergence = sample(log_normal_density, MEAN, COVARIANCE, short())
     assert not convergence.passed
-    assert f"allow {convergence.suggested_steps} steps" in " ".join(convergence.reasons)
+    assert f"{convergence.suggested_steps} steps after burn-in would do" in " ".join(convergence.reasons)
     assert convergence.suggested_steps > convergence.n_kept_steps
     assert chains.draws.shape == (4, 100, 32, 4)
     assert chains.kept.shape == (4, 50, 32, 4)
@@ -173,6 +173,23 @@ def test_separate_peaks_do_not_pass():
     _, convergence = sample(two_peaks, np.zeros(3), np.eye(3), settings, names=("D_x", "D_y", "D_s"))
     assert not convergence.passed
     assert "D_x" in " ".join(convergence.reasons)
+
+
+@pytest.mark.parametrize(("n_taus", "is_over"), [(2.49, True), (2.51, False)])
+def test_sampling_ends_where_twice_the_steps_would_not_suffice(n_taus, is_over):
+    """2000 of 20,000 steps with a twentieth of the 50 autocorrelation times: twice as many would hold those 50."""
+    assert is_hopeless(n_taus, 2000, SamplerSettings(seed=1)) is is_over
+
+
+def test_a_density_that_no_step_crosses_ends_the_sampling_early():
+    """A washboard: in six times as many steps its autocorrelation time is known to be some 2800 steps."""
+
+    def washboard(theta):
+        return np.sum(8.0 * np.cos(60.0 * theta) - 0.5 * theta**2, axis=1)
+
+    chains, convergence = sample(washboard, np.zeros(4), np.eye(4), SamplerSettings(seed=2, max_steps=10_000))
+    assert not convergence.passed
+    assert 400 < convergence.tau_max < chains.draws.shape[1] < 2500
 
 
 def test_progress_counts_every_chunk():
