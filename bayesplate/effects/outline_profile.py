@@ -13,7 +13,7 @@ from bayesplate.effects.base import Effect, Floats, Scope, Variation
 from bayesplate.effects.field_components import FieldProfile, field_parameters, field_profile, held_in
 from bayesplate.effects.part import WHOLE, Part, vibrating_part
 from bayesplate.modes.fields import EdgeStrip, Group, Outline
-from bayesplate.plate.board import Board, Values
+from bayesplate.plate.board import Board, Values, density
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.random_field import conditioned, width_readings
 from bayesplate.plate.setup import Ends, Setup
@@ -115,8 +115,10 @@ class OutlineProfile(Effect):
         return None if self.profile is None else _Limits(self)
 
     def adjusted(self, values: Values) -> Values:
-        """The widest width for the sides of the rectangle; the mass goes with the mean width, which stays."""
-        return values if self.profile is None else {**values, "length_y": values["length_y"] * self._widest}
+        """The widest width for the sides of the rectangle, and the density that the mean width gives to a mass."""
+        if self.profile is None:
+            return values
+        return {**values, "length_y": values["length_y"] * self._widest, "density": density(values)}
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
         """What every energy gains at the edges where the outline moves, besides what it is."""

@@ -178,7 +178,7 @@ def test_a_given_mass_is_kept():
 
     adjusted = effect.adjusted(values)
     area = 0.58 * float(adjusted["length_y"]) * np.mean(high - low)
-    assert density(values) * area * 4.7e-3 == pytest.approx(0.25, rel=1e-4)
+    assert density(adjusted) * area * 4.7e-3 == pytest.approx(0.25, rel=1e-4)
     assert (high - low).max() == pytest.approx(1.0, abs=1e-6)
     assert 0.205 < float(values["length_y"]) < float(adjusted["length_y"])
 
