@@ -14,6 +14,7 @@ from bayesplate.cards import PriorCard
 from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
+from bayesplate.plate.sessions import sessions
 from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior
@@ -105,8 +106,13 @@ class Problem:
         return self.prepared.prior
 
     @cached_property
+    def _sampled(self) -> Board:
+        """The board whose parameters are sampled; sessions share some by their labels, which posing may propose."""
+        return self.posed.board if sessions(self.prepared.board) else self.prepared.board
+
+    @cached_property
     def _parameters(self) -> Parameters:
-        return Parameters(self.prepared.board)
+        return Parameters(self._sampled)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -141,8 +147,8 @@ class Problem:
 
     @cached_property
     def _prior(self) -> Posterior:
-        """The prior alone, for which no plate has to be solved."""
-        return Posterior(self.prepared.board, self.prior, (), self.asked_law or "exact", self.robust)
+        """The prior alone, for which no plate has to be solved but those of sessions."""
+        return Posterior(self._sampled, self.prior, (), self.asked_law or "exact", self.robust)
 
     def log_prob(self, theta: ArrayLike) -> Floats:
         """Log density of the posterior, up to a constant: `log_prior` plus `log_likelihood`.

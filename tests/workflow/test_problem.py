@@ -71,6 +71,18 @@ def test_the_columns_and_the_readings_are_those_of_the_archive(problem, clamped,
     assert clamped.board.setups[0].labels == tuple(reading.label for reading in clamped.board.setups[0].readings)
 
 
+def test_what_sessions_share_is_among_the_columns(clamped):
+    """A board clamped twice: the discrepancies of its modes are sampled, so whoever else samples needs them too."""
+    (setup,) = clamped.board.setups
+    again = bayesplate.Problem.from_card(replace(clamped.board, setups=(setup, replace(setup, name="again"))))
+    theta = near(again, 3)
+    assert again.n_dim == len(again.names) == again.posed.centre.size
+    assert sum("discrepancy" in name for name in again.names) == 1 + len(setup.labels)
+    assert np.isfinite(again.log_prob(theta)).all()
+    assert again.predict(theta).shape == (3, 2 * len(setup.labels))
+    assert np.isfinite(again.log_prior(points(again, 20))).any()
+
+
 def test_predict_and_the_likelihood_are_those_of_the_fit(clamped, fiemme):
     """At the draws of a fit: the frequencies, the density up to its constant, and the likelihood of every reading."""
     draws = fiemme.draws
