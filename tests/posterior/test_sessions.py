@@ -16,7 +16,10 @@ from bayesplate.diagnosis.shifts import baseline as home
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.diagnosis.shifts.signatures import signatures
+from bayesplate.diagnosis.shifts.tables import nominal_shift
 from bayesplate.effects import declare
+from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.modes.naming import Place
 from bayesplate.modes.plate import Parity
@@ -191,3 +194,13 @@ def test_sessions_that_are_one_plate_are_solved_once_and_others_each(effects, n_
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one, other)
     assert (np.abs(found[0] - found[1]).max() > 1e-4) == bool(effects)  # what the days share is all without a clamp
+
+
+def test_what_an_effect_shifts_is_told_beside_the_discrepancies():
+    """`check` and `diagnose` tell the same; the air makes every mode lower, whatever the board does otherwise."""
+    problem = pose(board(is_rough=True), load_prior("weakly-informative"), law="linear")
+    base = baseline_of(problem)
+    raw, _, _ = nominal_shift(base, form_law(base, forms(problem.board)["air_loading"][0]).placed(base))
+    (told,) = signatures(problem, ["air_loading"])
+    assert (told.raw < 0.0).all()
+    assert cents(raw) == pytest.approx(told.raw, abs=0.3)

@@ -65,7 +65,7 @@ def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int)
     drawn = draw_terms(found, index, rng, _OVERSAMPLED * n_draws)
     log_weights = log_weights_of(found, drawn)
     if not np.isfinite(log_weights.max()):  # no draw is a plate by the exact law: the linear terms are all there is
-        return drawn.at(np.arange(n_draws))
+        return drawn.at(np.arange(0, drawn.n_draws, _OVERSAMPLED))  # which stand in the order of their noise
     shares = np.exp(log_weights - log_weights.max())
     return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=shares / shares.sum()))
 

@@ -111,14 +111,18 @@ class Terms:
         with np.errstate(divide="ignore"):
             return np.log(np.outer(self.noise.weights, self.table.weights).ravel())
 
+    @property
+    def _variances(self) -> Floats:
+        """Of the noise of each reading, its own error included: (n_levels, n_modes) array."""
+        base = self.fold.baseline
+        return np.asarray(self.noise.sd[:, base.setup_index] ** 2 + base.own_variance)
+
     @cached_property
     def noise_covariance(self) -> Floats:
         """Covariance of the projection without the cells' own: (n_levels, d, d) array."""
-        base = self.fold.baseline
         blind = self.fold.blind
-        inputs = blind @ base.input_slopes
-        variances = self.noise.sd[:, base.setup_index] ** 2 + base.own_variance
-        return np.einsum("di,li,ei->lde", blind, variances, blind) + inputs @ inputs.T
+        inputs = blind @ self.fold.baseline.input_slopes
+        return np.einsum("di,li,ei->lde", blind, self._variances, blind) + inputs @ inputs.T
 
     @cached_property
     def _parts(self) -> _Parts:
@@ -192,28 +196,27 @@ class Terms:
         by_cell = shares.reshape(self.noise.weights.size, self.table.n_cells, -1)
         own = (residuals @ misses)[None, :] - (self.table.shift @ misses)[:, None]
         total = (by_cell.sum(axis=0) * own).sum(axis=0)
-        of_inputs, has_tangents = self._gains_of_inputs, self.table.slopes.shape[2] > 0
-        if not has_tangents and not of_inputs.any():
-            return log_mass, np.asarray(total)
         seen = residuals @ self.fold.blind.T
-        rows = np.repeat(of_inputs[:, None], self.table.n_cells, axis=1)
-        if has_tangents:
+        rows = np.repeat(self._gains_without_cells[:, None], self.table.n_cells, axis=1)
+        if self.table.slopes.shape[2] > 0:
             there = np.einsum("di,kip->kdp", self.fold.blind, self.table.slopes)
-            along = np.einsum("i,kip->kp", misses, self.table.slopes) - np.einsum("ld,kdp->lkp", of_inputs, there)
+            along = np.einsum("i,kip->kp", misses, self.table.slopes) - np.einsum("lkd,kdp->lkp", rows, there)
             rows = rows + np.einsum("lkp,lkpd->lkd", along, self._gains)
         offsets = np.einsum("lkd,kd->lk", rows, self.middles)
         inside = np.einsum("lkd,nd->lkn", rows, seen) - offsets[:, :, None]
         return log_mass, np.asarray(total - (by_cell * inside).sum(axis=(0, 1)))
 
     @cached_property
-    def _gains_of_inputs(self) -> Floats:
-        """Takes what is seen to what the inputs add to the reading, as far as it tells them: (n_levels, d) array."""
-        slopes = self.fold.baseline.input_slopes
-        if not slopes.shape[1]:
-            return np.zeros((self.noise.weights.size, self.fold.blind.shape[0]))
-        covariance = (self.fold.misses @ slopes) @ (self.fold.blind @ slopes).T
-        wanted = np.broadcast_to(covariance, (self.noise.weights.size, covariance.size))
-        return np.asarray(np.linalg.solve(self.noise_covariance, wanted[:, :, None])[:, :, 0])
+    def _gains_without_cells(self) -> Floats:
+        """Takes what is seen to what it tells of the error in `Fold.misses`, no cell's sizes told: (n_levels, d) array.
+
+        Inputs move both; and where readings differ in noise at this level otherwise than at its median, so does the
+        noise of those that the constants were fitted to.
+        """
+        base, misses, blind = self.fold.baseline, self.fold.misses, self.fold.blind
+        of_noise = np.einsum("i,li,di->ld", misses, self._variances, blind)
+        of_inputs = (misses @ base.input_slopes) @ (blind @ base.input_slopes).T
+        return np.asarray(np.linalg.solve(self.noise_covariance, (of_noise + of_inputs)[:, :, None])[:, :, 0])
 
     @cached_property
     def _gains(self) -> Floats:

@@ -149,9 +149,10 @@ def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, dict[str
     for key, quantity in board.inputs.items():
         values.setdefault(key, np.asarray(quantity.mean))
     values |= {key: np.asarray(value) for key, value in size.items()}
-    parts = [
-        setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0] for setup in board.setups
-    ]
+    parts = []
+    for setup, fitted in zip(board.setups, problem.posterior.models, strict=True):
+        plate = setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0]
+        parts.append(plate + fitted.discrepancies(values)[0, : plate.size])
     return np.concatenate(parts), size
 
 

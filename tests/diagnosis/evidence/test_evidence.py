@@ -161,8 +161,9 @@ def refitted_without(base, mode, residual, cell, sd):
     shift, slopes = cell
     used = np.delete(np.arange(base.n_modes), mode)  # or those of one mode
     columns = np.hstack([base.slopes, slopes, base.input_slopes])
-    rows = np.vstack([columns[used] / sd, np.eye(columns.shape[1])[3:]])
-    target = np.r_[(residual - shift)[used] / sd, np.zeros(columns.shape[1] - 3)]
+    scales = np.broadcast_to(sd, base.n_modes)[used]
+    rows = np.vstack([columns[used] / scales[:, None], np.eye(columns.shape[1])[3:]])
+    target = np.r_[(residual - shift)[used] / scales, np.zeros(columns.shape[1] - 3)]
     fitted = np.linalg.lstsq(rows, target, rcond=None)[0]
     return (residual - shift)[mode] - columns[mode] @ fitted
 
@@ -188,19 +189,22 @@ def test_a_reading_that_was_left_out_is_predicted_as_by_a_refit(n_tangents, n_in
     assert nested(bare_ground, residual[None, :]).before[0] == pytest.approx(without, abs=1e-12)
 
 
-def test_cells_and_levels_predict_with_their_share():
+@pytest.mark.parametrize("case", CASES)
+def test_cells_and_levels_predict_with_their_share(case):
+    """Where readings differ in noise, what each level of it makes of the others is another fit of the constants."""
     rng = np.random.default_rng(5)
-    base = baseline(rng)
+    base = baseline(rng, **CASES[case])
     cells = table(rng, n_cells=3)
     grid = noise_grid(base.board)
     residual = 0.01 * rng.standard_normal(6)
     used = np.delete(np.arange(6), 1)
     total, predicted = 0.0, 0.0
-    for (sd,), level in zip(grid.sd, grid.weights, strict=True):
+    for by_setup, level in zip(grid.sd, grid.weights, strict=True):
+        sd = np.sqrt(by_setup[base.setup_index] ** 2 + base.own_variance)
         for k in range(3):
-            columns = np.hstack([base.slopes, cells.slopes[k]])[used]
+            columns = np.hstack([base.slopes, cells.slopes[k], base.input_slopes])[used]
             gap = (residual - cells.shift[k])[used]
-            wide = sd**2 * np.eye(5) + 1e4 * columns[:, :3] @ columns[:, :3].T + columns[:, 3:] @ columns[:, 3:].T
+            wide = np.diag(sd[used] ** 2) + 1e4 * columns[:, :3] @ columns[:, :3].T + columns[:, 3:] @ columns[:, 3:].T
             share = np.exp(-0.5 * gap @ np.linalg.solve(wide, gap) - 0.5 * np.linalg.slogdet(wide)[1])
             share *= level * cells.weights[k]
             total += share
@@ -211,7 +215,7 @@ def test_cells_and_levels_predict_with_their_share():
 
 def test_without_effect_the_error_left_out_is_the_residual_over_one_less_the_leverage():
     rng = np.random.default_rng(6)
-    base = baseline(rng, resolution=1.0)
+    base = baseline(rng)
     ground = ground_of(base, bare(base, noise_grid(base.board)))
     residuals = 0.01 * rng.standard_normal((3, 6))
     weighted = base.slopes / base.scales[:, None]

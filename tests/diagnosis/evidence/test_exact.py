@@ -136,7 +136,7 @@ def test_draws_that_are_no_plate_by_the_exact_law_count_for_nothing(found, off):
     none = under(lambda x: np.full((len(x), base.n_modes), off))
     as_drawn = draw_terms(none, 0, np.random.default_rng(2), 800)
     kept = draw_exact(none, 0, np.random.default_rng(2), 400)
-    np.testing.assert_array_equal(kept.log_rigidities, as_drawn.log_rigidities[:400])
+    np.testing.assert_array_equal(kept.log_rigidities, as_drawn.log_rigidities[::2])  # of all levels of noise
     assert under_exact_law(none) is None
 
 
