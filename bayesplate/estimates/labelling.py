@@ -6,7 +6,7 @@ proposed says nothing there. But a residual needs a mode.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from bayesplate.plate.measured import Peak, Reading
 from bayesplate.plate.setup import Setup
 
 LIKELY = 0.5
-"""Probability from which on a label is proposed: no two peaks can have the same one."""
+"""Probability above which a label is proposed: no two peaks can each be the same mode with more."""
 
 
 def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.float64], least: float) -> Setup:
@@ -43,24 +43,32 @@ def with_labels(setup: Setup, peaks: PeakLikelihood, probabilities: NDArray[np.f
     of_reading = {int(at): label for at, label in zip(peaks.readings, likely, strict=True) if at >= 0}
     of_bare = {int(at): label for at, label in zip(peaks.bare, likely, strict=True) if at >= 0}
     stated = {at: reading for at, reading in enumerate(setup.readings) if reading.confidence > 0}
-    taken = {one.stated or one.label for at, one in stated.items() if of_reading.get(at) is None}
+    given = {at: one.stated or one.label for at, one in stated.items()}
+    used = _without_doubles(given, {at: label for at in given if (label := of_reading.get(at)) is not None})
     readings, bare, rest = [], [], []
     for at, reading in enumerate(setup.readings):
         peak = Peak(reading.frequency, reading.sign, reading.amplitude, reading.damping)
         bare += [] if at in stated else [(peak, of_reading[at])]
     bare += [(peak, of_bare[i]) for i, peak in enumerate(setup.peaks)]
     for at, reading in stated.items():
-        given = reading.stated or reading.label
-        found = of_reading.get(at)
-        used = given if found is None or found in taken else found
-        readings.append(replace(_at(setup, reading, used), stated=None if used == given else given))
+        is_given = used[at] == given[at]
+        readings.append(replace(_at(setup, reading, used[at]), stated=None if is_given else given[at]))
     for peak, found in sorted(bare, key=lambda one: one[0].frequency.mean):
-        if found is None or found in taken:
+        if found is None or found in used.values():
             rest.append(peak)
         else:
             reading = Reading(found, (0, 0), peak.frequency, peak.sign, 0.0, None, peak.amplitude, peak.damping)
             readings.append(_at(setup, reading, found))
     return replace(setup, readings=tuple(readings), peaks=tuple(rest))
+
+
+def _without_doubles(given: Mapping[int, Label], found: Mapping[int, Label]) -> dict[int, Label]:
+    """The label of each reading: what was found, unless a reading whose given label stays has it."""
+    used = {**given, **found}
+    while doubles := [at for at, label in found.items() if label in (used[i] for i in given if i not in found)]:
+        found = {at: label for at, label in found.items() if at not in doubles}
+        used = {**given, **found}
+    return used
 
 
 def _at(setup: Setup, reading: Reading, label: Label) -> Reading:

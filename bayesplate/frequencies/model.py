@@ -216,7 +216,7 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
 
 
 def with_others(model: SetupModel, values: Values) -> SetupModel:
-    """Add the modes that peaks may be: all without a label up to above the highest peak or reading.
+    """Add the modes that peaks may be: all without a label up to above the highest peak or reading, at least one.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
     """
     setup = model.setup
     highest = 2.0 * np.pi * _ABOVE * max([*setup.measured, *setup.unlabelled])
-    modes = solve_up_to(model.plate, model.system.weights(values).at(0), highest**2)
+    modes = solve_up_to(model.plate, model.system.weights(values).at(0), highest**2, 1 + len(model.places))
     at = {(parity, int(rank)): i for i, (parity, rank) in enumerate(zip(modes.parities, modes.ranks, strict=True))}
     labelled = [at.get((place.parity, place.rank)) for place in model.places]
     rest = [i for i in range(len(modes.eigenvalues)) if i not in labelled]

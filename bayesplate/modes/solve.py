@@ -177,13 +177,15 @@ def solve(plate: PlateMatrices, weights: Weights, n_modes: int) -> Modes:
         solved |= solve_classes(plate, weights, short or {p: 2 * c.eigenvalues.size for p, c in solved.items()})
 
 
-def solve_up_to(plate: PlateMatrices, weights: Weights, highest: float) -> Modes:
-    """All elastic modes of a plate up to an eigenvalue (s^-2), at least one; see `solve`."""
+def solve_up_to(plate: PlateMatrices, weights: Weights, highest: float, n_least: int = 1) -> Modes:
+    """All elastic modes of a plate up to an eigenvalue (s^-2), and at least so many; see `solve`."""
     solved = {block.parity: solve_class(block, weights, _FIRST_OF_CLASS) for block in plate.blocks}
+    eigenvalues = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
+    highest = max(highest, eigenvalues[min(n_least, eigenvalues.size) - 1])
     while short := {p: _enough(c.eigenvalues, highest) for p, c in solved.items() if c.eigenvalues[-1] < highest}:
         solved |= solve_classes(plate, weights, short)
     n_modes = sum(int(np.sum(c.eigenvalues <= highest)) for c in solved.values())
-    return collect(plate, solved, max(n_modes, 1))
+    return collect(plate, solved, n_modes)
 
 
 def _enough(eigenvalues: NDArray[np.float64], highest: float) -> int:
