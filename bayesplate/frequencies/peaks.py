@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.assignment import LEAST, Assignments
+from bayesplate.frequencies.assignment import Assignments
 from bayesplate.frequencies.model import SetupModel, every_label
 from bayesplate.frequencies.residues import share_seen, sign_probabilities
 from bayesplate.labels import Label
@@ -28,20 +28,18 @@ _SIGNS = {"+": 1, "-": -1, "": 0}
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """Peaks and modes that keep their order: all, or those that may be of one sign.
+    """Peaks that keep their order among the modes: all, or those that may be of one sign.
 
     Attributes
     ----------
     peaks : (n_own,) array of int
-    modes : (n_of,) array of int
-    log_sign : (n_own, n_of) array
+    log_sign : (n_own, n_modes) array
         ln of the probability that a mode has the sign of a peak.
     taking : (n_tried, n_own) array of bool
         Which of the peaks are of this sign, for every sign that those of unknown sign may have.
     """
 
     peaks: Rows
-    modes: Rows
     log_sign: Floats
     taking: NDArray[np.bool_]
 
@@ -56,8 +54,8 @@ class PeakLikelihood:
     leaves no peak with a prior probability, which is higher the nearer hammer or sensor stand to its nodal lines, or if
     it lies above the highest peak. Where the signs of residues are known, on the card and from the shapes, a peak of
     the other sign is not that mode, and peaks and modes keep their order within a sign only; a mode with so small a
-    residue that it may have either sign is in both orders. A label that may be wrong is right with the probability that
-    the card gives, and otherwise any other mode's.
+    residue that it may have either sign may be a peak of either. A label that may be wrong is right with the probability
+    that the card gives, and otherwise any other mode's.
 
     Attributes
     ----------
@@ -77,8 +75,6 @@ class PeakLikelihood:
         Probability that a mode below the highest peak left none.
     orders : tuple of Order
         One of all, or one per sign.
-    shared : (n_shared,) array of int
-        Modes that are in the orders of both signs.
     log_highest : float
         ln of the highest frequency that was read, Hz.
     """
@@ -92,7 +88,6 @@ class PeakLikelihood:
     log_alone: Floats
     missed: Floats
     orders: tuple[Order, ...]
-    shared: Rows
     log_highest: float
 
     @classmethod
@@ -131,7 +126,6 @@ class PeakLikelihood:
         orders = tuple(_orders(signs, columns.size, residues))
         is_split = len(orders) > 1
         log_sign = np.where(((signs != 0) & (residues is not None)) | is_split, -np.log(2.0), 0.0)
-        shared = np.intersect1d(orders[0].modes, orders[1].modes) if is_split else np.empty(0, dtype=np.intp)
         log_alone = np.log(setup.spurious * len(errors.frequency) * wide) + log_label[:, -1] + log_sign
         return cls(
             errors=errors,
@@ -143,7 +137,6 @@ class PeakLikelihood:
             log_alone=log_alone,
             missed=1.0 - seen,
             orders=orders,
-            shared=shared,
             log_highest=float(np.log(highest)),
         )
 
@@ -165,8 +158,9 @@ class PeakLikelihood:
         there = every_log_frequency[:, self.columns]
         has_all = np.flatnonzero(np.isfinite(there).all(axis=1))
         result = np.full(len(there), -np.inf)
-        for start in range(0, has_all.size, _DRAWS_AT_ONCE):
-            some = has_all[start : start + _DRAWS_AT_ONCE]
+        step = max(1, _DRAWS_AT_ONCE // len(self.orders[0].taking))
+        for start in range(0, has_all.size, step):
+            some = has_all[start : start + step]
             result[some] = self._log_sum(there[some], noise[some])
         return result
 
@@ -174,11 +168,8 @@ class PeakLikelihood:
         """`log_likelihood` of a few draws that have all modes: each takes peaks times modes times orders of memory."""
         from scipy.special import logsumexp
 
-        missed = self._missed(there, noise)
-        summed = [one.log_sums(order.taking) for order, _, one in self._assignments(there, noise, missed)]
-        total = logsumexp(sum(summed), axis=0)
-        # A mode in two orders was counted as missed in one of them at least.
-        return np.asarray(total - np.log(np.maximum(missed[:, self.shared], LEAST)).sum(axis=1))
+        _, assignments = self._assignments(there, noise)
+        return np.asarray(logsumexp(assignments.log_sums([order.taking for order in self.orders]), axis=0))
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
         """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes) array; the rest: it is none.
@@ -200,14 +191,15 @@ class PeakLikelihood:
         from scipy.special import softmax
 
         there = every_log_frequency[:, self.columns]
-        every = self._assignments(there, noise, self._missed(there, noise))
-        weights = softmax(sum(one.log_sums(order.taking) for order, _, one in every), axis=0)
+        modes, assignments = self._assignments(there, noise)
+        taking = [order.taking for order in self.orders]
+        weights = softmax(assignments.log_sums(taking), axis=0)
         result = np.zeros((*self.log_prior.shape, len(noise)))
-        for order, modes, one in every:
-            for taken, weight in zip(order.taking, weights, strict=True):
-                by_mode = np.zeros((int(taken.sum()), self.columns.size, len(noise)))
-                np.put_along_axis(by_mode, modes[None], one.of(taken).pairs(), axis=1)
-                result[order.peaks[taken]] += by_mode * weight
+        for *taken, weight in zip(*taking, weights, strict=True):
+            for order, own, pairs in zip(self.orders, taken, assignments.of(taken).pairs(), strict=True):
+                by_mode = np.empty(pairs.shape)
+                np.put_along_axis(by_mode, modes[None], pairs, axis=1)
+                result[order.peaks[own]] += by_mode * weight
         return result
 
     def log_density_alone(self, reading: int) -> float:
@@ -217,21 +209,18 @@ class PeakLikelihood:
         width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
         return float(self.log_alone[at] - np.log(width))
 
-    def _assignments(self, there: Floats, noise: Floats, missed: Floats) -> list[tuple[Order, Rows, Assignments]]:
-        """Each of `orders`, its modes in the order of each draw, and what its peaks say of them.
-
-        The modes are (n, n_draws) arrays.
-        """
-        rows = [np.ascontiguousarray(each.T) for each in (there, missed)]
-        found = []
+    def _assignments(self, there: Floats, noise: Floats) -> tuple[Rows, Assignments]:
+        """The modes in the order of each draw, an (n_modes, n_draws) array, and what the peaks say of them."""
+        modes = np.ascontiguousarray(np.argsort(there, axis=1).T)
+        missed = self._missed(there, noise)
+        ordered, lonely = (np.take_along_axis(np.ascontiguousarray(each.T), modes, axis=0) for each in (there, missed))
+        log_pair, log_alone = [], []
         for order in self.orders:
-            by_rank = np.ascontiguousarray(np.argsort(there[:, order.modes], axis=1).T)
-            modes = order.modes[by_rank]
-            ordered, lonely = (np.take_along_axis(each, modes, axis=0) for each in rows)
-            log_pair = self.errors.at(order.peaks).log_likelihood_of_each(ordered, noise)
-            log_pair += np.take(self.log_prior[np.ix_(order.peaks, order.modes)] + order.log_sign, by_rank, axis=1)
-            found.append((order, modes, Assignments(log_pair, self.log_alone[order.peaks], lonely)))
-        return found
+            own = self.errors.at(order.peaks).log_likelihood_of_each(ordered, noise)
+            own += np.take(self.log_prior[order.peaks] + order.log_sign, modes, axis=1)
+            log_pair.append(own)
+            log_alone.append(self.log_alone[order.peaks])
+        return modes, Assignments(tuple(log_pair), tuple(log_alone), lonely)
 
     def _missed(self, there: Floats, noise: Floats) -> Floats:
         """Probability that each mode left no peak: (n_draws, n_modes) array."""
@@ -253,20 +242,19 @@ def _signs(setup: Setup, doubtful: Rows) -> list[str]:
 def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Order]:
     """Those that may be of one sign, for every sign of the peaks of which it is not known; or all together."""
     unsigned = np.flatnonzero(signs == 0)
-    peaks, modes = np.arange(signs.size), np.arange(n_modes)
     log_sign = np.zeros((3, n_modes))
     is_known = residues is not None and not np.isnan(residues).any()
     if residues is not None:
         with np.errstate(divide="ignore"):
             log_sign[[1, -1]] = np.log(sign_probabilities(residues))
     if unsigned.size > _MOST_UNSIGNED or unsigned.size == signs.size or not is_known:
-        yield Order(peaks, modes, log_sign[signs], np.ones((1, signs.size), dtype=np.bool_))
+        yield Order(np.arange(signs.size), log_sign[signs], np.ones((1, signs.size), dtype=np.bool_))
         return
     tried = np.repeat(signs[None], 2**unsigned.size, axis=0)
     tried[:, unsigned] = list(product((1, -1), repeat=unsigned.size))
     for sign in (1, -1):
-        own, of = np.flatnonzero((signs == sign) | (signs == 0)), np.flatnonzero(log_sign[sign] > -np.inf)
-        yield Order(own, of, np.repeat(log_sign[sign, of][None], own.size, axis=0), tried[:, own] == sign)
+        own = np.flatnonzero((signs == sign) | (signs == 0))
+        yield Order(own, np.repeat(log_sign[sign][None], own.size, axis=0), tried[:, own] == sign)
 
 
 def _log_labels(setup: Setup, readings: Rows, labels: Sequence[Label | None]) -> Floats:

@@ -152,11 +152,15 @@ def test_as_many_peaks_are_none_as_stated():
 RESIDUES = np.array([0.6, -0.4, 0.5, -0.02, 0.3])
 
 
-def test_signs_keep_peaks_and_modes_apart() -> None:
-    """The fourth mode may have either sign: the sum over both, each with its probability."""
-    signed = {99.5: "+", 130.2: "-", 131.5: "+", 181.0: "-"}
+@pytest.mark.parametrize(
+    "signed", [{99.5: "+", 130.2: "-", 131.5: "+", 181.0: "-"}, {99.5: "+", 130.2: "-", 179.5: "+", 180.5: "-"}]
+)
+def test_signs_keep_peaks_and_modes_apart(signed) -> None:
+    """The fourth mode may have either sign: the sum over both, each with its probability; it is never two peaks."""
     setup = setup_of(peaks=[Peak(exact(hertz), sign) for hertz, sign in signed.items()])
-    found = PeakLikelihood.of(model_of(setup, RESIDUES)).log_likelihood(MODES, NOISE)
+    likelihood = PeakLikelihood.of(model_of(setup, RESIDUES))
+    found = likelihood.log_likelihood(MODES, NOISE)
+    assert (likelihood.probabilities(MODES, NOISE).sum(axis=0) <= 1.0 + 1e-12).all()
     seen = (1.0 - MISSED) * share_seen(RESIDUES)
     positive = norm.cdf(RESIDUES[3] / NODAL_LINE)
     for draw in range(3):
@@ -166,7 +170,7 @@ def test_signs_keep_peaks_and_modes_apart() -> None:
             for sign, wanted in (("+", has_plus), ("-", ~has_plus)):
                 hertz = [one for one, own in signed.items() if own == sign]
                 weight *= enumerated(
-                    hertz, MODES[draw, wanted], seen[wanted], NOISE[draw], 181.0, 0.5 * SPURIOUS, n_peaks=4
+                    hertz, MODES[draw, wanted], seen[wanted], NOISE[draw], max(signed), 0.5 * SPURIOUS, n_peaks=4
                 )[0]
             expected += weight
         assert found[draw] == pytest.approx(np.log(expected), abs=1e-9)
