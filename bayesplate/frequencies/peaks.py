@@ -54,8 +54,8 @@ class PeakLikelihood:
     leaves no peak with a prior probability, which is higher the nearer hammer or sensor stand to its nodal lines, or if
     it lies above the highest peak. Where the signs of residues are known, on the card and from the shapes, a peak of
     the other sign is not that mode, and peaks and modes keep their order within a sign only; a mode with so small a
-    residue that it may have either sign may be a peak of either. A label that may be wrong is right with the probability
-    that the card gives, and otherwise any other mode's.
+    residue that it may have either sign may be a peak of either. A label that may be wrong is right with the
+    probability that the card gives, and otherwise any other mode's.
 
     Attributes
     ----------
