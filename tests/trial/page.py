@@ -83,7 +83,7 @@ def in_short(summary: Mapping[str, Any]) -> str:
         f"{share(wrong.format(six))};",
         f"with six modes of the free board as well, on {share(right.format(both))} and {share(wrong.format(both))}.",
         "An effect that the library does not know is taken for one of its own on "
-        f"{share(unknown.format(six))} and {share(unknown.format(both))}{_held_outside(summary)}.",
+        f"{share(unknown.format(six))}, with both setups on {share(unknown.format(both))}{_held_outside(summary)}.",
         "Intervals of 90 % for the constants, averaged over the effects, hold the truth on "
         f"{share(f'constants after tracing, {six}, 2x: 90 % intervals')}, those of the ideal plate on "
         f"{share(f'constants without tracing, {six}, 2x: visibly worse')}.",
