@@ -3,6 +3,8 @@
 PYTHON ?= $(shell python3.11 -c "" 2>/dev/null && echo python3.11 || echo python3)
 VENV ?= .venv
 BIN = $(VENV)/bin
+# Measured recordings, which are no part of the project.
+RECORDINGS ?= recordings
 
 # Thousands of small matrices: threads of a linear algebra library would only wait for one another.
 export OMP_NUM_THREADS := 1
@@ -53,7 +55,7 @@ sand: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_sand.py --pictures 20 --workers 2 --out results/sand.jsonl --publish docs/validation
 
 measured: $(VENV)/tested-with
-	$(BIN)/python tests/calibration/run_measured.py --folder ../shared/data --publish docs/validation
+	$(BIN)/python tests/calibration/run_measured.py --folder $(RECORDINGS) --publish docs/validation
 
 bars: $(VENV)/tested-with
 	$(BIN)/python tests/calibration/run_bars.py --publish docs/validation --workers 2

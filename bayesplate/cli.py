@@ -192,7 +192,7 @@ def diagnose(
     quiet: bool,
     debug: bool,
 ) -> None:
-    """Trace the residual of CARD to an effect that it lacks.
+    """Trace what the plate model misses on CARD to a physical effect.
 
     Adds the effect, and reports the error before and after.
     """
@@ -232,7 +232,7 @@ def diagnose(
     multiple=True,
     metavar="CLASS=MINUTES",
     callback=costs,
-    help="Of a reading (1), a clamping (10), a board (30).",
+    help="Minutes that a reading (1), a new clamping (10) or another board (30) takes.",
 )
 @click.option("--between", callback=names, help="Effects to be told apart, comma separated.")
 @shared_options("out", "seed", "effects", "force", "json", "quiet", "debug")
@@ -317,7 +317,12 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
     show_default=True,
     help="Of a file with two channels; also response,force, or response,response for stereo.",
 )
-@click.option("--motion", default="acceleration", show_default=True, help="What a response is; pressure: a microphone.")
+@click.option(
+    "--motion",
+    default="acceleration",
+    show_default=True,
+    help="What a response is: acceleration, velocity, displacement, or pressure (a microphone).",
+)
 @click.option("--polarity", help="same or opposite, of force and response (default: found by the labels).")
 @click.option("--sweep", metavar="F1,F2,S", help="For recordings of an exponential sweep: its parameters, or its file.")
 @click.option(
@@ -369,8 +374,13 @@ def cite(card: str, effects: list[str] | None, as_json: bool, quiet: bool, debug
 @click.option("--folders", is_flag=True, help="Write the files of fit for each board too, into boards/NAME.")
 @click.option("--table", type=click.Choice(["csv", "parquet"]), default="csv", show_default=True)
 @click.option("--match", metavar="PERCENT", help="Boards match within this: 10 (default), or E_x=10,E_y=15.")
-@click.option("--limit", multiple=True, metavar="NAME=LEAST:GREATEST", help="A specification: E_x=10:14, density=:420.")
-@click.option("--rigidity", type=float, metavar="NM", help="D_x for which each board's thickness is wanted.")
+@click.option(
+    "--limit",
+    multiple=True,
+    metavar="NAME=LEAST:GREATEST",
+    help="A specification, moduli in GPa, density in kg/m3: E_x=10:14, density=:420.",
+)
+@click.option("--rigidity", type=float, metavar="N_M", help="D_x in N m for which each board's thickness is wanted.")
 @shared_options(
     "out", "seed", "effects", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet", "debug"
 )

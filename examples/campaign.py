@@ -14,6 +14,7 @@ can be resumed.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import bayesplate
@@ -52,7 +53,8 @@ def page(found: bayesplate.CampaignDiagnoseResult) -> str:
         *(markdown(one) for one in tables),
     ]
     for words, common in left_over.items():
-        parts += [f"## What is left over on all boards alike{words}", markdown(common_table(common))]
+        left = replace(common_table(common), title="Measured over predicted, cents")
+        parts += [f"## What is left over on all boards alike{words}", markdown(left)]
     parts += [f"- {warning}" for warning in summary.warnings]
     parts += [f"What to do next: {diagnosis.recommendation}."] if diagnosis.recommendation else []
     return "\n\n".join(part.rstrip() for part in parts) + "\n"

@@ -34,6 +34,18 @@ BOARDS = (
     "spruce-free-1L",
     "spruce-free-3L",
 )
+HEAD = """# Error before and after, board by board
+
+Written by `examples/closing_the_loop.py`; do not edit. Each board is fitted as an ideal plate, an effect that it lacks
+is searched for, and where the verdict is a name or a group, the most probable effect is fitted too.
+
+- In sample, left out, nested: error in cents, rms over the modes, without the effect → with it. In sample: of the fit
+  itself; left out: of each mode by a fit that has not seen it; nested: the same, and the effect is searched for again
+  without that mode.
+- E_x, E_y, G_xy: what the effect changes each constant by, in standard deviations of the first fit.
+- Nearest: where nothing explains the board, the effect that comes nearest, and the error left out with it, in cents.
+
+"""
 COLUMNS = ("board", "verdict", "effects", "claim", "in sample", "left out", "nested", "E_x", "E_y", "G_xy", "nearest")
 
 
@@ -70,11 +82,16 @@ def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
             ", ".join(one.effects) or "-",
             "error reduced" if one.claim else "no claim",
             *(f"{_cents(merit.of(one.before))} → {_cents(merit.of(one.after))}" for merit in MERITS if merit.is_rms),
-            *(f"{shift.shift_in_sd:+.1f}" for shift in one.elastic_shift.values()),
+            *(_signed(shift.shift_in_sd) for shift in one.elastic_shift.values()),
             _nearest(one),
         )
         for name, one in diagnoses.items()
     ]
+
+
+def page(diagnoses: Mapping[str, Diagnosis]) -> str:
+    """What the columns are, and the table."""
+    return HEAD + markdown(diagnoses)
 
 
 def markdown(diagnoses: Mapping[str, Diagnosis]) -> str:
@@ -88,6 +105,12 @@ def _nearest(one: Diagnosis) -> str:
         return "-"
     nearest = one.finalists[0]
     return f"{', '.join(nearest.effects)}: {_cents(nearest.leave_one_out_rms_cents)}"
+
+
+def _signed(value: float) -> str:
+    """With its sign; what rounds to nothing is 0."""
+    shown = f"{value:+.1f}"
+    return "0" if float(shown) == 0.0 else shown
 
 
 def _cents(value: float | None) -> str:
@@ -106,7 +129,7 @@ def main() -> None:
         assert "transverse_shear" in diagnoses["paper-cantilever-fe"].effects
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        (arguments.out / "closing-the-loop.md").write_text(markdown(diagnoses), encoding="utf-8")
+        (arguments.out / "closing-the-loop.md").write_text(page(diagnoses), encoding="utf-8")
         with (arguments.out / "closing-the-loop.csv").open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream, lineterminator="\n").writerows([COLUMNS, *rows(diagnoses)])
 

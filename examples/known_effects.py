@@ -7,7 +7,8 @@ lacking, or the size is another one on that board. It is printed either way.
 
     python examples/known_effects.py --out known-effects
 
-prints one table and writes it as Markdown and as CSV with full precision, for every measured board of the shelf.
+prints one table and writes it as Markdown and as CSV with full precision, for every measured board that comes with
+the package.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def _cents(value: float | None) -> str:
 def main() -> None:
     """Compute, print the table, and write it where told."""
     parser = argparse.ArgumentParser(description="Error before and after known effects, board by board.")
-    parser.add_argument("boards", nargs="*", help="cards (default: the measured boards of the shelf)")
+    parser.add_argument("boards", nargs="*", help="cards (default: the measured boards that come with the package)")
     parser.add_argument("--out", type=Path, help="folder for known-effects.md and .csv")
     arguments = parser.parse_args()
     found = known_effects(arguments.boards or measured_boards())

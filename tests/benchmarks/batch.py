@@ -37,8 +37,9 @@ boards under way and of their finite elements is not there yet.
 HEAD = """# Many boards
 
 Written by `make batch`; do not edit. Simulated cards of one design with constants of their own, six readings each,
-through `bayesplate batch`, with the libraries' threads switched off. Two workers can be twice as fast at best. The Dask
-cluster runs without Dask's statistical profiler, whose record in each worker grows with time, whatever is computed.
+through `bayesplate batch`, with the libraries' threads switched off. Two workers can be about twice as fast at
+best. The Dask cluster runs without Dask's statistical profiler, whose record in each worker grows with time, whatever
+is computed. Different tables are a count: one means that all ways gave the same bytes.
 """
 _TICKS = os.sysconf("SC_CLK_TCK")
 _MEGABYTE = 1e6
@@ -204,7 +205,13 @@ def ratios(rows: Sequence[Measured]) -> Iterator[Ratio]:
 
 def page(rows: Sequence[Measured]) -> str:
     """The page of the runs and their ratios."""
-    lines = [HEAD, "| what | ratio | limit | |", "|---|---:|---:|---|", *(ratio.row for ratio in ratios(rows)), ""]
+    lines = [
+        HEAD,
+        "| what | ratio or count | limit | |",
+        "|---|---:|---:|---|",
+        *(ratio.row for ratio in ratios(rows)),
+        "",
+    ]
     lines += ["| boards | computed by | s | s per board | processor, s | memory, MB | of a worker, MB | load before |"]
     lines += ["|---:|---|---:|---:|---:|---:|---:|---:|"]
     for row in sorted(rows, key=lambda row: (row.boards, row.workers)):

@@ -31,7 +31,8 @@ Written by `make benchmarks`; do not edit. Every ratio is of two things that wer
 unit of cold times is a process of its own that poses a clamped board with five parameters and samples its linear law
 with emcee as it comes (stretch moves, vectorised, {walkers} walkers, {steps} steps). Effective draws are those of the
 parameter that has fewest, by the package's autocorrelation time; the median of {seeds} seeds counts, and the time
-includes the surrogate, the warm-up and every judgement of convergence.
+includes the surrogate, the warm-up and every judgement of convergence. Emcee walks here on the package's own posterior;
+beside other samplers, on a page of its own, it is given a density in NumPy, and its ratio there is another one.
 
 | what | ratio | limit | |
 |---|---:|---:|---|
@@ -91,7 +92,7 @@ def ratios(repeats: int) -> Iterator[Ratio]:
             board,
             4.0,
             (*options, "--effects", ",".join(effects)),
-            ", the limit from before its unlabelled peaks took part",
+            "; the limit was set before its unlabelled peaks took part in the fit",
         ),
     ):
         cold = timing.whole_fit(name, *more, repeats=repeats)

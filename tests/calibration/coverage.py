@@ -38,6 +38,13 @@ PAGES = {
     "two-setups": "Coverage: a board clamped and free, with a clamp that gives and whose grip is not known",
 }
 """Titles of what may be published, by the name of the page and of the command."""
+ABOUT = (
+    "Allowed: counts that a fit which is right keeps to; the chance that it leaves any of these bands, "
+    f"{100 * FAMILY_LEVEL:g} %, is shared among all rows. The rows pooled "
+    f"over the effects must lie within {100 * LEAST:g} to {100 * MOST:g} % too, and an effect speaks there by its main "
+    "parameter. The last column is how much the readings narrow a parameter: the posterior's standard deviation over "
+    "the prior's, the median of the boards. The control, intervals of half the width, must fail."
+)
 
 Interval = dict[str, float]
 
@@ -123,7 +130,7 @@ def judge(records: Sequence[Record]) -> tuple[list[str], bool]:
     caught = not any(count.is_within(level) for count in halved)
     well = all(count.is_within(level) for count in table)
     shown = ", ".join(f"{count.name} {_share(count)}" for count in halved)
-    lines.append(f"half the width, pooled: {shown}: {'outside' if caught else 'NOT CAUGHT'}")
+    lines.append(f"control, must fail: half the width, pooled: {shown}: {'outside' if caught else 'NOT CAUGHT'}")
     again = sum(record["attempts"] > 1 for record in good)
     redraws = sum(record["redraws"] for record in good)
     seconds = float(np.median([record["seconds"] for record in good]))
@@ -187,7 +194,7 @@ def main() -> int:
     print("\n".join(lines))
     if options.publish:
         page = "\n".join(lines).splitlines()
-        publish(options.publish, options.page, PAGES[options.page], f"make {options.page}", page)
+        publish(options.publish, options.page, PAGES[options.page], f"make {options.page}", page, ABOUT)
     print(f"{(time.perf_counter() - started) / 60:.1f} minutes")
     return 0 if well else 1
 

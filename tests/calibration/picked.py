@@ -207,7 +207,7 @@ def bars(records: Sequence[Record], key: str = "z") -> dict[str, bool]:
     n_false = sum(len(record["false"]) for record in records)
     stated = sum(sum(record["false"]) + sum(mode["spurious"] for mode in record["modes"]) for record in records)
     within = {
-        f"within {size:g} standard error{'s' if size > 1.0 else ''} as many as a normal law has": share
+        f"within {size:g} standard error{'s' if size > 1.0 else ''} at least as many as a normal law has": share
         >= wanted - 3.0 * sd
         for size, (wanted, share, sd) in zip(WITHIN, _shares(records, key), strict=True)
     }

@@ -70,7 +70,7 @@ def add_to(
     return records
 
 
-def publish(folder: Path, name: str, title: str, command: str, lines: Sequence[str]) -> None:
+def publish(folder: Path, name: str, title: str, command: str, lines: Sequence[str], about: str = "") -> None:
     """Write what a command found to a page of the documentation.
 
     Parameters
@@ -82,7 +82,10 @@ def publish(folder: Path, name: str, title: str, command: str, lines: Sequence[s
     title, command : str
     lines : sequence of str
         As they were printed.
+    about : str
+        What the lines have to be read with.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    text = [f"# {title}", "", f"Written by `{command}`; do not edit.", "", "```text", *lines, "```", ""]
+    head = [f"# {title}", "", f"Written by `{command}`; do not edit.", "", *([about, ""] if about else [])]
+    text = [*head, "```text", *lines, "```", ""]
     (folder / f"{name}.md").write_text("\n".join(text), encoding="utf-8")

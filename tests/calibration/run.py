@@ -27,12 +27,29 @@ from calibration.mutants import FITTED
 from calibration.pictures import ALT, draw
 from calibration.records import Record, add_to, read_done
 from calibration.sbc import identity, simulate_one
-from calibration.table import MUTANTS, NOT_COUNTED, family_p_value, is_calibrated, is_caught, rows, text
+from calibration.table import (
+    FAMILY_LEVEL,
+    MUTANT_LEVEL,
+    MUTANTS,
+    NOT_COUNTED,
+    family_p_value,
+    is_calibrated,
+    is_caught,
+    rows,
+    text,
+)
 from calibration.truths import Design
 
 FEWEST_OF_MUTANT = 60
 """Simulations in which every mutant is fitted, though some are found out by fewer."""
 TITLE = "Calibration of the posterior"
+ABOUT = (
+    "Of ranks: band p is the chance that the ranks of a fit that is right leave the flat line as far somewhere, chi2 p "
+    "that of a chi-squared of their histogram; beside them the mean rank, 0.5 if the fit is right, and how often the "
+    "middle 50 and 90 % of the draws hold the truth. A part is right if the smallest band p times the number of "
+    f"quantities, the family-wise p, is above {FAMILY_LEVEL:g}: of many quantities some leave their own 95 % band by "
+    f"chance. A mutant is caught if it is below {MUTANT_LEVEL:g}; what is wrong in it by construction is not counted."
+)
 SECTIONS = {
     "ranks": (
         "Ranks of the truth among draws",
@@ -244,7 +261,7 @@ def page(found: dict[str, list[str]], before: str = "", pictures: Container[str]
     pictures : container of str
         Parts of which there is a picture beside the page.
     """
-    head = f"# {TITLE}\n\nWritten by `make calibration`; do not edit. Each part stands as it was last run.\n"
+    head = f"# {TITLE}\n\nWritten by `make calibration`; do not edit. Each part stands as it was last run.\n\n{ABOUT}\n"
     kept = dict(block.split("\n", 1) for block in before.split("\n## ")[1:])
     parts_of_page = [head]
     for name, (title, what) in SECTIONS.items():

@@ -1,4 +1,4 @@
-"""Pick measured recordings: `python tests/calibration/run_measured.py --folder ../shared/data`.
+"""Pick measured recordings: `python tests/calibration/run_measured.py --folder recordings`.
 
 The raw hits of a free half-top (2R), its frequency response, and that of another (1R), against peaks that were read off
 by another method. The data have no stated licence and are not part of the project: where the folder is absent, this
@@ -35,6 +35,11 @@ from bayesplate.results.words import chances, percent
 
 WITHIN, MOST_FURTHER, HIGHEST, RATHER = 3e-3, 2, 1000.0, 0.5
 TITLE = "Peaks picked from measured recordings, against those that another method read off"
+ABOUT = (
+    "Hits and frequency responses of two free half-tops of spruce, 2R and 1R, by D. Badiane and others, from the "
+    "repository `David-Badiane/Data-driven-characterization-of-spruce-tonewood-plates` on GitHub (companion paper: doi "
+    "10.1121/10.0020559). The repository states no licence: the recordings are no part of this project."
+)
 AT = {"hammer": [(0.020, 0.020)], "sensor": [(0.560, 0.197)]}
 """Where the listing says that hammer and sensor were, m."""
 HALF_WIDTHS, DEGREES = (10.0, 15.0, 20.0, 25.0), (1, 2, 3)
@@ -138,7 +143,7 @@ def main() -> int:
         print("\n".join(lines), flush=True)
         is_right, told = is_right and agrees, [*told, *lines, ""]
     if options.publish is not None:
-        publish(options.publish, "measured-recordings", TITLE, "make measured", told[:-1])
+        publish(options.publish, "measured-recordings", TITLE, "make measured", told[:-1], ABOUT)
     return 0 if is_right else 1
 
 

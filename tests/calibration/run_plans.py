@@ -38,8 +38,17 @@ from calibration.plans import (
 )
 from calibration.records import Record, add_to, publish, read_done
 
+from bayesplate.diagnosis.decision.verdict import WITHIN
+
 SEED = 2
 """Boards of seed 1 were looked at while the trial was written."""
+ABOUT = (
+    "Boards whose readings leave two explanations, two effects or an effect and none; each is measured further, in one "
+    f"of four ways. Settled: the true explanation is then at least {WITHIN:g} times as probable as the other; wrongly: "
+    "the false one is. Min: mean minutes that it takes, by the plan's own costs. Boards passed over left more "
+    "explanations than two, or fewer, or not the true one, or had a label in doubt. The doubt is the entropy of the "
+    "probabilities of the two."
+)
 _WORDS = {
     "first": "the plan's first proposal",
     "random": "a random proposal",
@@ -140,7 +149,7 @@ def main() -> int:
     lines = told(records)
     print("\n".join(lines))
     if options.publish is not None:
-        publish(options.publish, "plans", "Plans, calibrated", "python tests/calibration/run_plans.py", lines)
+        publish(options.publish, "plans", "Plans, calibrated", "make plans", lines, ABOUT)
         draw(records, options.publish / "plans.png")
         with (options.publish / "plans.md").open("a", encoding="utf-8") as page:
             page.write("\n![Realised against expected drop of the doubt, and boards settled](plans.png)\n")

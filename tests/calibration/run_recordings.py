@@ -19,6 +19,11 @@ from calibration.picked import N_HITS, N_PLACES, RATE, SECONDS, Record, is_calib
 from calibration.records import add_to, publish, read_done
 
 BASE_SEED = 22
+ABOUT = (
+    "The bars on standard errors ask for at least as many errors within them as a normal law has, so that errors "
+    "stated somewhat too large meet them. The probability of no mode is a cautious figure, not a calibrated one: its "
+    "bar asks for no more false peaks among the likely ones than it states, and fewer meet it."
+)
 
 
 def run(n_recordings: int, workers: int, out: Path, *, quiet: bool = False) -> list[Record]:
@@ -47,7 +52,12 @@ def main() -> int:
     if options.publish is not None:
         command = "make recordings"
         publish(
-            options.publish, "recordings", "Picked modes of recordings: are their errors as stated?", command, lines
+            options.publish,
+            "recordings",
+            "Picked modes of recordings: are their errors as stated?",
+            command,
+            lines,
+            ABOUT,
         )
     return 0 if is_calibrated(records) else 1
 

@@ -40,6 +40,8 @@ N_MODES, MISSED, N_LABELLED = 16, 0.3, 2
 SPURIOUS = 1.0 / (1.0 + (1.0 - MISSED) * N_MODES)
 EDGES = (0.0, 0.05, 0.2, 0.5, 0.8, 0.95, 1.001)
 """Of bins of probability."""
+ALLOWED, COVERED = 4.0, (0.85, 0.95)
+"""Standard errors by which a bin of probability may be off; shares of truths that 90 % intervals may hold."""
 _SPARE_MODES = 12
 _MOST_REDRAWS = 100
 Record = dict[str, Any]
@@ -148,11 +150,24 @@ def reliability(
     return table
 
 
-def is_calibrated(records: Sequence[Record]) -> bool:
-    """Whether every bin is right within four standard errors, and no interval certainly outside 85 to 95 %."""
-    bins = all(abs(row["true"] - row["mean"]) <= 4.0 * row["sd"] + 1.0 / row["n"] for row in reliability(records))
+def bars(records: Sequence[Record]) -> dict[str, bool]:
+    """What must hold: every bin right within four standard errors, and no interval certainly outside 85 to 95 %."""
+    bins = reliability(records)
     held = coverage(records, "holds").values()
-    return bins and all(_may_be(hits, n, 0.85, 0.95) for hits, n in held)
+    low, high = COVERED
+    return {
+        f"every bin of probability within {ALLOWED:g} standard errors": all(
+            abs(row["true"] - row["mean"]) <= ALLOWED * row["sd"] + 1.0 / row["n"] for row in bins
+        ),
+        f"intervals of 90 % may hold the truth on {100 * low:g} to {100 * high:g} % of all boards": all(
+            _may_be(hits, n, low, high) for hits, n in held
+        ),
+    }
+
+
+def is_calibrated(records: Sequence[Record]) -> bool:
+    """Whether both bars are met."""
+    return all(bars(records).values())
 
 
 def _may_be(hits: int, n: int, low: float, high: float) -> bool:

@@ -36,8 +36,8 @@ def computed(example):
 
 
 def shown_rows():
-    lines = SHOWN.read_text(encoding="utf-8").splitlines()[2:]
-    return [tuple(cell.strip() for cell in line.strip("|").split("|")) for line in lines if line.startswith("|")]
+    lines = [line for line in SHOWN.read_text(encoding="utf-8").splitlines() if line.startswith("|")]
+    return [tuple(cell.strip() for cell in line.strip("|").split("|")) for line in lines[2:]]
 
 
 def test_a_hidden_effect_is_named_and_the_error_falls(computed):
@@ -67,6 +67,8 @@ def test_the_readme_says_what_the_table_shows():
     assert "on the nine measured ones [it claims no improvement](docs/validation/closing-the-loop.md)" in readme
     assert (len(rows), len(computed)) == (11, 2)
     assert all(row[1:3] == ("named", "transverse_shear") for row in computed.values())
+    assert "which it names, with a claim on one;" in readme
+    assert [row[3] for row in computed.values()].count("error reduced") == 1
     measured = [row for name, row in rows.items() if name not in computed]
     assert all(row[3] == "no claim" for row in measured)
     groups = [row for row in measured if row[1] == "indistinguishable group"]
@@ -75,12 +77,13 @@ def test_the_readme_says_what_the_table_shows():
     for name, _, effects, *_ in groups:
         assert f"{effects.replace('_', ' ').replace(', ', ' or ')} on {name}" in readme
     (nested,) = [row[6] for row in groups if row[0] == "spruce-free-1R"]
-    assert "goes from {} to {}".format(*nested.split(" → ")) in readme
+    assert "left out, the search repeated, goes from {} to {} cents".format(*nested.split(" → ")) in readme
     *_, nearest = rows["spruce-free-3L"]
     assert nearest.startswith("support_stiffness: ")
     before, after = rows["spruce-free-3L"][5].split(" → ")[0], nearest.split(": ")[1]
-    told = f"a support stiffness comes nearest on spruce-free-3L, {before} to {after} cents, and leaves more than noise"
-    assert f"On two nothing known explains it; {told}" in readme
+    told = f"a support stiffness comes nearest on spruce-free-3L, {before} to {after} cents"
+    measure = "with the search not repeated"
+    assert f"On two nothing known explains it; {told} {measure}, and leaves more than noise" in readme
     assert [row[1] for row in measured].count("unexplained") == 2
     assert [row[1] for row in measured].count("named") == 0
 
@@ -102,6 +105,15 @@ def test_the_readme_says_what_the_campaign_found():
         assert "refuses" not in one
 
 
+def test_the_page_that_is_shown_says_what_its_columns_are(example):
+    assert SHOWN.read_text(encoding="utf-8").startswith(example.HEAD)
+
+
+@pytest.mark.parametrize(("value", "shown"), [(0.0, "0"), (-0.04, "0"), (0.05, "+0.1"), (-1.25, "-1.2"), (2.0, "+2.0")])
+def test_what_rounds_to_nothing_has_no_sign(example, value, shown):
+    assert example._signed(value) == shown
+
+
 def test_every_board_is_shown(example):
     assert tuple(row[0] for row in shown_rows()) == example.BOARDS
 
@@ -110,7 +122,8 @@ def test_it_writes_its_table(example, computed, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(example, "close_the_loop", lambda boards: computed)
     monkeypatch.setattr(sys, "argv", ["closing_the_loop.py", "--out", str(tmp_path)])
     example.main()
-    assert (tmp_path / "closing-the-loop.md").read_text(encoding="utf-8").strip() in capsys.readouterr().out
+    assert (tmp_path / "closing-the-loop.md").read_text(encoding="utf-8") == example.page(computed)
+    assert example.page(computed).removeprefix(example.HEAD).strip() in capsys.readouterr().out
     with (tmp_path / "closing-the-loop.csv").open(newline="", encoding="utf-8") as stream:
         assert list(csv.reader(stream)) == [list(example.COLUMNS), list(example.rows(computed)[0])]
 

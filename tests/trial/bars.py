@@ -90,7 +90,9 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
         found.append(_at_least(f"top-1, {design}, 5 cents, 2x", share(records, is_best), least, beside=note))
     unseen = share(of("one", design=six, **large), is_not_needed)
     limit, of_all = NOT_NEEDED
-    found.append(_at_most(f"{six}, 5 cents, 2x: none needed", unseen, limit / of_all, beside=f"{limit} of {of_all}"))
+    found.append(
+        _at_most(f"{six}, 5 cents, 2x: none needed", unseen, limit / of_all, beside=f"bar: {limit} of {of_all}")
+    )
     for design in designs:
         records = of("outside", design=design)
         cause = taken_for(records, is_named)

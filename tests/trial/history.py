@@ -1,9 +1,14 @@
-"""What was changed before this run of the trial, as lines of its page."""
+"""What was changed before this run of the trial, as lines of its page: a sentence at its head, the rest at its end."""
 
 from __future__ import annotations
 
+BEFORE = (
+    "All boards are new: the run before this one missed 36 of the same 85 bars, and two rules of `diagnose` were "
+    "mended after it, before any board of this run was planted ([history](#history))."
+)
+
 CHANGED: tuple[str, ...] = (
-    "## What was changed before this run",
+    "## History",
     "",
     "The run before this one (base seed 6, as many boards) missed 36 of the same 85 bars. Two rules were mended after "
     "it, before any board of this run was planted; cells, sizes and bars are as they were:",
@@ -29,7 +34,4 @@ CHANGED: tuple[str, ...] = (
     "noise is drawn from its prior, is known, or readings are rounded; a stiffness gradient joined the library; an "
     "effect is needed at a false-alarm rate of 2 % and named only if the name survives other priors, another noise and "
     "the exact law; the most probable answer may be that nothing is lacking, and bars count all classes.",
-    "",
-    "`diagnose` solves two plausible effects together, for their shifts need not add. The trial does not: that would "
-    "take several times as long; pairs are judged as if their shifts added.",
 )

@@ -9,9 +9,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from trial.bars import PLANNED
 from trial.cells import CELLS, Cell
 from trial.counts import CONSTANTS, Record
-from trial.history import CHANGED
+from trial.history import BEFORE, CHANGED
 from trial.published import publish_records
 from trial.summary import COLUMNS, CONDITIONS, summarise
 
@@ -21,6 +22,32 @@ WAYS = {
     "averaged": "averaged over all hypotheses",
 }
 SHORT = "trial-short.md"
+WORDS: tuple[str, ...] = (
+    "Cells are written in short: `one cantilever-6 5c 2x` are cantilevers of which six modes are read with a noise of "
+    "5 cents, each with one effect of twice the nominal size. `null` has no effect, `two` has two, `outside` has one "
+    "that the library does not know, a crack or a glued rib; `cantilever-6-free-6` is the cantilever measured free as "
+    "well. The noise that a card states is a prior: the true noise is its median, or `drawn` from it, or the median "
+    "and `known` to 5 %; readings may be `rounded` to 1 Hz.",
+    "",
+    "- *named*, *unique*: the verdict is one answer. A name is wrong if it holds an effect that is not planted; one "
+    "of two planted effects is counted by itself.",
+    "- *flagged*: the verdict is a name, a group of effects that cannot be told apart, or unexplained.",
+    "- *the set given*: the effects of the name or the group, and those at most ten times less probable than the best.",
+    "- *top-1*, *best is right*: the most probable answer, whatever the verdict, is what is planted; it may be that "
+    "nothing is lacking.",
+    "- *relabelling*: no effect, but the labels of two neighbouring modes exchanged.",
+    "- *after tracing*: constants averaged over all hypotheses, each by its probability; *without tracing*: those of "
+    "the ideal plate.",
+    "",
+    "Bounds in brackets are 95 % bounds, those of shares exact (Clopper and Pearson). A bar is an upper or a lower "
+    "limit, or a range. It is met if both bounds keep to it, and not the estimate alone: with 300 boards, a bar of "
+    "2 % is met if at most one is named. One that is missed stays here as missed. A bar counts all classes of effects "
+    "that are planted; what the classes that were planned first would give by themselves stands in the notes: "
+    f"{', '.join(sorted(PLANNED))}.",
+    "",
+    "`diagnose` solves two plausible effects together, for their shifts need not add. The trial does not: that would "
+    "take several times as long; pairs are judged as if their shifts added.",
+)
 
 
 def write(records: Sequence[Record], base_seed: int, folder: Path, cells: Sequence[Cell] = CELLS) -> dict[str, Any]:
@@ -47,6 +74,7 @@ def in_short(summary: Mapping[str, Any]) -> str:
 
     six, both = "cantilever-6", "cantilever-6-free-6"
     right, wrong = "top-1, {}, 5 cents, 2x", "one {} 5c 2x: unique and wrong"
+    unknown = "outside the library, {}: falsely unique"
     sentences = (
         f"Of {sum(bar['n'] for bar in nothing)} planted boards that lack nothing, an effect was named on "
         f"{sum(bar['count'] for bar in nothing):.0f} and claimed on {bars['claim made on a null']['count']:.0f}.",
@@ -55,13 +83,24 @@ def in_short(summary: Mapping[str, Any]) -> str:
         f"{share(wrong.format(six))};",
         f"with six modes of the free board as well, on {share(right.format(both))} and {share(wrong.format(both))}.",
         "An effect that the library does not know is taken for one of its own on "
-        f"{share(f'outside the library, {six}: falsely unique')}.",
+        f"{share(unknown.format(six))}, with both setups on {share(unknown.format(both))}{_held_outside(summary)}.",
         "Intervals of 90 % for the constants, averaged over the effects, hold the truth on "
         f"{share(f'constants after tracing, {six}, 2x: 90 % intervals')}, those of the ideal plate on "
         f"{share(f'constants without tracing, {six}, 2x: visibly worse')}.",
         f"{sum(not bar['met'] for bar in bars.values())} of {len(bars)} bars are missed.",
     )
-    return textwrap.fill(" ".join(sentences), 118, break_on_hyphens=False)
+    return textwrap.fill(" ".join(sentences), 139, break_on_hyphens=False)
+
+
+def _held_outside(summary: Mapping[str, Any]) -> str:
+    """How often intervals hold the worst constant of boards with an effect that the library does not know."""
+    cells = [cell for name, cell in summary["cells"].items() if name.startswith("outside") and "constants" in cell]
+    if not cells:
+        return ""
+    shares = {name: [cell["constants"]["averaged"][name]["share"] for cell in cells] for name in CONSTANTS}
+    worst = min(shares, key=lambda name: max(shares[name]))
+    shown = " and ".join(f"{100 * one:.0f} %" for one in shares[worst])
+    return f"; with such an effect, 90 % intervals hold {worst} on {shown}"
 
 
 def plain(value: Any) -> Any:
@@ -88,12 +127,9 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         "unstated mass at the same place of its design, so that a card does not tell what is planted. Sizes are "
         "multiples of a nominal size; air and transverse shear keep theirs.",
         "",
-        "Bounds in brackets are exact 95 % bounds (Clopper and Pearson). A bar is met if the bound that could break it "
-        "does not; one that is missed stays here as missed. A bar counts all classes of effects that are planted. The "
-        "most probable answer may be that nothing is lacking. A name is wrong if it holds an effect that is not "
-        "planted; one of two planted effects is counted by itself.",
+        *WORDS,
         "",
-        *CHANGED,
+        BEFORE,
         "",
         f"{boards['judged']} boards of {boards['wanted']} judged, {boards['failed']} gave no answer, base seed "
         f"{summary['base_seed']}.",
@@ -108,6 +144,8 @@ def page(summary: Mapping[str, Any]) -> list[str]:
         *_constants(summary),
         *_amplitudes(summary),
         *_claims(summary),
+        "",
+        *CHANGED,
     ]
 
 
@@ -199,6 +237,11 @@ def _claims(summary: Mapping[str, Any]) -> Iterable[str]:
         for name, one in summary["claims"].items()
     ]
     yield from _table(("boards that are", "boards", "claimed", *judged), body)
+    yield from (
+        "",
+        "The conditions are judged only where the verdict is a name or a group: their shares are of those boards, the "
+        "share claimed is of all.",
+    )
 
 
 def _percent(found: Mapping[str, Any] | None, key: str = "share") -> str:

@@ -11,7 +11,7 @@ import pytest
 from trial.cells import Cell
 from trial.counts import is_best, is_covered, listed
 from trial.made_records import made
-from trial.page import page, plain, write
+from trial.page import in_short, page, plain, write
 from trial.published import as_text, publish_records, published_records
 from trial.summary import by_class, confusion, summarise
 
@@ -129,6 +129,15 @@ def test_records_in_the_repository_are_those_of_the_page():
     assert hashlib.sha256(as_text(records)).hexdigest() == shown["records"]["sha256"]
     again = plain(summarise(records, shown["base_seed"]))
     assert again == {key: value for key, value in shown.items() if key != "records"}
+
+
+def test_the_short_form_is_that_of_the_summary():
+    root = Path(__file__).parents[2] / "docs" / "validation"
+    shown = json.loads((root / "trial.json").read_text(encoding="utf-8"))
+    assert in_short(shown) == (root / "trial-short.md").read_text(encoding="utf-8").strip()
+    few = in_short(shown | {"cells": {}})
+    assert "intervals hold E_y" in in_short(shown)
+    assert "intervals hold E_y" not in few
 
 
 def test_the_readme_says_in_short_what_the_trial_found():

@@ -147,6 +147,8 @@ CHECKS = (
     ("trial-short", "make trial", "The same in a paragraph."),
 )
 """Long checks: the stem of their page or printed output, the command that makes it, and what it shows."""
+TITLES = {"trial-short": "The trial in short"}
+"""Of long checks that their stem does not say in words."""
 
 
 def _boards() -> list[str]:
@@ -303,7 +305,7 @@ def long_checks(folder: Path) -> str:
     others = {path.stem: "" for path in sorted(RESULTS.glob("*.md")) if path.stem not in known}
     for stem, shows in {**known, **others}.items():
         page, output = RESULTS / f"{stem}.md", RESULTS / f"{stem}.txt"
-        said = f"**{plain(stem).capitalize()}.** {shows}"
+        said = f"**{TITLES.get(stem, plain(stem).capitalize())}.** {shows}"
         if page.exists() and is_page(page):
             pages.append(f"{RESULTS.name}/{stem}")
             parts.append(f"{said} {{doc}}`What came out <{pages[-1]}>`.\n")

@@ -16,7 +16,8 @@ HEAD = """# Beside other samplers
 Written by `make peers`; do not edit. One posterior, that of `{board}` under the linear law: four parameters, six
 frequencies read to 1 Hz, each the probability of the interval that was rounded to it. Every sampler is given the same
 file of coefficients, priors and readings, and the estimate to start from, which the package has to find first. Each
-has an environment and a process of its own, on one thread.
+has an environment and a process of its own, on one thread. The peers evaluate a density in NumPy or JAX that was
+written for this comparison; the benchmarks, on a page of their own, give emcee the package's own posterior.
 
 - Cold time: a whole process, from its start to its exit, with draws in a file, that ends with at least
   {goal:,} effective draws of the parameter that has fewest. The length of the run is told to every peer; it was found
