@@ -113,6 +113,9 @@ _N_DRAWS = 4000
 _FEWEST_POSSIBLE = 0.05
 """Share of the draws that must be of a material: elsewhere those few say nothing of the others."""
 
+_FEWEST_OTHERS, _MOST_STRAYS = 4, 2
+"""Readings beside one that is asked about, at least; and readings asked about, at most: more say nothing."""
+
 _WITHIN = (0.025, 0.975)
 
 
@@ -143,9 +146,20 @@ class PriorPredictive:
 
         About chi-squared with a degree of freedom for each reading where the prior holds.
         """
-        covariance = np.atleast_2d(np.cov(self.draws, rowvar=False)) + _SLACK**2 * np.eye(self.draws.shape[1])
         off = log_frequencies - self.draws.mean(axis=0)
-        return float(off @ np.linalg.solve(covariance, off))
+        return float(off @ np.linalg.solve(self._covariance, off))
+
+    def without(self, reading: int, log_frequencies: Floats) -> tuple[float, float]:
+        """Distance of all readings but one, and ln f that they expect of that one."""
+        others = np.delete(np.arange(log_frequencies.size), reading)
+        off = log_frequencies[others] - self.draws.mean(axis=0)[others]
+        pulled = np.linalg.solve(self._covariance[np.ix_(others, others)], off)
+        expected = self.draws[:, reading].mean() + self._covariance[reading, others] @ pulled
+        return float(off @ pulled), float(expected)
+
+    @property
+    def _covariance(self) -> Floats:
+        return np.atleast_2d(np.cov(self.draws, rowvar=False)) + _SLACK**2 * np.eye(self.draws.shape[1])
 
 
 def prior_predictive(
@@ -224,7 +238,10 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
         [one for one in SUSPECTS if SLOWEST < speed / one.speed < FASTEST and (is_material or not one.is_of_a_unit)],
         rng,
     )
-    remedies = (*(one.question for one in likeliest), fault.remedy)
+    questions = [one.question for one in likeliest]
+    if not is_material and not likeliest:
+        questions = _strays(board, prior, rng)
+    remedies = (*questions, fault.remedy)
     asked = replace(fault, remedy="; ".join(filter(None, remedies)))
     if any(one.is_of_a_unit for one in likeliest):
         raise InputError(asked)
@@ -241,6 +258,24 @@ def _likeliest(board: Board, prior: PriorCard, suspects: Sequence[Suspect], rng:
     if chdtrc(measured.size, nearest) < _PROBABLE:
         return []
     return [one for one, distance in zip(suspects, distances, strict=True) if distance < nearest + _AS_NEAR]
+
+
+def _strays(board: Board, prior: PriorCard, rng: np.random.Generator) -> list[str]:
+    """Questions after the one reading without which the others are within the prior's reach; none where any may be."""
+    (found,) = prior_predictive(board, prior, rng)
+    measured = log_measured(board)
+    if found is None or measured.size <= _FEWEST_OTHERS:
+        return []
+    alone = [found.without(i, measured) for i in range(measured.size)]
+    nearest = min(distance for distance, _ in alone)
+    if chdtrc(measured.size - 1, nearest) < _PROBABLE:
+        return []
+    asked = [
+        f"is {name} at {np.exp(read):.4g} Hz right? the others expect about {float(f'{np.exp(expected):.2g}'):g} Hz"
+        for name, read, (distance, expected) in zip(board.short_reading_names, measured, alone, strict=True)
+        if distance < nearest + _AS_NEAR
+    ]
+    return asked if len(asked) <= _MOST_STRAYS else []
 
 
 def _no_material(board: Board, ratio: float) -> Fault:

@@ -244,6 +244,11 @@ class Board:
         """Setup and label of every reading, in the order of all results: "cantilever (1,0)"."""
         return tuple(f"{setup.name} {label}" for setup in self.setups for label in setup.labels)
 
+    @property
+    def short_reading_names(self) -> tuple[str, ...]:
+        """The same for sentences: without the setup where there is only one, "(1,0)"."""
+        return self.reading_names if len(self.setups) > 1 else tuple(map(str, self.setups[0].labels))
+
 
 def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup], **more: Any) -> Board:
     """A board from quantities in SI units, without a card.

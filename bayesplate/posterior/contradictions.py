@@ -96,5 +96,6 @@ def require_possible_noise(posterior: Posterior, centre: Floats) -> None:
     )
     raise NotIdentifiableError(
         f"{board.name}: the declared noise contradicts the data: chi^2 / dof = {misfit:.2g} at a noise of {levels}, "
-        "the most that its prior allows; nothing was sampled: state noise_percent as large as repeated readings differ"
+        "the most that its prior allows; nothing was sampled: look for a reading that is a decimal place off, or has "
+        "another's label, or state noise_percent as large as repeated readings differ"
     )

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +10,7 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
-from bayesplate.posterior.slips import DECIMALS, OCTAVES, Slip, SlipSearch
+from bayesplate.posterior.slips import DECIMALS, OCTAVES, Slip, SlipSearch, with_frequencies
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 
@@ -37,14 +34,15 @@ def slip_remarks(posterior: Posterior, centre: NDArray[np.float64]) -> tuple[str
     Returns
     -------
     tuple of str
-        The likeliest slip, or else the two readings whose order is least like the plate's; and whether the noise that
-        the residuals want is far above its prior.
+        The likeliest slip, or else the two readings whose order is least like the plate's, unless no plate fits; and
+        whether the noise that the residuals want is far above its prior.
     """
     search = SlipSearch(posterior, centre)
-    found, slip = [], search.likeliest()
+    is_lost = is_too_wide(posterior.board, search.log_widening)
+    found, slip = [], search.likeliest(anywhere=is_lost)
     if slip is not None:
         found.append(_exchange(search.board, slip) if slip.is_exchange else _stray(search, slip))
-    elif (slip := search.disordered()) is not None:
+    elif not is_lost and (slip := search.disordered()) is not None:
         found.append(_disorder(search.board, slip))
     return (*found, *noise_remarks(posterior.board, search.log_widening))
 
@@ -86,7 +84,7 @@ def _stray(search: SlipSearch, slip: Slip) -> str:
     kind = "an octave" if slip.factor in OCTAVES else "a decimal place" if slip.factor in DECIMALS else "misread"
     advice = "" if search.is_robust else " --robust gives it less say"
     return (
-        f"{_name(search.board, i)} at {measured:.5g} Hz is {apart} what the other modes expect, "
+        f"{search.board.short_reading_names[i]} at {measured:.5g} Hz is {apart} what the other modes expect, "
         f"{measured * np.exp(-gap):.4g} Hz: {kind}, or another mode?{advice}"
     )
 
@@ -95,7 +93,7 @@ def _exchange(board: Board, slip: Slip) -> str:
     frequencies = _frequencies(board)
     one, other = slip.readings
     frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
-    residuals = (weighted_least_squares(each).residuals for each in (board, _with_frequencies(board, frequencies)))
+    residuals = (weighted_least_squares(each).residuals for each in (board, with_frequencies(board, frequencies)))
     before, after = (cents(np.sqrt(np.mean(each**2))) for each in residuals)
     return (
         f"{_pair(board, slip)} fit far better exchanged, {after:.1f} cents rms in place of {before:.1f} "
@@ -119,21 +117,16 @@ def times(log_odds: float) -> str:
     return f"{odds:.2g} times" if odds < 100 else f"{float(f'{odds:.1g}'):,.0f} times"
 
 
-def _name(board: Board, reading: int) -> str:
-    labels = [str(label) for setup in board.setups for label in setup.labels]
-    return labels[reading] if len(board.setups) == 1 else board.reading_names[reading]
-
-
 def _pair(board: Board, slip: Slip) -> str:
     hertz = np.exp(log_measured(board))
-    return " and ".join(f"{_name(board, i)} at {hertz[i]:.5g} Hz" for i in slip.readings)
+    return " and ".join(f"{board.short_reading_names[i]} at {hertz[i]:.5g} Hz" for i in slip.readings)
 
 
 def _above_the_others(board: Board, reading: int) -> float:
     """How far a reading lies above what the others expect: ln measured - ln predicted, by least squares without it."""
     frequencies: list[Quantity | None] = [*_frequencies(board)]
     frequencies[reading] = None
-    values = weighted_least_squares(_with_frequencies(board, frequencies)).values
+    values = weighted_least_squares(with_frequencies(board, frequencies)).values
     models = (setup_model(system_of(board, setup), values) for setup in board.setups)
     predicted = np.concatenate([model.log_frequencies(values, "linear")[0] for model in models])
     return float(log_measured(board)[reading] - predicted[reading])
@@ -141,14 +134,3 @@ def _above_the_others(board: Board, reading: int) -> float:
 
 def _frequencies(board: Board) -> list[Quantity]:
     return [reading.frequency for setup in board.setups for reading in setup.readings]
-
-
-def _with_frequencies(board: Board, frequencies: Sequence[Quantity | None]) -> Board:
-    """The board with other frequencies of its readings, in their order; without those that are None."""
-    rest = iter(frequencies)
-    setups = []
-    for setup in board.setups:
-        pairs = [(reading, next(rest)) for reading in setup.readings]
-        kept = tuple(replace(reading, frequency=one) for reading, one in pairs if one is not None)
-        setups += [replace(setup, readings=kept)] if kept else []
-    return replace(board, setups=tuple(setups))

@@ -10,6 +10,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import design, refit
 from bayesplate.frequencies.laws import LawName, cents
@@ -125,6 +126,8 @@ def _fitted(
     predict, centre = predictor(board, models, "exact", centre), centre.copy()
     for _ in range(_MOST_LEVELS):
         start = np.clip(centre[columns], bounds.lower + _INSIDE, bounds.upper - _INSIDE)
+        if not np.isfinite(predict(start[None, :])).all():
+            raise NotIdentifiableError(_no_plate(board, models, parameters.values_at(centre)))
         centre[columns] = refit(predict, target, scales, start, bounds)
         if is_once:
             break
@@ -134,6 +137,18 @@ def _fitted(
             break
     centre[N_RIGIDITIES : parameters.first_input] = np.log(noise)
     return centre, scales
+
+
+def _no_plate(board: Board, models: Sequence[SetupModel], values: Values) -> str:
+    """That the plate which least squares found is not even near the readings, and which of them it misses most."""
+    target = log_measured(board)
+    residuals = target - np.concatenate([model.log_frequencies(values, "linear")[0] for model in models])
+    worst = int(np.argmax(np.abs(residuals)))
+    return (
+        f"{board.name}: no plate comes near the readings, least squares misses {board.short_reading_names[worst]} at "
+        f"{np.exp(target[worst]):.5g} Hz by {abs(cents(residuals[worst])):.0f} cents: is it a decimal place off, or "
+        "another mode?"
+    )
 
 
 def _with_peaks(models: Iterable[SetupModel], values: Values) -> tuple[SetupModel, ...]:

@@ -15,12 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from bayesplate.estimates.least_squares import log_measured
+from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
 from bayesplate.estimates.refit import N_CONSTANTS, most_likely, normal_misfit, sensitivities
+from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.board import Board
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior
+from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +43,8 @@ _ANYWHERE = np.log(16.0)
 """Width in ln f over which a reading of something else may lie: two octaves either way."""
 _OPEN = 1e-6
 """Sensitivity of ln f to the logarithm of a constant, in its best combination of readings, below which it is open."""
+_N_REFITTED = 3
+"""Slips, the likeliest to first order, whose odds after a refit are compared."""
 _NOISE_SDS = np.linspace(-3.0, 14.0, 69)
 
 
@@ -85,11 +92,22 @@ AS_READ = Slip(())
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Residuals and sensitivities of all readings at one point of the fitted columns."""
+    """Residuals and sensitivities of all readings at one point of the fitted columns, under a law that serves there."""
 
+    predict: Predictor
+    x: Floats
     residuals: Floats
     slopes: Floats
-    inputs: Floats
+
+    @classmethod
+    def at(cls, predict: Predictor, x: Floats, target: Floats) -> _Fit:
+        """Beside readings, (n_modes,) array of ln f."""
+        return cls(predict, x, target - predict(x[None, :])[0], sensitivities(predict, x))
+
+    @property
+    def inputs(self) -> Floats:
+        """Standard coordinates of the uncertain inputs."""
+        return self.x[N_CONSTANTS:]
 
 
 class SlipSearch:
@@ -107,18 +125,19 @@ class SlipSearch:
         self.board = posterior.board
         self.is_robust = posterior.robust
         self.target = log_measured(self.board)
-        self._bounds = posterior.parameters.fitted_bounds
-        self._predict = predictor(self.board, posterior.models, "exact", centre)
-        self._start = centre[posterior.parameters.fitted_columns]
+        self._parameters = posterior.parameters
         self._medians = np.array([setup.noise.median for setup in self.board.setups])
         self._log_sd = max(_LEAST_LOG_SD, *(setup.noise.log_sd for setup in self.board.setups))
         self._variances = np.stack(
             [reading_sd(self.board.setups, self._medians * np.exp(self._log_sd * z)) ** 2 for z in _NOISE_SDS]
         )
-        self.as_read = self._at(self._start, self.target)
+        predict = predictor(self.board, posterior.models, "exact", centre)
+        self.as_read = _Fit.at(predict, centre[self._parameters.fitted_columns], self.target)
+        if not np.isfinite(self.as_read.slopes).all():  # so far off that the exact law made there is of no plate
+            self.as_read = self._elsewhere(AS_READ) or self.as_read
         self.log_widening = self._log_sd * self._wanted_noise(posterior)
         if self.is_robust:  # there the centre is not where normal errors would have it
-            self.as_read = self.refitted(AS_READ)
+            self.as_read = self.refitted(AS_READ, self.as_read)
 
     def _wanted_noise(self, posterior: Posterior) -> float:
         """How far above the middle of its prior the noise lies that the residuals want, in steps of `_log_sd`."""
@@ -132,8 +151,14 @@ class SlipSearch:
             log_density += errors.log_likelihood(np.tile(predicted, (levels.size, 1)), levels).sum(axis=1)
         return float(_NOISE_SDS[np.argmax(log_density)])
 
-    def likeliest(self) -> Slip | None:
+    def likeliest(self, anywhere: bool = False) -> Slip | None:
         """The slip that explains the readings best, if it does so far better than noise and after a refit.
+
+        Parameters
+        ----------
+        anywhere : bool
+            Whether the plate may be quite another one than the readings as they are lead to. Each reading is left out
+            then in turn, and slips are weighed at what least squares finds without it, too.
 
         Returns
         -------
@@ -144,7 +169,7 @@ class SlipSearch:
             return None
         strays = [Slip((i,)) for i in range(n_modes)]
         off = [Slip((i,), factor) for i in range(n_modes) for factor in (*OCTAVES, *DECIMALS)]
-        best = self._refitted_best([*strays, *off, *self._pairs()])
+        best = self._refitted_best([*strays, *off, *self._pairs()], anywhere)
         return best if best is not None and best.log_odds > np.log(RARITY) else None
 
     def disordered(self) -> Slip | None:
@@ -162,35 +187,65 @@ class SlipSearch:
         ends = np.cumsum([0, *(len(setup.readings) for setup in self.board.setups)])
         return [Slip(pair) for first, last in pairwise(ends.tolist()) for pair in combinations(range(first, last), 2)]
 
-    def _refitted_best(self, slips: Sequence[Slip]) -> Slip | None:
-        """The likeliest of some slips to first order, with its odds after a refit; None if it cannot be weighed."""
-        if not slips:
-            return None
-        keeping = [slip for slip in slips if not slip.left_out]
-        shifts = np.array([slip.mended(self.target) for slip in keeping]).reshape(-1, self.target.size) - self.target
-        log_evidence = dict(zip(keeping, self._log_evidence(self.as_read, (), shifts), strict=True))
-        log_evidence |= {s: float(self._log_evidence(self.as_read, s.left_out)) for s in slips if s.left_out}
-        best = max(log_evidence, key=lambda slip: log_evidence[slip])
-        odds = self._log_evidence(self.refitted(best), best.left_out) - self._log_evidence(self.as_read, ())
-        return replace(best, log_odds=float(odds)) if np.isfinite(odds) else None
+    def _refitted_best(self, slips: Sequence[Slip], anywhere: bool = False) -> Slip | None:
+        """The likeliest of some slips, with its odds after a refit; None if none can be weighed."""
+        places = [self.as_read, *(self._elsewhere(Slip((i,))) for i in range(self.target.size) if anywhere)]
+        to_first_order = np.max([self._first_order(slips, place) for place in places if place is not None], axis=0)
+        tried = [slips[i] for i in np.argsort(-to_first_order, kind="stable")[: _N_REFITTED if anywhere else 1]]
+        weighed = [self._weighed(slip, anywhere) for slip in tried]
+        return max((slip for slip in weighed if np.isfinite(slip.log_odds)), key=lambda one: one.log_odds, default=None)
 
-    def refitted(self, slip: Slip) -> _Fit:
+    def _first_order(self, slips: Sequence[Slip], place: _Fit) -> Floats:
+        """ln of the probability of the readings with each slip, a fit to them moved by its slopes: (n_slips,) array."""
+        found = np.empty(len(slips))
+        keeping = [i for i, slip in enumerate(slips) if not slip.left_out]
+        shifts = np.array([slips[i].mended(self.target) for i in keeping]).reshape(-1, self.target.size) - self.target
+        found[keeping] = self._log_evidence(place, (), shifts)
+        for i, slip in enumerate(slips):
+            if slip.left_out:
+                found[i] = self._log_evidence(place, slip.left_out)
+        return found
+
+    def _weighed(self, slip: Slip, anywhere: bool) -> Slip:
+        """A slip with its odds after a refit."""
+        starts = [self.as_read, *([self._elsewhere(slip)] if anywhere else [])]
+        fits = [self.refitted(slip, one) for one in starts if one is not None]
+        evidence = max(float(self._log_evidence(fit, slip.left_out)) for fit in fits)
+        return replace(slip, log_odds=evidence - float(self._log_evidence(self.as_read, ())))
+
+    def refitted(self, slip: Slip, start: _Fit) -> _Fit:
         """Residuals of the most likely constants where a slip is mended."""
         target = slip.mended(self.target)
         scales = reading_sd(self.board.setups, self._medians * np.exp(self.log_widening))
-        x = most_likely(self._predict, normal_misfit(target, scales), self._start, self._bounds, slip.left_out)
-        return self._at(x, target)
+        bounds = self._parameters.fitted_bounds
+        x = most_likely(start.predict, normal_misfit(target, scales), start.x, bounds, slip.left_out)
+        return _Fit.at(start.predict, x, target)
 
-    def _at(self, x: Floats, target: Floats) -> _Fit:
-        return _Fit(target - self._predict(x[None, :])[0], sensitivities(self._predict, x), x[N_CONSTANTS:])
+    def _elsewhere(self, slip: Slip) -> _Fit | None:
+        """The readings beside the plate that least squares finds where a slip is mended, from a start of its own.
+
+        None where the readings lead to no plate at all.
+        """
+        frequencies = list(np.exp(slip.mended(self.target)))
+        kept = [None if i in slip.left_out else Quantity.exact(float(one)) for i, one in enumerate(frequencies)]
+        try:
+            values = weighted_least_squares(with_frequencies(self.board, kept)).values
+            models = [setup_model(system_of(self.board, setup), values) for setup in self.board.setups]
+        except (ValueError, KeyError):
+            return None
+        there = self._parameters.theta(values, self._medians)
+        return _Fit.at(
+            predictor(self.board, models, "linear", there), there[self._parameters.fitted_columns], self.target
+        )
 
     def _log_evidence(self, fit: _Fit, left_out: tuple[int, ...], shifts: Floats | float = 0.0) -> Floats:
         """ln of the probability of the readings over all noise levels; one per row of shifts of the residuals.
 
-        Minus infinity where they leave a constant open: then a slip cannot be weighed.
+        Minus infinity where they leave a constant open, or lead to no plate: then a slip cannot be weighed.
         """
         kept = np.setdiff1d(np.arange(self.target.size), left_out)
-        if np.linalg.matrix_rank(fit.slopes[kept, :N_CONSTANTS], tol=_OPEN) < N_CONSTANTS:
+        is_plate = np.isfinite(fit.residuals).all() and np.isfinite(fit.slopes).all()
+        if not is_plate or np.linalg.matrix_rank(fit.slopes[kept, :N_CONSTANTS], tol=_OPEN) < N_CONSTANTS:
             return np.full(np.shape(shifts)[:-1], -np.inf)
         return np.asarray(logsumexp(self._by_noise(fit, left_out, shifts), axis=0) - len(left_out) * np.log(_ANYWHERE))
 
@@ -202,3 +257,14 @@ class SlipSearch:
         residuals = (fit.residuals + shifts)[..., kept] + inputs @ fit.inputs
         found = log_probability(residuals, fit.slopes[kept, :N_CONSTANTS], self._variances[:, kept], inputs)
         return found - 0.5 * (_NOISE_SDS**2).reshape(-1, *[1] * (found.ndim - 1))
+
+
+def with_frequencies(board: Board, frequencies: Sequence[Quantity | None]) -> Board:
+    """A board with other frequencies of its readings, in their order; without those that are None."""
+    rest = iter(frequencies)
+    setups = []
+    for setup in board.setups:
+        pairs = [(reading, next(rest)) for reading in setup.readings]
+        kept = tuple(replace(reading, frequency=one) for reading, one in pairs if one is not None)
+        setups += [replace(setup, readings=kept)] if kept else []
+    return replace(board, setups=tuple(setups))

@@ -237,6 +237,21 @@ def test_a_plate_of_no_material_is_refused_under_any_prior_and_no_unit_is_blamed
     assert "ten times" not in told
 
 
+def test_one_reading_that_makes_a_plate_of_no_material_is_asked_about():
+    """A decimal place in a mode along the grain: no unit, no exchange, and the others tell what they expect."""
+    _, board = of_spruce()
+    (setup,) = board.setups
+    at = next(i for i, one in enumerate(setup.readings) if one.beams == (2, 0))
+    wrong = replace(setup.readings[at], frequency=setup.readings[at].frequency.scaled(0.1))
+    readings = (*setup.readings[:at], wrong, *setup.readings[at + 1 :])
+    told = asked(replace(board, setups=(replace(setup, readings=readings),)), "weakly-informative")
+    assert "nu_xy nu_yx is below 1" in told
+    assert f"is {wrong.label} at {wrong.frequency.mean:.4g} Hz right? the others expect about " in told
+    expected = float(told.split("expect about ")[1].split()[0])
+    assert expected == pytest.approx(10.0 * wrong.frequency.mean, rel=0.15)
+    assert told.count("right?") == 1
+
+
 def test_a_plate_of_no_material_is_refused_also_where_no_exchange_mends_it():
     """A square plate as stiff both ways, and a Poisson ratio above one: nothing to be exchanged."""
     _, board = of_spruce(20e9, 18e9, L_x=0.3, L_y=0.3)
