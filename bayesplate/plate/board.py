@@ -109,9 +109,10 @@ class Board:
         unknown = set(priors) - set(self.inputs)
         if unknown:
             raise ValueError(f"priors: wanted names of {', '.join(self.inputs)}, got {', '.join(sorted(unknown))}")
-        return replace(
-            self, parameters=tuple(replace(one, prior=priors.get(one.name, one.prior)) for one in self.parameters)
+        stated = (
+            replace(one, prior=priors[one.name], assumed=None) if one.name in priors else one for one in self.parameters
         )
+        return replace(self, parameters=tuple(stated))
 
     def without(self, effects: Collection[str]) -> Board:
         """The board without some of its declared effects, by their names."""
@@ -155,10 +156,11 @@ class Board:
             Or the density; exactly one of the two.
         density : Quantity, number or array of readings, kg m^-3
         poisson_xy : Quantity, number or array of readings
-            By default that of the prior, where it states one, else 0.4 ± 0.08.
+            By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08.
         prior : str or PriorCard
             Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
-            what uses the board: `Problem.from_card(board, prior=prior)`.
+            what uses the board: `Problem.from_card(board, prior=prior)`. What is not stated of noise and Poisson ratio
+            is taken from the prior that is given there.
         effects : sequence of str
             Declared effects.
         shear_xz, shear_yz : Quantity, number or array of readings, Pa
@@ -184,10 +186,9 @@ class Board:
         0.003
         """
         card = load_prior(prior) if isinstance(prior, str) else prior
-        poisson = card.poisson_xy or DEFAULT_POISSON if poisson_xy is None else poisson_xy
         stated = {
             "length_x": length_x, "length_y": length_y, "thickness": thickness, "mass": mass, "density": density,
-            "poisson_xy": poisson, "shear_xz": shear_xz, "shear_yz": shear_yz,
+            "poisson_xy": poisson_xy, "shear_xz": shear_xz, "shear_yz": shear_yz,
         }  # fmt: skip
         quantities: dict[str, Quantity] = {}
         faults = []
@@ -204,7 +205,8 @@ class Board:
         return made_board(
             name,
             quantities,
-            [setup.with_noise_of(card) for setup in held],
+            [setup.assuming_noise(card) if setup.is_noise_assumed else setup for setup in held],
+            assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or DEFAULT_POISSON,
             prior=prior if isinstance(prior, str) else prior.name,
             effects=tuple(effects),
             title=title,
@@ -245,7 +247,13 @@ class Board:
         return tuple(f"{setup.name} {label}" for setup in self.setups for label in setup.labels)
 
 
-def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup], **more: Any) -> Board:
+def made_board(
+    name: str,
+    inputs: Mapping[str, Quantity],
+    setups: Sequence[Setup],
+    assumed_poisson: Quantity | None = None,
+    **more: Any,
+) -> Board:
     """A board from quantities in SI units, without a card.
 
     Parameters
@@ -256,6 +264,8 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
         was read at places becomes the mean over the board of the field that the readings tell of.
     setups : sequence of Setup
         What their clamps cover becomes parameters too.
+    assumed_poisson : Quantity, optional
+        A Poisson ratio that nobody stated, where `inputs` has none.
     **more
         Other attributes of `Board`.
 
@@ -264,7 +274,11 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
     Board
     """
     inputs = {**inputs, **_means_of_fields(inputs)}
-    stated = [Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1]) for key, prior in inputs.items()]
+    assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}
+    stated = [
+        Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1], assumed=assumed.get(key))
+        for key, prior in {**inputs, **assumed}.items()
+    ]
     covered = [parameter for setup in setups for parameter in setup.clamped_parameters]
     return Board(name, (*stated, *covered), tuple(setups), **more)
 

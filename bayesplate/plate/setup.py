@@ -31,10 +31,10 @@ NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median
 
 
 def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
-    """The relative noise where none is stated: that of the prior, otherwise the one of such edges."""
+    """The relative noise where none is stated, that of the prior or else of such edges: an object of its own."""
     if prior is not None and prior.noise_percent is not None:
         return prior.noise_percent.scaled(1e-2)
-    return CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE
+    return replace(CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE)
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,8 @@ class Setup:
         None: not declared.
     group : Owner or None
         The group of sessions that the setup is one of (`bayesplate.plate.sessions`).
+    assumed : Quantity or None
+        The noise that was taken because nobody stated one; see `is_noise_assumed`.
     """
 
     name: str
@@ -103,6 +105,7 @@ class Setup:
     hammer: tuple[float, float] | None = None
     air: DeclaredAir | None = None
     group: Owner | None = None
+    assumed: Quantity | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def from_frequencies(
@@ -137,7 +140,8 @@ class Setup:
         resolution : float, Hz
             Step to which plain numbers are rounded; 0 if they are not.
         noise : Quantity, optional
-            Relative, log-normal: 0.005 is half a per cent. By default that of the prior or of the edges, as on a card.
+            Relative, log-normal: 0.005 is half a per cent. By default that of the prior that the board is used with,
+            or else of the edges, as on a card.
         first_label : tuple of int
         clamped : dict of Quantity, number or array of readings, m
             What a clamp covers, by edge.
@@ -188,12 +192,12 @@ class Setup:
         faults += no_peaks
         if faults:
             raise InputError(faults)
-        return cls(
+        made = cls(
             name=name,
             ends_x=(cast(End, words["x0"]), cast(End, words["x1"])),
             ends_y=(cast(End, words["y0"]), cast(End, words["y1"])),
             readings=tuple(readings),
-            noise=assumed_noise(tuple(words.values())) if noise is None else noise,
+            noise=DEFAULT_NOISE if noise is None else noise,
             clamped=covered,
             resolution=float(resolution),
             peaks=peaks,
@@ -203,11 +207,17 @@ class Setup:
             hammer=hammer,
             air=air,
         )
+        return made.assuming_noise() if noise is None else made
 
-    def with_noise_of(self, prior: PriorCard) -> Setup:
-        """The setup with the noise that a prior card states, if it does and the setup states none of its own."""
-        words = self.ends_x + self.ends_y
-        return replace(self, noise=assumed_noise(words, prior)) if self.noise == assumed_noise(words) else self
+    def assuming_noise(self, prior: PriorCard | None = None) -> Setup:
+        """The setup with the noise of a prior, or else of its edges, in place of any that it has."""
+        noise = assumed_noise(self.ends_x + self.ends_y, prior)
+        return replace(self, noise=noise, assumed=noise)
+
+    @property
+    def is_noise_assumed(self) -> bool:
+        """Whether the noise is still the very object that was assumed: whoever states another one replaces it."""
+        return self.noise is self.assumed
 
     @property
     def edges(self) -> dict[str, str]:

@@ -69,7 +69,7 @@ def board(**changed):
 
 
 def test_a_board_from_numbers_is_that_of_the_card_with_the_same_numbers(tmp_path):
-    """Exactly: readings, inputs, noise, the prior's Poisson ratio; only what the card left unsaid is now said."""
+    """Exactly: readings, inputs, noise, the prior's Poisson ratio; what the card left unsaid stays unsaid."""
     path = tmp_path / "my-board.toml"
     path.write_text(CARD, encoding="utf-8")
     made, read = prepare(board()).board, prepare(path).board
@@ -103,6 +103,28 @@ def test_what_is_not_said_is_what_a_card_assumes():
     assert board(prior=noisy).setups[0].noise.median == pytest.approx(0.01)
     own = Q.from_median(0.002, 1.2)
     assert board(prior=noisy, setups=setup(noise=own)).setups[0].noise == own
+
+
+def test_what_nobody_stated_is_that_of_the_prior_which_is_given_in_the_end():
+    """However the board was made and varied; what was stated stays, the usual numbers among it."""
+    noise, ratio = Q.from_median(0.02, 1.3), Q.from_mean(0.3, 0.01, "normal")
+    mine = prior(noise=noise, poisson_xy=ratio)
+    fewer = replace(board(), setups=tuple(replace(one, readings=one.readings[:3]) for one in board().setups))
+    for one in (board(), fewer, board(prior=mine), prepare("spruce-free-2R").stated):
+        text = one.to_card()
+        assert not any(key in text for key in ("noise_percent", "poisson_xy"))
+        found = prepare(one, prior=mine).board
+        assert (found.inputs["poisson_xy"], found.setups[0].noise.median) == (ratio, pytest.approx(0.02))
+    usual = {"setups": setup(noise=DEFAULT_NOISE), "poisson_xy": Q.from_mean(0.4, 0.08, "normal")}
+    (same,) = (replace(one, noise=DEFAULT_NOISE) for one in board().setups)
+    for one in (
+        board(**usual),
+        board(prior=mine, **usual),
+        replace(board(), setups=(same,)).with_priors({"poisson_xy": usual["poisson_xy"]}),
+    ):
+        found = prepare(one, prior=mine).board
+        assert found.inputs["poisson_xy"] == usual["poisson_xy"]
+        assert found.setups[0].noise.median == pytest.approx(0.003)
 
 
 def test_peaks_are_numbers_readings_quantities_or_peaks():
