@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.cards import MISSED, SPURIOUS, CoefficientCard, PriorCard
+from bayesplate.cards.stated import is_place, quantity_of, wrong_types
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 from bayesplate.plate.measured import NO_OFFSET, Peak, Reading, label_text, peaks_of
@@ -30,6 +32,10 @@ CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
 
 
+def _is_noise(value: object) -> bool:
+    return isinstance(value, Quantity) and not value.is_exact
+
+
 def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
     """The relative noise where none is stated, that of the prior or else of such edges: an object of its own."""
     if prior is not None and prior.noise_percent is not None:
@@ -45,6 +51,12 @@ class AttachedItem:
     places: tuple[tuple[float, float], ...]
     mass: Quantity | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.places, list | tuple) or not all(map(is_place, self.places)):
+            raise InputError(wrong_types(str(self.kind), [("places", self.places, False, "((x, y), ...) in m")]))
+        if self.mass is not None:
+            object.__setattr__(self, "mass", quantity_of(self.mass, f"{self.kind} mass", "in kg"))
+
 
 @dataclass(frozen=True)
 class DeclaredAir:
@@ -52,6 +64,10 @@ class DeclaredAir:
 
     density: Quantity | None = None
     baffle: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.density is not None:
+            object.__setattr__(self, "density", quantity_of(self.density, "air density", "in kg/m^3"))
 
 
 @dataclass(frozen=True)
@@ -106,6 +122,11 @@ class Setup:
     air: DeclaredAir | None = None
     group: Owner | None = None
     assumed: Quantity | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "noise", quantity_of(self.noise, f"{self.name} noise", "relative"))
+        covered = {edge: quantity_of(one, f"{self.name} clamped {edge}", "in m") for edge, one in self.clamped.items()}
+        object.__setattr__(self, "clamped", covered)
 
     @classmethod
     def from_frequencies(
@@ -163,7 +184,25 @@ class Setup:
         InputError
             With every label, frequency, peak and name of an edge that cannot be read.
         """
-        faults: list[Fault] = []
+        faults = list(wrong_types(str(name), (
+            ("name", name, isinstance(name, str), "a text"),
+            ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
+            ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
+            ("noise", noise, noise is None or _is_noise(noise), NOISE_WANTED),
+            ("resolution", resolution, isinstance(resolution, Real), "a number, in Hz"),
+            ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
+            ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
+            ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),
+            ("unlabelled", unlabelled, isinstance(unlabelled, list | tuple | np.ndarray), "a list of peaks"),
+            ("attached", attached, isinstance(attached, list | tuple)
+             and all(isinstance(one, AttachedItem) for one in attached), "a list of AttachedItem"),
+            ("hammer", hammer, hammer is None or is_place(hammer), "a place (x, y) in m"),
+            ("air", air, isinstance(air, DeclaredAir | None), "a DeclaredAir"),
+            ("published_coefficients", published_coefficients,
+             isinstance(published_coefficients, CoefficientCard | None), "a CoefficientCard"),
+        )))  # fmt: skip
+        if faults:
+            raise InputError(faults)
         if not isinstance(edges, str) and set(edges) != set(EDGES):
             faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
         words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
@@ -181,13 +220,9 @@ class Setup:
             if edge not in EDGES:
                 faults.append(Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(edge)))
             try:
-                covered[edge] = Quantity.of(length)
-            except ValueError as error:
-                faults.append(Fault(f"{name} clamped {edge}", "a length in m", repr(length), str(error)))
-        if not (noise is None or (isinstance(noise, Quantity) and not noise.is_exact)):
-            faults.append(Fault(f"{name} noise", NOISE_WANTED, repr(noise)))
-        if np.asarray(resolution).dtype.kind not in "iuf":
-            faults.append(Fault(f"{name} resolution", "a number, in Hz", repr(resolution)))
+                covered[edge] = quantity_of(length, f"{name} clamped {edge}", "in m")
+            except InputError as error:
+                faults += error.faults
         peaks, no_peaks = peaks_of(unlabelled, name)
         faults += no_peaks
         if faults:
