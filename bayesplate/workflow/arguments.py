@@ -165,6 +165,12 @@ def _effects(name: str, value: object) -> Iterator[Fault]:
             yield Fault(f"{name} {number}", "each name once", f"{quoted(effect)} again")
 
 
+def _between(name: str, value: object) -> Iterator[Fault]:
+    yield from _effects(name, value)
+    if isinstance(value, list | tuple) and not value:
+        yield Fault(name, "one name of an effect or more, or None", "an empty list")
+
+
 def _files(name: str, value: object) -> Iterator[Fault]:
     if isinstance(value, str | os.PathLike) or not isinstance(value, list | tuple) or not value:
         yield Fault(name, "a list of one path or more", _shown(value), "files=[path]")
@@ -256,7 +262,7 @@ _CHECKS: dict[str, Check] = {
     "sand": _sand,
     "goal": _word(GOALS),
     "costs": _costs,
-    "between": _effects,
+    "between": _between,
     "board": _board,
     "prior_card": _prior_card,
     "request": _request,
