@@ -108,6 +108,8 @@ class Board:
 
     def with_priors(self, priors: Mapping[str, Quantity | ArrayLike]) -> Board:
         """The board with other priors of some of its parameters, by their names; numbers as in `from_numbers`."""
+        if not isinstance(priors, Mapping):
+            raise InputError(wrong_types(self.name, [("priors", priors, False, "a dict of quantities by name")]))
         faults = [_unknown("priors", name, self.inputs) for name in priors if name not in self.inputs]
         stated, unread = _quantities(priors, "priors")
         if faults or unread:

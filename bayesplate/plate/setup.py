@@ -36,6 +36,10 @@ def _is_noise(value: object) -> bool:
     return isinstance(value, Quantity) and not value.is_exact
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
     """The relative noise where none is stated, that of the prior or else of such edges: an object of its own."""
     if prior is not None and prior.noise_percent is not None:
@@ -189,7 +193,7 @@ class Setup:
             ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
             ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
             ("noise", noise, noise is None or _is_noise(noise), NOISE_WANTED),
-            ("resolution", resolution, isinstance(resolution, Real), "a number, in Hz"),
+            ("resolution", resolution, _is_number(resolution), "a number, in Hz"),
             ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
             ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
             ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),

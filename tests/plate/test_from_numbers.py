@@ -242,6 +242,7 @@ BAD = {
     "priors": (lambda: board().with_priors({"masss": 0.04, "mass": "40 g"}),
                ["priors: wanted one of length_x, length_y, thickness, mass, poisson_xy, got masss (did you mean mass?)",
                 "priors mass: wanted a number, an array of readings or a Quantity, SI, got '40 g'"]),
+    "priors in a list": (lambda: board().with_priors([0.04]), ["my-board priors: wanted a dict of quantities by name"]),
     "a setup": (lambda: board().setup("fre"), ["setup: wanted one of free, got fre (did you mean free?)"]),
     "a parameter": (lambda: board().parameter("nu"), ["parameter: wanted one of length_x, length_y, thickness, mass"]),
     "a bounded peak": (lambda: board(setups=setup(unlabelled=[Q.from_range(440.0, 450.0)])).to_card(),
