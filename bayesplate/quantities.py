@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
-from typing import Literal
+from numbers import Real
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_ndtr, ndtr, ndtri
+
+from bayesplate.errors import Fault, InputError
 
 Kind = Literal["normal", "log-normal", "log-uniform"]
 Floats = NDArray[np.float64]
@@ -56,31 +59,41 @@ class Quantity:
     place_sd: float = 0.0
 
     def __post_init__(self) -> None:
+        faults = tuple(self._faults())
+        if faults:
+            raise InputError(faults)
+
+    def _faults(self) -> Iterator[Fault]:
+        """What makes no quantity of these values."""
+        if self.kind not in get_args(Kind):
+            yield Fault("kind", ", ".join(get_args(Kind)), repr(self.kind))
         if not math.isfinite(self.mean):
-            raise ValueError(f"mean: wanted a finite number, got {self.mean}")
-        if not (math.isfinite(self.sd) and self.sd >= 0):
-            raise ValueError(f"sd: wanted a finite number, zero or positive, got {self.sd}")
+            yield Fault("mean", "a finite number", f"{self.mean}")
+        for name, size in (("sd", self.sd), ("resolution", self.resolution), ("place_sd", self.place_sd)):
+            if not 0 <= size < math.inf:
+                yield Fault(name, "a finite number, zero or positive", f"{size}")
         if self.kind == "log-normal" and self.sd > 0 and self.mean <= 0:
-            raise ValueError(f"mean: wanted a positive number for a log-normal quantity, got {self.mean}")
-        if self.kind == "log-uniform" and not 0 < self.lower < self.upper < math.inf:
-            raise ValueError(f"bounds: wanted 0 < lower < upper, got {self.lower} and {self.upper}")
-        if not self.lower < self.upper:
-            raise ValueError(f"bounds: wanted lower < upper, got {self.lower} and {self.upper}")
+            yield Fault("mean", "a positive number for a log-normal quantity", f"{self.mean}")
+        is_range = self.kind == "log-uniform"
+        if not self.lower < self.upper or (is_range and not 0 < self.lower < self.upper < math.inf):
+            wanted = "0 < lower < upper" if is_range else "lower < upper"
+            yield Fault("bounds", wanted, f"{self.lower} and {self.upper}")
         for places in (self.at_x, self.at_y):
             if places and len(places) != len(self.readings):
-                raise ValueError(f"places: wanted one per reading ({len(self.readings)}), got {len(places)}")
+                yield Fault("places", f"one per reading ({len(self.readings)})", f"{len(places)}")
 
     @classmethod
     def exact(cls, value: float) -> Quantity:
         """A number without uncertainty."""
-        return cls(float(value), kind="log-normal" if value > 0 else "normal")
+        number = _number("value", value)
+        return cls(number, kind="log-normal" if number > 0 else "normal")
 
     @classmethod
     def from_mean(
         cls, mean: float, sd: float, kind: Kind = "log-normal", lower: float = -math.inf, upper: float = math.inf
     ) -> Quantity:
         """A number with a standard deviation, both in the quantity's unit; log-normal unless said otherwise."""
-        return cls(float(mean), float(sd), kind, lower, upper)
+        return cls(_number("mean", mean), _number("sd", sd), kind, _number("lower", lower), _number("upper", upper))
 
     @classmethod
     def from_median(cls, median: float, factor: float) -> Quantity:
@@ -93,8 +106,9 @@ class Quantity:
         factor : float
             Above 1: about two thirds of the probability lies between median / factor and median * factor.
         """
-        if not (median > 0 and factor > 1):
-            raise ValueError(f"wanted median > 0 and factor > 1, got {median} and {factor}")
+        median, factor = _number("median", median), _number("factor", factor)
+        if not (0 < median < math.inf and 1 < factor < math.inf):
+            raise InputError(Fault("median and factor", "median > 0 and factor > 1", f"{median} and {factor}"))
         variance = math.log(factor) ** 2
         mean = median * math.exp(variance / 2)
         return cls(mean, mean * math.sqrt(math.expm1(variance)))
@@ -102,8 +116,9 @@ class Quantity:
     @classmethod
     def from_range(cls, lower: float, upper: float) -> Quantity:
         """A quantity whose logarithm is uniform between two positive bounds, in the quantity's unit."""
+        lower, upper = _number("lower", lower), _number("upper", upper)
         if not 0 < lower < upper < math.inf:
-            raise ValueError(f"bounds: wanted 0 < lower < upper, got {lower} and {upper}")
+            raise InputError(Fault("bounds", "0 < lower < upper", f"{lower} and {upper}"))
         width = math.log(upper / lower)
         mean = (upper - lower) / width
         return cls(mean, math.sqrt((upper**2 - lower**2) / (2.0 * width) - mean**2), "log-uniform", lower, upper)
@@ -136,19 +151,25 @@ class Quantity:
         place_sd : float
             See the class.
         """
-        values = tuple(float(value) for value in readings)
+        given: object = readings
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise InputError(Fault("readings", "a list or an array of numbers", repr(readings)))
+        values = tuple(_number("readings", value) for value in readings)
         if not values:
-            raise ValueError("readings: wanted at least one, got none")
+            raise InputError(Fault("readings", "at least one", "none"))
+        if not all(map(math.isfinite, values)):
+            raise InputError(Fault("readings", "finite numbers", f"{list(values)}"))
+        resolution = _number("resolution", resolution)
         # statistics computes with fractions: equal readings have a variance of exactly zero
         scatter = statistics.variance(values) / len(values) if len(values) > 1 else 0.0
-        places_x, places_y = (tuple(float(value) for value in places) for places in (at_x, at_y))
+        places_x, places_y = (tuple(_number("places", value) for value in places) for places in (at_x, at_y))
         n_places = len(set(zip_longest(places_x, places_y)))
         sd = math.sqrt(scatter + resolution**2 / 12 / (len(values) if n_places > 1 else 1))
-        return cls(statistics.mean(values), sd, kind, readings=values, resolution=float(resolution),
-                   at_x=places_x, at_y=places_y, place_sd=float(place_sd))  # fmt: skip
+        return cls(statistics.mean(values), sd, kind, readings=values, resolution=resolution,
+                   at_x=places_x, at_y=places_y, place_sd=_number("place_sd", place_sd))  # fmt: skip
 
     @classmethod
-    def of(cls, stated: Quantity | ArrayLike, kind: Kind = "log-normal") -> Quantity:
+    def of(cls, stated: Quantity | ArrayLike | None, kind: Kind = "log-normal") -> Quantity:
         """What was stated as a quantity: a number is exact, an array holds readings, a quantity stays.
 
         Parameters
@@ -163,16 +184,19 @@ class Quantity:
 
         Raises
         ------
-        ValueError
+        InputError
             If it is none of these, or not finite.
         """
         if isinstance(stated, Quantity):
             return stated
-        values = np.asarray(stated)
+        try:
+            values = np.asarray(stated)
+        except ValueError:  # rows of different lengths
+            values = np.asarray(None)
         if values.dtype.kind not in "iuf":
-            raise ValueError(f"wanted a number, an array of readings or a Quantity, got {stated!r}")
+            raise InputError(Fault("quantity", "a number, an array of readings or a Quantity", repr(stated)))
         if not np.isfinite(values).all():
-            raise ValueError(f"wanted finite numbers, got {stated!r}")
+            raise InputError(Fault("quantity", "finite numbers", repr(stated)))
         if values.ndim:
             return cls.from_readings(values.astype(np.float64).ravel().tolist(), kind=kind)
         return cls.exact(float(values))
@@ -395,6 +419,14 @@ class Quantity:
             at_y=tuple(place * factor for place in self.at_y),
             place_sd=self.place_sd * factor,
         )
+
+
+def _number(place: str, value: object) -> float:
+    """A number as such; raises InputError for a text, a truth value and an array."""
+    is_scalar = isinstance(value, np.ndarray) and not value.ndim and value.dtype.kind in "iuf"
+    if isinstance(value, bool) or not (is_scalar or isinstance(value, Real)):
+        raise InputError(Fault(place, "a number", repr(value)))
+    return float(value)  # type: ignore[arg-type]
 
 
 def _log_probability(low: float, high: float) -> float:

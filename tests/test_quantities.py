@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from bayesplate.errors import InputError
 from bayesplate.quantities import Quantity
 
 LOG_NORMAL = Quantity.from_mean(3.0, 0.6)
@@ -143,11 +144,30 @@ def test_scaled_bounds_keep_the_density() -> None:
         (lambda: Quantity.from_readings([]), "readings: wanted at least one, got none"),
         (lambda: Quantity.from_readings([1.0, 2.0], at_x=[0.0]), "places: wanted one per reading"),
         (lambda: Quantity.from_median(1.0, 1.0), "wanted median > 0 and factor > 1"),
+        (lambda: Quantity.from_median("1", 2.0), "median: wanted a number, got '1'"),
+        (lambda: Quantity.from_mean(None, 1.0), "mean: wanted a number, got None"),
+        (lambda: Quantity.from_mean(1.0, 1.0, "uniform"), "kind: wanted normal, log-normal, log-uniform, got 'uniform"),
+        (lambda: Quantity.from_range(2.0, 1.0), "bounds: wanted 0 < lower < upper, got 2.0 and 1.0"),
+        (lambda: Quantity.from_readings([1.0, 2.0], resolution=-1), "resolution: wanted a finite number, zero or pos"),
+        (lambda: Quantity.from_readings([1.0, math.inf]), "readings: wanted finite numbers"),
+        (lambda: Quantity.from_readings("12"), "readings: wanted a list or an array of numbers, got '12'"),
+        (lambda: Quantity.exact([1.0]), r"value: wanted a number, got \[1.0\]"),
+        (lambda: Quantity.of([[1.0], [1.0, 2.0]]), "quantity: wanted a number, an array of readings or a Quantity"),
+    ],
+)
+def test_what_makes_no_quantity_is_refused(make: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
         (lambda: Quantity.exact(1.0).scaled(0), "factor: wanted a positive number, got 0"),
         (lambda: Quantity(1.0, 1.0, "normal").log_sd, "log_sd: wanted the quantity of a positive thing"),
     ],
 )
-def test_refuses(make: object, message: str) -> None:
+def test_what_a_quantity_cannot_do_is_refused(make: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()  # type: ignore[operator]
 

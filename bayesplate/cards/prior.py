@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,8 +16,9 @@ from bayesplate.cards.measures import DENSITY, QuantityReader, read_factor, read
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.schema import Section, validated
 from bayesplate.cards.shelf import find
+from bayesplate.cards.stated import wrong_types
 from bayesplate.cards.values import Choice, Complaint, Number, Refusal, read_format, read_name, read_text
-from bayesplate.cards.words import shown
+from bayesplate.cards.words import did_you_mean, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.quantities import Quantity
 
@@ -125,7 +126,7 @@ class PriorCard(Section):
         constants : dict of Quantity
             E_x, E_y, G_xy in Pa, or D_x, D_y, D_s in N m; each from `Quantity.from_median` or `Quantity.from_range`.
         source : str or dict of str
-            Where the numbers come from: one text, or one per name (also of noise, poisson_xy, density_kg_m3).
+            Where the numbers come from: one text, or one for each of them (also noise, poisson_xy, density_kg_m3).
         noise : Quantity, optional
             Relative noise of a frequency, from `Quantity.from_median`.
         poisson_xy : Quantity, optional
@@ -145,33 +146,42 @@ class PriorCard(Section):
         """
         from bayesplate.cards.writing import prior_text
 
-        faults = [
-            *(Fault(f"{name} {key}", "one of E_x, E_y, G_xy, D_x, D_y, D_s", "an unknown name")
-              for key in constants if key not in (*ELASTIC, *RIGIDITY)),
-            *(Fault(f"{name} {key}", "Quantity.from_median or Quantity.from_range, a constant known to some extent",
-                    "another kind of quantity") for key, one in constants.items() if not _is_of_a_card(one)),
-        ]  # fmt: skip
-        if noise is not None and not (_is_of_a_card(noise) and noise.kind == "log-normal"):
-            faults.append(Fault(f"{name} noise", "Quantity.from_median", "another kind of quantity"))
-        if poisson_xy is not None and (poisson_xy.is_exact or poisson_xy.kind != "normal"):
-            wanted = 'Quantity.from_mean(0.4, 0.08, "normal")'
-            faults.append(Fault(f"{name} poisson_xy", wanted, "another kind of quantity"))
-        if density is not None and (density.is_exact or density.kind != "log-normal"):
-            faults.append(Fault(f"{name} density", "Quantity.from_mean(430, 60)", "another kind of quantity"))
+        faults = list(wrong_types(str(name), (
+            ("name", name, isinstance(name, str), "a text"),
+            ("title", title, isinstance(title, str), "a text"),
+            ("constants", constants, isinstance(constants, Mapping), "a dict of quantities by name"),
+            ("source", source, isinstance(source, str | Mapping), "a text, or a dict of texts by name"),
+        )))  # fmt: skip
+        if faults:
+            raise InputError(faults)
+        if not isinstance(source, str):  # as `sources` has it, for a prior that is made of another one
+            source = {"noise" if key == "noise_percent" else key: one for key, one in source.items()}
+        faults = [Fault(f"{name} {key}", "one of E_x, E_y, G_xy, D_x, D_y, D_s", "an unknown name")
+                  for key in constants if key not in (*ELASTIC, *RIGIDITY)]  # fmt: skip
+        known = "Quantity.from_median or Quantity.from_range, a constant known to some extent"
+        for key, quantity, kinds, wanted in (
+            *((key, one, ("log-normal", "log-uniform"), known) for key, one in constants.items()),
+            ("noise", noise, ("log-normal",), "Quantity.from_median"),
+            ("poisson_xy", poisson_xy, ("normal",), 'Quantity.from_mean(0.4, 0.08, "normal")'),
+            ("density", density, ("log-normal",), "Quantity.from_mean(430, 60)"),
+        ):
+            if not (_is_of_a_card(quantity, kinds) or (quantity is None and key not in constants)):
+                got = "another kind of quantity" if isinstance(quantity, Quantity) else repr(quantity)
+                faults.append(Fault(f"{name} {key}", f"{wanted}, without bounds", got))
+        further = {"noise": noise, "poisson_xy": poisson_xy, "density_kg_m3": density}
+        stated = {**constants, **{key: one for key, one in further.items() if one is not None}}
+        faults += _source_faults(name, source, stated)
         if faults:
             raise InputError(faults)
 
-        def stated(key: str, quantity: Quantity) -> StatedPrior:
-            return StatedPrior(quantity, source if isinstance(source, str) else source.get(key, ""))
-
-        further: dict[str, Any] = {key: stated(key, one) for key, one in constants.items()}
-        if noise is not None:
-            further["stated_noise"] = stated("noise", noise.scaled(100.0))
-        if poisson_xy is not None:
-            further["stated_poisson"] = stated("poisson_xy", poisson_xy)
-        if density is not None:
-            further["stated_density"] = stated("density_kg_m3", density)
-        return read_prior_text(prior_text(cls.model_construct(format=1, name=name, title=title, **further)), name)
+        fields = {"noise": "stated_noise", "poisson_xy": "stated_poisson", "density_kg_m3": "stated_density"}
+        priors: dict[str, Any] = {
+            fields.get(key, key): StatedPrior(
+                one.scaled(100.0) if key == "noise" else one, source if isinstance(source, str) else source[key]
+            )
+            for key, one in stated.items()
+        }
+        return read_prior_text(prior_text(cls.model_construct(format=1, name=name, title=title, **priors)), name)
 
     def to_card(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
         """The prior as a card, in TOML.
@@ -265,10 +275,27 @@ def _read_prior(data: bytes, file: str, stem: str) -> PriorCard:
     return validated(PriorCard, table, file, faults=[*name_faults(table, file, stem), *_set_faults(table, file)])
 
 
-def _is_of_a_card(quantity: Quantity) -> bool:
-    """Whether a prior card can state the density of a constant: log-normal without bounds, or log-uniform."""
-    is_free = quantity.lower == -math.inf and quantity.upper == math.inf
-    return not quantity.is_exact and (quantity.kind == "log-uniform" or (quantity.kind == "log-normal" and is_free))
+def _is_of_a_card(quantity: object, kinds: tuple[str, ...]) -> bool:
+    """Whether a prior card can state a density: it is of such a kind, and has no bounds but those of its kind."""
+    if not isinstance(quantity, Quantity) or quantity.is_exact or quantity.kind not in kinds:
+        return False
+    return quantity.kind == "log-uniform" or (quantity.lower == -math.inf and quantity.upper == math.inf)
+
+
+def _source_faults(name: str, source: str | Mapping[str, str], stated: Collection[str]) -> Iterator[Fault]:
+    """Sources that are empty or lacking, and those of a name that a prior cannot have."""
+    wanted = "where the numbers come from"
+    if isinstance(source, str):
+        if not source.strip():
+            yield Fault(f"{name} source", wanted, "an empty text")
+        return
+    known = (*ELASTIC, *RIGIDITY, "noise", "poisson_xy", "density_kg_m3")
+    for key in source:
+        if key not in known:
+            yield Fault(f"{name} source {key}", f"one of {', '.join(known)}", str(key), did_you_mean(str(key), known))
+    for key in stated:
+        if not isinstance(source.get(key), str) or not source[key].strip():
+            yield Fault(f"{name} source {key}", wanted, repr(source.get(key)))
 
 
 def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:

@@ -207,10 +207,10 @@ def _predicted(
 
 
 def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) -> None:
-    """Ask about the one mistake that makes all readings wrong together, where there is one.
+    """Ask about the one mistake that makes all readings wrong together, where there is one; refuse the impossible.
 
     Asked where the readings are out of the prior's reach, or would need a material that there is not, and mending one
-    of `SUSPECTS` brings them within it.
+    of `SUSPECTS` brings them within it. Refused in any case where no material carries sound so fast or so slowly.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
     Raises
     ------
     InputError
-        If a unit is the likeliest mistake.
+        If a unit is the likeliest mistake, or no material carries sound so and there is no other suspect.
     NotIdentifiableError
         If the likeliest mistake is that two sides, constants or orders stand for each other.
     """
@@ -247,6 +247,8 @@ def require_plausible(board: Board, prior: PriorCard, rng: np.random.Generator) 
         raise InputError(asked)
     if likeliest or not is_material:
         raise NotIdentifiableError(str(asked))
+    if not SLOWEST < speed < FASTEST:
+        raise InputError(asked)
 
 
 def _likeliest(board: Board, prior: PriorCard, suspects: Sequence[Suspect], rng: np.random.Generator) -> list[Suspect]:
@@ -291,7 +293,7 @@ def _contradiction(board: Board, prior: PriorCard, speed: float, rng: np.random.
     place = f"{board.name}.toml frequencies_hz"
     if not SLOWEST < speed < FASTEST:
         wanted = f"those of a material that carries sound at {SLOWEST:g} to {FASTEST:g} m/s"
-        return Fault(place, wanted, f"{speed:.3g} m/s")
+        return Fault(place, wanted, f"{speed:.3g} m/s", "are units, sizes and labels right?")
     measured = log_measured(board)
     (predicted,) = prior_predictive(board, prior, rng)
     if predicted is None or chdtrc(measured.size, predicted.distance(measured)) > _IMPROBABLE:

@@ -73,13 +73,15 @@ def prior_laws(
 ) -> tuple[BareLaw, ...]:
     """The modes of a station at the prior's median, and at plates drawn from it; the median first.
 
-    A plate on which a mode is not to be found is passed over.
+    A plate of no material, nu_xy nu_yx >= 1, and one on which a mode is not to be found are passed over.
     """
     laws = [bare_law(beliefs.board, station, values)]
     drawn = {name: one.sample(rng, N_PLATES) for name, one in prior.constants.items()}
     for i in range(N_PLATES):
         plain = {name: value for name, value in values.items() if name not in RIGIDITIES}
         there = with_rigidities({**plain, **{name: np.asarray(each[i]) for name, each in drawn.items()}})
+        if not all(np.isfinite(there[name]) for name in RIGIDITIES):
+            continue
         try:
             laws.append(bare_law(beliefs.board, station, there))
         except (KeyError, BayesplateError):

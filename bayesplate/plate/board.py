@@ -6,18 +6,20 @@ import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
+from bayesplate.cards.stated import quantity_of, wrong_types
+from bayesplate.cards.words import did_you_mean
 from bayesplate.cards.writing import write_card
 from bayesplate.errors import Fault, InputError
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
 from bayesplate.plate.setup import Setup
-from bayesplate.quantities import Quantity
+from bayesplate.quantities import Kind, Quantity
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
@@ -88,12 +90,12 @@ class Board:
         return {parameter.name: parameter.prior for parameter in self.uncertain}
 
     def parameter(self, name: str) -> Parameter:
-        """The parameter of a name."""
-        return next(parameter for parameter in self.parameters if parameter.name == name)
+        """The parameter of a name; raises InputError with the names that there are."""
+        return _named("parameter", name, self.parameters)
 
     def setup(self, name: str) -> Setup:
-        """The setup of a name."""
-        return next(setup for setup in self.setups if setup.name == name)
+        """The setup of a name; raises InputError with the names that there are."""
+        return _named("setup", name, self.setups)
 
     def nominal(self) -> dict[str, NDArray[np.float64]]:
         """Mean of every parameter."""
@@ -104,13 +106,24 @@ class Board:
         joined = {parameter.name: parameter for parameter in (*self.parameters, *parameters)}
         return replace(self, parameters=tuple(joined.values()))
 
-    def with_priors(self, priors: Mapping[str, Quantity]) -> Board:
-        """The board with other priors of some of its parameters, by their names."""
-        unknown = set(priors) - set(self.inputs)
-        if unknown:
-            raise ValueError(f"priors: wanted names of {', '.join(self.inputs)}, got {', '.join(sorted(unknown))}")
+    def with_priors(self, priors: Mapping[str, Quantity | ArrayLike]) -> Board:
+        """The board with other priors of some of its parameters, by their names; numbers as in `from_numbers`."""
+        if not isinstance(priors, Mapping):
+            raise InputError(wrong_types(self.name, [("priors", priors, False, "a dict of quantities by name")]))
+        faults = [_unknown("priors", name, self.inputs) for name in priors if name not in self.inputs]
+        stated, unread = _quantities(priors, "priors")
+        if faults or unread:
+            raise InputError([*faults, *unread])
         return replace(
-            self, parameters=tuple(replace(one, prior=priors.get(one.name, one.prior)) for one in self.parameters)
+            self,
+            parameters=tuple(
+                replace(one, prior=stated[one.name], assumed=None) if one.name in stated else one
+                for one in self.parameters
+            ),
+            setups=tuple(
+                replace(one, clamped={e: stated.get(one.input_name(e), length) for e, length in one.clamped.items()})
+                for one in self.setups
+            ),
         )
 
     def without(self, effects: Collection[str]) -> Board:
@@ -134,7 +147,7 @@ class Board:
         mass: Quantity | ArrayLike | None = None,
         density: Quantity | ArrayLike | None = None,
         poisson_xy: Quantity | ArrayLike | None = None,
-        prior: str | PriorCard = "weakly-informative",
+        prior: str | os.PathLike[str] | PriorCard = "weakly-informative",
         effects: Sequence[str] = (),
         shear_xz: Quantity | ArrayLike | None = None,
         shear_yz: Quantity | ArrayLike | None = None,
@@ -155,10 +168,11 @@ class Board:
             Or the density; exactly one of the two.
         density : Quantity, number or array of readings, kg m^-3
         poisson_xy : Quantity, number or array of readings
-            By default that of the prior, where it states one, else 0.4 ± 0.08.
-        prior : str or PriorCard
+            By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08.
+        prior : str, path or PriorCard
             Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
-            what uses the board: `Problem.from_card(board, prior=prior)`.
+            what uses the board: `Problem.from_card(board, prior=prior)`. What is not stated of noise and Poisson ratio
+            is taken from the prior that is given there.
         effects : sequence of str
             Declared effects.
         shear_xz, shear_yz : Quantity, number or array of readings, Pa
@@ -171,7 +185,7 @@ class Board:
         Raises
         ------
         InputError
-            With every value that is no number, no array of numbers and no quantity.
+            With every value that is no number, no array of numbers and no quantity, and every argument of another type.
 
         Examples
         --------
@@ -183,29 +197,32 @@ class Board:
         >>> board.inputs["thickness"].mean
         0.003
         """
-        card = load_prior(prior) if isinstance(prior, str) else prior
-        poisson = card.poisson_xy or DEFAULT_POISSON if poisson_xy is None else poisson_xy
+        faults = list(wrong_types(str(name), (
+            ("name", name, isinstance(name, str), "a text"),
+            ("setups", setups, isinstance(setups, Setup) or _are(setups, Setup), "a Setup or a list of them"),
+            ("prior", prior, isinstance(prior, str | os.PathLike | PriorCard), "a name, a path or a PriorCard"),
+            ("effects", effects, _are(effects, str), "a list of names of effects"),
+            ("title", title, isinstance(title, str), "a text"),
+            ("source", source, isinstance(source, str), "a text"),
+        )))  # fmt: skip
         stated = {
             "length_x": length_x, "length_y": length_y, "thickness": thickness, "mass": mass, "density": density,
-            "poisson_xy": poisson, "shear_xz": shear_xz, "shear_yz": shear_yz,
+            "poisson_xy": poisson_xy, "shear_xz": shear_xz, "shear_yz": shear_yz,
         }  # fmt: skip
-        quantities: dict[str, Quantity] = {}
-        faults = []
-        for key, value in stated.items():
-            try:
-                if value is not None:
-                    quantities[key] = Quantity.of(value, "normal" if key == "poisson_xy" else "log-normal")
-            except ValueError as error:
-                faults.append(Fault(f"{name} {key}", "a number, an array of readings or a Quantity, SI", str(error)))
-        if faults:
-            raise InputError(faults)
+        needed = ("length_x", "length_y", "thickness")
+        values = {key: one for key, one in stated.items() if one is not None or key in needed}
+        quantities, unread = _quantities(values, str(name))
+        if faults or unread:
+            raise InputError([*faults, *unread])
+        card = prior if isinstance(prior, PriorCard) else load_prior(prior)
         shear = {key: quantities.pop(key, None) for key in ("shear_xz", "shear_yz")}
         held = (setups,) if isinstance(setups, Setup) else tuple(setups)
         return made_board(
             name,
             quantities,
-            [setup.with_noise_of(card) for setup in held],
-            prior=prior if isinstance(prior, str) else prior.name,
+            [setup.assuming_noise(card) if setup.is_noise_assumed else setup for setup in held],
+            assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or DEFAULT_POISSON,
+            prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
             effects=tuple(effects),
             title=title,
             source=source,
@@ -250,7 +267,49 @@ class Board:
         return self.reading_names if len(self.setups) > 1 else tuple(map(str, self.setups[0].labels))
 
 
-def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup], **more: Any) -> Board:
+def _quantities(
+    stated: Mapping[str, Quantity | ArrayLike | None], place: str
+) -> tuple[dict[str, Quantity], list[Fault]]:
+    """Quantities by name from what was stated of them, and what cannot be one."""
+    found: dict[str, Quantity] = {}
+    faults: list[Fault] = []
+    for name, value in stated.items():
+        kind: Kind = "normal" if name == "poisson_xy" else "log-normal"
+        try:
+            found[name] = quantity_of(value, f"{place} {name}", "SI", kind)
+        except InputError as error:
+            faults += error.faults
+    return found, faults
+
+
+def _are(values: object, kind: type) -> bool:
+    """Whether it is a list or tuple of things of one kind."""
+    return isinstance(values, list | tuple) and all(isinstance(one, kind) for one in values)
+
+
+def _unknown(place: str, name: object, known: Iterable[str]) -> Fault:
+    names = tuple(known)
+    near = did_you_mean(name, names) if isinstance(name, str) else ""
+    return Fault(place, f"one of {', '.join(names)}", str(name), near)
+
+
+Named = TypeVar("Named", Parameter, Setup)
+
+
+def _named(place: str, name: str, among: Iterable[Named]) -> Named:
+    by_name = {one.name: one for one in among}
+    if name not in by_name:
+        raise InputError(_unknown(place, name, by_name))
+    return by_name[name]
+
+
+def made_board(
+    name: str,
+    inputs: Mapping[str, Quantity],
+    setups: Sequence[Setup],
+    assumed_poisson: Quantity | None = None,
+    **more: Any,
+) -> Board:
     """A board from quantities in SI units, without a card.
 
     Parameters
@@ -261,6 +320,8 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
         was read at places becomes the mean over the board of the field that the readings tell of.
     setups : sequence of Setup
         What their clamps cover becomes parameters too.
+    assumed_poisson : Quantity, optional
+        A Poisson ratio that nobody stated, where `inputs` has none.
     **more
         Other attributes of `Board`.
 
@@ -269,7 +330,11 @@ def made_board(name: str, inputs: Mapping[str, Quantity], setups: Sequence[Setup
     Board
     """
     inputs = {**inputs, **_means_of_fields(inputs)}
-    stated = [Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1]) for key, prior in inputs.items()]
+    assumed = {} if assumed_poisson is None else {"poisson_xy": assumed_poisson}
+    stated = [
+        Parameter(key, BOARD, prior, INPUTS[key][0], words=INPUTS[key][1], assumed=assumed.get(key))
+        for key, prior in {**inputs, **assumed}.items()
+    ]
     covered = [parameter for setup in setups for parameter in setup.clamped_parameters]
     return Board(name, (*stated, *covered), tuple(setups), **more)
 

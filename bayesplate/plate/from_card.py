@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from bayesplate.cards import BoardCard, CoefficientCard, PriorCard, SetupSection
 from bayesplate.plate.board import Board, made_board
-from bayesplate.plate.setup import AttachedItem, DeclaredAir, Peak, Reading, Setup, assumed_noise
+from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredAir, Peak, Reading, Setup
 from bayesplate.quantities import Quantity
 
 NO_TABLES: Mapping[str, CoefficientCard] = MappingProxyType({})
@@ -43,18 +43,21 @@ def board_from_card(
         inputs["mass"] = card.plate.mass_g.scaled(_MILLI)
     elif card.plate.density_kg_m3 is not None:
         inputs["density"] = card.plate.density_kg_m3
-    inputs["poisson_xy"] = _poisson(card, prior)
+    assumed = _assumed_poisson(card, prior)
+    if assumed is None:
+        inputs["poisson_xy"] = card.material.poisson_xy
     return made_board(
         card.name,
         inputs,
         setups,
+        assumed_poisson=assumed,
         title=card.title,
         source=card.source,
         prior=card.material.prior,
         effects=tuple(card.effects),
         shear_xz=_optional(card.material.shear_xz_gpa, 1e9),
         shear_yz=_optional(card.material.shear_yz_gpa, 1e9),
-        notes=_notes(card, inputs["poisson_xy"]),
+        notes=_notes(assumed),
     )
 
 
@@ -62,16 +65,11 @@ def _optional(quantity: Quantity | None, factor: float) -> Quantity | None:
     return None if quantity is None else quantity.scaled(factor)
 
 
-def _poisson(card: BoardCard, prior: PriorCard | None) -> Quantity:
-    if card.material.poisson_is_default and prior is not None and prior.poisson_xy is not None:
-        return prior.poisson_xy
-    return card.material.poisson_xy
-
-
-def _noise(section: SetupSection, prior: PriorCard | None) -> Quantity:
-    if section.noise_percent is not None:
-        return section.noise_percent.scaled(_PERCENT)
-    return assumed_noise(tuple(section.edges.words.values()), prior)
+def _assumed_poisson(card: BoardCard, prior: PriorCard | None) -> Quantity | None:
+    """The Poisson ratio of the prior, or else the usual one, if the card states none."""
+    if not card.material.poisson_is_default:
+        return None
+    return prior.poisson_xy if prior is not None and prior.poisson_xy is not None else card.material.poisson_xy
 
 
 def _joined_with_rounding(frequency: Quantity, resolution: float | None) -> Quantity:
@@ -83,7 +81,8 @@ def _joined_with_rounding(frequency: Quantity, resolution: float | None) -> Quan
 
 def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCard | None) -> Setup:
     edges, first = section.edges, section.first_label
-    return Setup(
+    stated = section.noise_percent
+    made = Setup(
         name=section.name,
         ends_x=(edges.x0, edges.x1),
         ends_y=(edges.y0, edges.y1),
@@ -102,7 +101,7 @@ def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCar
         peaks=tuple(_peaks(section)),
         missed=section.missed_probability,
         spurious=section.spurious_probability,
-        noise=_noise(section, prior),
+        noise=DEFAULT_NOISE if stated is None else stated.scaled(_PERCENT),
         first_label=first,
         published_coefficients=table,
         attached=tuple(
@@ -116,6 +115,7 @@ def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCar
         hammer=None if section.hammer is None else (section.hammer.at_mm[0] * _MILLI, section.hammer.at_mm[1] * _MILLI),
         air=None if section.air is None else DeclaredAir(section.air.density_kg_m3, section.air.baffle),
     )
+    return made.assuming_noise(prior) if stated is None else made
 
 
 def _peaks(section: SetupSection) -> Iterator[Peak]:
@@ -127,8 +127,8 @@ def _peaks(section: SetupSection) -> Iterator[Peak]:
         yield Peak(_joined_with_rounding(peak.hz, section.resolution_hz), peak.sign, peak.amplitude, damping)
 
 
-def _notes(card: BoardCard, poisson: Quantity) -> tuple[str, ...]:
-    notes = []
-    if card.material.poisson_is_default:
-        notes.append(f"the card gives no Poisson ratio: nu_xy = {poisson.mean:g} ± {poisson.sd:g} was assumed")
-    return tuple(notes)
+def _notes(assumed_poisson: Quantity | None) -> tuple[str, ...]:
+    if assumed_poisson is None:
+        return ()
+    told = f"nu_xy = {assumed_poisson.mean:g} ± {assumed_poisson.sd:g} was assumed"
+    return (f"the card gives no Poisson ratio: {told}",)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from bayesplate.cards.stated import quantity_of
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 from bayesplate.quantities import Quantity
@@ -44,6 +45,9 @@ class Reading:
     amplitude: float | None = None
     damping: float | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frequency", quantity_of(self.frequency, f"frequency of {self.label}", "in Hz"))
+
     @property
     def is_sure(self) -> bool:
         """Whether the label cannot be wrong."""
@@ -79,11 +83,7 @@ class Reading:
             If the label cannot be read, or the frequency is no number.
         """
         read = Label.parse(label_text(label))
-        try:
-            quantity = Quantity.of(frequency)
-        except ValueError as error:
-            wanted = "a number, an array of readings or a Quantity, in Hz"
-            raise InputError(Fault(f"frequency of {read}", wanted, repr(frequency), str(error))) from None
+        quantity = quantity_of(frequency, f"frequency of {read}", "in Hz")
         return cls(read, (read.m - first_label[0], read.n - first_label[1]), quantity, sign)
 
 
@@ -106,6 +106,9 @@ class Peak:
     sign: str = ""
     amplitude: float | None = None
     damping: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frequency", quantity_of(self.frequency, "frequency of a peak", "in Hz"))
 
     @property
     def is_bare(self) -> bool:
@@ -130,17 +133,14 @@ def peaks_of(stated: Sequence[Peak | Quantity | ArrayLike], name: str) -> tuple[
     peaks: list[Peak] = []
     faults: list[Fault] = []
     for number, one in enumerate(stated, start=1):
-        peak, frequency = (one, one.frequency) if isinstance(one, Peak) else (None, one)
+        place = f"{name} unlabelled {number}"
         try:
-            quantity = Quantity.of(frequency)
-        except ValueError as error:
-            wanted = "a number, an array of readings, a Quantity or a Peak, in Hz"
-            faults.append(Fault(f"{name} unlabelled {number}", wanted, repr(one), str(error)))
-        else:
-            peaks.append(Peak(quantity) if peak is None else replace(peak, frequency=quantity))
+            peaks.append(one if isinstance(one, Peak) else Peak(quantity_of(one, place, "in Hz, or a Peak")))
+        except InputError as error:
+            faults += error.faults
     return tuple(peaks), faults
 
 
 def label_text(label: str | tuple[int, int]) -> str:
     """A label as a card writes it."""
-    return label if isinstance(label, str) else f"({','.join(map(str, label))})"
+    return f"({','.join(map(str, label))})" if isinstance(label, tuple) else str(label)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -71,6 +71,8 @@ class Parameter:
         What people call it; empty where that is its key.
     look : str
         What it does to the board if it is one of an effect's components, in words; empty for what has a meaning alone.
+    assumed : Quantity or None
+        What was taken for the prior because nobody stated one; see `is_assumed`.
     """
 
     key: str
@@ -83,6 +85,12 @@ class Parameter:
     source: str = ""
     words: str = ""
     look: str = ""
+    assumed: Quantity | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def is_assumed(self) -> bool:
+        """Whether the prior is still the very object that was assumed: whoever states another one replaces it."""
+        return self.prior is self.assumed
 
     @property
     def name(self) -> str:

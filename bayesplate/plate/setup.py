@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.cards import MISSED, SPURIOUS, CoefficientCard, PriorCard
+from bayesplate.cards.stated import is_place, quantity_of, wrong_types
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 from bayesplate.plate.measured import NO_OFFSET, Peak, Reading, label_text, peaks_of
@@ -30,11 +32,19 @@ CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
 
 
+def _is_noise(value: object) -> bool:
+    return isinstance(value, Quantity) and not value.is_exact
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
-    """The relative noise where none is stated: that of the prior, otherwise the one of such edges."""
+    """The relative noise where none is stated, that of the prior or else of such edges: an object of its own."""
     if prior is not None and prior.noise_percent is not None:
         return prior.noise_percent.scaled(1e-2)
-    return CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE
+    return replace(CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE)
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,12 @@ class AttachedItem:
     places: tuple[tuple[float, float], ...]
     mass: Quantity | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.places, list | tuple) or not all(map(is_place, self.places)):
+            raise InputError(wrong_types(str(self.kind), [("places", self.places, False, "((x, y), ...) in m")]))
+        if self.mass is not None:
+            object.__setattr__(self, "mass", quantity_of(self.mass, f"{self.kind} mass", "in kg"))
+
 
 @dataclass(frozen=True)
 class DeclaredAir:
@@ -52,6 +68,10 @@ class DeclaredAir:
 
     density: Quantity | None = None
     baffle: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.density is not None:
+            object.__setattr__(self, "density", quantity_of(self.density, "air density", "in kg/m^3"))
 
 
 @dataclass(frozen=True)
@@ -85,6 +105,8 @@ class Setup:
         None: not declared.
     group : Owner or None
         The group of sessions that the setup is one of (`bayesplate.plate.sessions`).
+    assumed : Quantity or None
+        The noise that was taken because nobody stated one; see `is_noise_assumed`.
     """
 
     name: str
@@ -103,6 +125,12 @@ class Setup:
     hammer: tuple[float, float] | None = None
     air: DeclaredAir | None = None
     group: Owner | None = None
+    assumed: Quantity | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "noise", quantity_of(self.noise, f"{self.name} noise", "relative"))
+        covered = {edge: quantity_of(one, f"{self.name} clamped {edge}", "in m") for edge, one in self.clamped.items()}
+        object.__setattr__(self, "clamped", covered)
 
     @classmethod
     def from_frequencies(
@@ -137,7 +165,8 @@ class Setup:
         resolution : float, Hz
             Step to which plain numbers are rounded; 0 if they are not.
         noise : Quantity, optional
-            Relative, log-normal: 0.005 is half a per cent. By default that of the prior or of the edges, as on a card.
+            Relative, log-normal: 0.005 is half a per cent. By default that of the prior that the board is used with,
+            or else of the edges, as on a card.
         first_label : tuple of int
         clamped : dict of Quantity, number or array of readings, m
             What a clamp covers, by edge.
@@ -159,7 +188,25 @@ class Setup:
         InputError
             With every label, frequency, peak and name of an edge that cannot be read.
         """
-        faults: list[Fault] = []
+        faults = list(wrong_types(str(name), (
+            ("name", name, isinstance(name, str), "a text"),
+            ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
+            ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
+            ("noise", noise, noise is None or _is_noise(noise), NOISE_WANTED),
+            ("resolution", resolution, _is_number(resolution), "a number, in Hz"),
+            ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
+            ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
+            ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),
+            ("unlabelled", unlabelled, isinstance(unlabelled, list | tuple | np.ndarray), "a list of peaks"),
+            ("attached", attached, isinstance(attached, list | tuple)
+             and all(isinstance(one, AttachedItem) for one in attached), "a list of AttachedItem"),
+            ("hammer", hammer, hammer is None or is_place(hammer), "a place (x, y) in m"),
+            ("air", air, isinstance(air, DeclaredAir | None), "a DeclaredAir"),
+            ("published_coefficients", published_coefficients,
+             isinstance(published_coefficients, CoefficientCard | None), "a CoefficientCard"),
+        )))  # fmt: skip
+        if faults:
+            raise InputError(faults)
         if not isinstance(edges, str) and set(edges) != set(EDGES):
             faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
         words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
@@ -177,23 +224,19 @@ class Setup:
             if edge not in EDGES:
                 faults.append(Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(edge)))
             try:
-                covered[edge] = Quantity.of(length)
-            except ValueError as error:
-                faults.append(Fault(f"{name} clamped {edge}", "a length in m", repr(length), str(error)))
-        if not (noise is None or (isinstance(noise, Quantity) and not noise.is_exact)):
-            faults.append(Fault(f"{name} noise", NOISE_WANTED, repr(noise)))
-        if np.asarray(resolution).dtype.kind not in "iuf":
-            faults.append(Fault(f"{name} resolution", "a number, in Hz", repr(resolution)))
+                covered[edge] = quantity_of(length, f"{name} clamped {edge}", "in m")
+            except InputError as error:
+                faults += error.faults
         peaks, no_peaks = peaks_of(unlabelled, name)
         faults += no_peaks
         if faults:
             raise InputError(faults)
-        return cls(
+        made = cls(
             name=name,
             ends_x=(cast(End, words["x0"]), cast(End, words["x1"])),
             ends_y=(cast(End, words["y0"]), cast(End, words["y1"])),
             readings=tuple(readings),
-            noise=assumed_noise(tuple(words.values())) if noise is None else noise,
+            noise=DEFAULT_NOISE if noise is None else noise,
             clamped=covered,
             resolution=float(resolution),
             peaks=peaks,
@@ -203,11 +246,17 @@ class Setup:
             hammer=hammer,
             air=air,
         )
+        return made.assuming_noise() if noise is None else made
 
-    def with_noise_of(self, prior: PriorCard) -> Setup:
-        """The setup with the noise that a prior card states, if it does and the setup states none of its own."""
-        words = self.ends_x + self.ends_y
-        return replace(self, noise=assumed_noise(words, prior)) if self.noise == assumed_noise(words) else self
+    def assuming_noise(self, prior: PriorCard | None = None) -> Setup:
+        """The setup with the noise of a prior, or else of its edges, in place of any that it has."""
+        noise = assumed_noise(self.ends_x + self.ends_y, prior)
+        return replace(self, noise=noise, assumed=noise)
+
+    @property
+    def is_noise_assumed(self) -> bool:
+        """Whether the noise is still the very object that was assumed: whoever states another one replaces it."""
+        return self.noise is self.assumed
 
     @property
     def edges(self) -> dict[str, str]:

@@ -26,7 +26,7 @@ _INPUT_KEYS = {
 
 
 def card_text(board: Board) -> str:
-    """The card of a board, as TOML; reading it gives the board again.
+    """The card of a board, as TOML; reading it gives the board again, what was assumed from the prior it is read with.
 
     Parameters
     ----------
@@ -42,7 +42,8 @@ def card_text(board: Board) -> str:
     InputError
         If a quantity has a density that no card can state.
     """
-    inputs = {one.name: one.prior for one in board.parameters if one.owner == BOARD and not one.is_of_effect}
+    own = [one for one in board.parameters if one.owner == BOARD and not one.is_of_effect and not one.is_assumed]
+    inputs = {one.name: one.prior for one in own}
     faults = [fault for place, one, kind in _uncertain(board) for fault in unstatable(place, one, kind)]
     exact = (setup.name for setup in board.setups if setup.noise.is_exact)
     faults += [Fault(f"{name} noise", NOISE_WANTED, "an exact number") for name in exact]
@@ -54,7 +55,9 @@ def card_text(board: Board) -> str:
         lines.append(f"effects = {array(text(name) for name in board.effects)}")
     lines += ["", "[plate]"]
     lines += [f"{key} = {quantity(inputs[name], f, f)}" for name, (key, f) in _INPUT_KEYS.items() if name in inputs]
-    lines += ["", "[material]", f"poisson_xy = {quantity(inputs['poisson_xy'], 1.0)}", f"prior = {text(board.prior)}"]
+    lines += ["", "[material]"]
+    lines += [f"poisson_xy = {quantity(inputs['poisson_xy'], 1.0)}"] if "poisson_xy" in inputs else []
+    lines += [f"prior = {text(board.prior)}"]
     shear = {"shear_xz_gpa": board.shear_xz, "shear_yz_gpa": board.shear_yz}
     lines += [f"{key} = {quantity(modulus, 1e9)}" for key, modulus in shear.items() if modulus is not None]
     header = "[setup]" if len(board.setups) == 1 else "[[setup]]"
@@ -97,8 +100,9 @@ def _setup(setup: Setup) -> Iterator[str]:
         yield f"published_coefficients = {text(setup.published_coefficients.name)}"
     yield from _peaks(setup.peaks)
     yield from _probabilities(setup)
-    median, factor = density_numbers(setup.noise, _PERCENT, lambda m, f: Quantity.from_median(m, f).scaled(_PERCENT))
-    yield f"noise_percent = {table({'median': median, 'factor': factor})}"
+    if not setup.is_noise_assumed:
+        noise = density_numbers(setup.noise, _PERCENT, lambda m, f: Quantity.from_median(m, f).scaled(_PERCENT))
+        yield f"noise_percent = {table(dict(zip(('median', 'factor'), noise, strict=True)))}"
     if setup.hammer is not None:
         yield f"hammer = {table({'at_mm': _place(setup.hammer)})}"
     if setup.air is not None:

@@ -39,6 +39,7 @@ def corner_figure(
     from matplotlib.figure import Figure
 
     side = _INCHES * len(columns)
+    truths = None if marked is None else [marked.get(name) for name in columns]
     figure = Figure(figsize=(side, side))
     corner.corner(
         np.column_stack([np.ravel(values) for values in columns.values()]),
@@ -47,9 +48,11 @@ def corner_figure(
         levels=_HELD,
         smooth=1.0,
         color=BLUE,
-        truths=None if marked is None else [marked.get(name) for name in columns],
+        truths=None if len(columns) == 1 else truths,
         truth_color=ORANGE,
     )
+    if len(columns) == 1 and truths is not None and truths[0] is not None:  # which corner marks in pairs only
+        figure.axes[0].axvline(truths[0], color=ORANGE)
     return figure
 
 

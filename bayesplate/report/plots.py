@@ -56,11 +56,15 @@ class FitPlots:
         Parameters
         ----------
         names : sequence of str
-            Of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the units of cards.
+            One or more, each once, of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
+            units of cards.
         """
         from bayesplate.report.corner_plot import corner_figure
 
         known = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
+        if isinstance(names, str) or not len(names) or len(set(names)) < len(names):
+            wanted = f"a list of one or more of {', '.join(known)}, each once"
+            raise InputError(Fault("names", wanted, repr(names) if isinstance(names, str) else f"{list(names)}"))
         for name in names:
             _place("name", name, list(known))
         shown = {name: _factor_and_words(name, self.inference.problem) for name in names}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -21,7 +21,7 @@ _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True)
 class ByConstant(Generic[Value]):
-    """One value per constant, by attribute or by name: `elastic.E_x` is `elastic["E_x"]`."""
+    """One value per constant, by attribute or by name as in a dict: `elastic.E_x` is `elastic["E_x"]`."""
 
     NAMES: ClassVar[tuple[str, ...]] = ()
 
@@ -30,6 +30,16 @@ class ByConstant(Generic[Value]):
             raise KeyError(name)
         value: Value = getattr(self, name)
         return value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.NAMES)
+
+    def __len__(self) -> int:
+        return len(self.NAMES)
+
+    def keys(self) -> tuple[str, ...]:
+        """The names."""
+        return self.NAMES
 
     def items(self) -> tuple[tuple[str, Value], ...]:
         """Name and value of each."""

@@ -84,7 +84,7 @@ def _data(card: BoardCard, board: Board) -> tuple[str, ...]:
 
 def _priors(prior: PriorCard, board: Board) -> tuple[str, ...]:
     """Sources of the prior card that the fit uses, and of the priors of effects that the board card does not state."""
-    used = {name: source for name, source in prior.sources.items() if _is_used(name, prior, board)}
+    used = {name: source for name, source in prior.sources.items() if _is_used(name, board)}
     entries = [f"{name} ({prior.name}): {_one_line(source)}" for name, source in used.items()]
     for setup in board.setups:
         for effect in effects_of(board, setup):
@@ -95,13 +95,12 @@ def _priors(prior: PriorCard, board: Board) -> tuple[str, ...]:
     return tuple(dict.fromkeys(entries))
 
 
-def _is_used(name: str, prior: PriorCard, board: Board) -> bool:
+def _is_used(name: str, board: Board) -> bool:
     """A prior's Poisson ratio and noise serve only where the board card does not state its own."""
     if name == "poisson_xy":
-        return board.inputs["poisson_xy"] == prior.poisson_xy
+        return board.parameter("poisson_xy").is_assumed
     if name == "noise_percent":
-        assert prior.noise_percent is not None
-        return any(setup.noise == prior.noise_percent.scaled(1e-2) for setup in board.setups)
+        return any(setup.is_noise_assumed for setup in board.setups)
     return True
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from bayesplate.cards import BoardCard, CampaignCard, PriorCard
 from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
+from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
@@ -25,6 +26,9 @@ from bayesplate.workflow.batch_grading import grading_faults
 from bayesplate.workflow.prepare import Prepared
 
 Check = Callable[[str, object], Iterator[Fault]]
+
+FEWEST_NULL = math.ceil(1.0 / min(BY_CHANCE, FALSE_ALARMS)) - 1
+"""Among n simulated boards the one at hand is first by chance in a share of 1 / (n + 1), which is to be that small."""
 
 
 def require_arguments(**given: object) -> None:
@@ -161,6 +165,12 @@ def _effects(name: str, value: object) -> Iterator[Fault]:
             yield Fault(f"{name} {number}", "each name once", f"{quoted(effect)} again")
 
 
+def _between(name: str, value: object) -> Iterator[Fault]:
+    yield from _effects(name, value)
+    if isinstance(value, list | tuple) and not value:
+        yield Fault(name, "one name of an effect or more, or None", "an empty list")
+
+
 def _files(name: str, value: object) -> Iterator[Fault]:
     if isinstance(value, str | os.PathLike) or not isinstance(value, list | tuple) or not value:
         yield Fault(name, "a list of one path or more", _shown(value), "files=[path]")
@@ -234,7 +244,7 @@ _CHECKS: dict[str, Check] = {
     "out": _path_or_none,
     "setup": _path_or_none,
     "seed": _whole(0),
-    "n_null": _whole(1),
+    "n_null": _whole(FEWEST_NULL),
     "effects": _effects,
     "law": _word(get_args(LawName)),
     "coefficients": _word(get_args(CoefficientSource)),
@@ -252,7 +262,7 @@ _CHECKS: dict[str, Check] = {
     "sand": _sand,
     "goal": _word(GOALS),
     "costs": _costs,
-    "between": _effects,
+    "between": _between,
     "board": _board,
     "prior_card": _prior_card,
     "request": _request,

@@ -134,7 +134,8 @@ def diagnose(
     force, resume : bool
         Replace the results in the folder, or continue an interrupted run.
     n_null : int
-        Data sets of the null control at most.
+        Data sets of the null control at most; with fewer than 49 chance cannot be told from an effect at the two per
+        cent that count as a false alarm.
     progress : callable, optional
         Told when a part begins and after every chunk of sampling, with the share of the whole that is done.
 

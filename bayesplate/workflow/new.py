@@ -8,9 +8,9 @@ from pathlib import Path
 
 from bayesplate.cards import EDGE_NAMES, load_prior, physical_faults, read_board_text
 from bayesplate.cards.setup import EdgeWord, edge_words
-from bayesplate.cards.starter import Starter, starter_text
+from bayesplate.cards.starter import HALF_TOP, Starter, starter_text
 from bayesplate.cards.values import Number, Refusal
-from bayesplate.cards.words import shown
+from bayesplate.cards.words import did_you_mean, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
@@ -23,6 +23,7 @@ _EDGES_WANTED = (
 _ARRANGEMENTS = {"cantilever": "CFFF"}
 _ANY = Number(-1e300, 1e300)
 _N_EXAMPLES = 8
+SIZES = (*HALF_TOP, "mass")
 
 
 def new(
@@ -61,12 +62,22 @@ def new(
     InputError
         If there is a file of that name, or what was given cannot stand on a card; then nothing is written.
     """
+    texts = {"edges": edges, "prior": prior, "title": title, "notes": notes}
+    wrong = [Fault(name, "a text", repr(one)) for name, one in texts.items() if not isinstance(one, str)]
+    by_name = {"sizes": sizes, "frequencies": frequencies}
+    wrong += [Fault(k, "a dict of numbers", repr(v)) for k, v in by_name.items() if not isinstance(v, Mapping | None)]
+    if wrong:
+        raise InputError(wrong)
     card = Path(path)
     card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
     if card.exists():
         raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
-    faults: list[Fault] = []
+    faults = [
+        Fault(f"sizes {name}", f"one of {', '.join(SIZES)}", shown(name), did_you_mean(str(name), SIZES))
+        for name in sizes or {}
+        if name not in SIZES
+    ]
     if words is None:
         faults.append(Fault("edges", _EDGES_WANTED, shown(edges)))
         words = dict.fromkeys(EDGE_NAMES, "free")
@@ -106,14 +117,14 @@ def _numbers(given: Mapping[str, float | str], faults: list[Fault]) -> dict[str,
         try:
             found[name] = _ANY(_number(value))
         except Refusal as refusal:
-            faults += [Fault(plain(name), one.wanted, one.got, one.remedy) for one in refusal.complaints]
+            faults += [Fault(plain(str(name)), one.wanted, one.got, one.remedy) for one in refusal.complaints]
     return found
 
 
 def _number(value: float | str) -> float | str:
     try:
         return float(value)
-    except ValueError:
+    except (TypeError, ValueError):
         return value
 
 

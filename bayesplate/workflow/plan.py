@@ -18,7 +18,8 @@ from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.errors import NotIdentifiableError
+from bayesplate.effects import effect_faults
+from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.planning.assembled import (
     Bench,
     benches,
@@ -30,6 +31,7 @@ from bayesplate.planning.drawn_up import DrawnUp, begun, drawn_up
 from bayesplate.planning.plan import FORMAT, Plan
 from bayesplate.planning.proposals import Costs
 from bayesplate.planning.survivors import asked, surviving
+from bayesplate.plate.board import Board
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.folder import DIAGNOSIS, json_text, make_folder, require_new, write_text, writing
@@ -104,7 +106,7 @@ def plan(
         Minutes of a "reading" (1), a "clamping" (10), a "board" (30).
     between : sequence of str, optional
         Effects that are to be told apart, no effect being one more possibility; by default those that survive the
-        search of `diagnose`.
+        search of `diagnose`. Each must be able to act on the board, and not be declared.
     out : path, optional
         Folder of plan.json, the figure of gains and the sheets for the bench; nothing is written without it. A
         diagnosis of the same card that is there is not made again.
@@ -171,6 +173,8 @@ def _drawn_up(
     progress: Callable[[Progress], None] | None,
 ) -> DrawnUp:
     """The plan of a board: from a search, from a finished one, or from the prior."""
+    if between is not None:
+        _require_possible(prepared.board, between)
     stages = Stages(progress, _POSE + _SEARCH + _PLAN)
     stages.begin("estimate", _POSE)
     problem = Problem(prepared)
@@ -188,6 +192,15 @@ def _drawn_up(
     among = _among(searched, between, finished)
     stages.begin("gains of further readings", _PLAN)
     return drawn_up(searched, prepared.prior, seed, goal=goal, costs=costs, among=among)
+
+
+def _require_possible(board: Board, between: Sequence[str]) -> None:
+    """Refuse effects that cannot be told apart: those that cannot act on the board, and those that it declares."""
+    faults = [Fault("between", "effects that are not declared", name) for name in between if name in board.effects]
+    others = replace(board, effects=tuple(name for name in between if name not in board.effects))
+    faults += [Fault("between", one.wanted, one.got) for one in effect_faults(others)]
+    if faults:
+        raise InputError(faults)
 
 
 @dataclass(frozen=True)

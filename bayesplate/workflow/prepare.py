@@ -119,6 +119,7 @@ def prepare(
     NotIdentifiableError
         If the sides or the orders of the labels seem to be exchanged.
     """
+    _require_card(card)
     given = prior if prior is None or isinstance(prior, PriorCard) else load_prior(prior)
     if not isinstance(card, Board):
         read = load_board(card, may_lack_frequencies=may_lack_frequencies, setup=setup)
@@ -131,6 +132,14 @@ def prepare(
     if lost:
         raise InputError(lost)
     return prepared
+
+
+def _require_card(card: object) -> None:
+    """Refuse what other functions take for a card."""
+    if not isinstance(card, Board | str | os.PathLike):
+        remedy = {"Problem": "it is one: use it as it is", "Campaign": "its boards are in its problems"}
+        kind = type(card).__name__
+        raise InputError(Fault("card", "a board: a name, a path or a Board", f"a {kind}", remedy.get(kind, "")))
 
 
 def prepared_card(read: BoardCard, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:

@@ -194,7 +194,10 @@ class Problem:
         return self._by_point(lambda rows: posterior.log_likelihood(rows).sum(axis=1), theta, ())
 
     def predict(self, theta: ArrayLike) -> Floats:
-        """Frequencies of the labelled modes, without noise.
+        """Frequencies of the labelled modes, without noise, under the law of the problem.
+
+        The linear law holds near the estimate only: for draws of the prior it is off by tens to hundreds of cents, and
+        so is the likelihood. `Problem.from_card(card, law="exact")` holds for them too.
 
         Parameters
         ----------

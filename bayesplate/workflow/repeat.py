@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from bayesplate.cards import load_board, load_named, read_board_text
+from bayesplate.cards import NamedCards, PriorCard, card_names, load_board, load_named, load_prior, read_board_text
 from bayesplate.cards.words import shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.posterior.sampling import Progress
@@ -181,7 +181,7 @@ def _problem(before: Mapping[str, Any], path: Path, card: str | os.PathLike[str]
     """The problem that a summary is of; raises InputError with everything that differs."""
     file, request, model = plain(str(path)), before["request"], before["model"]
     read = read_board_text(request["card"], before["name"], beside=path.parent) if card is None else load_board(card)
-    named = load_named(read)
+    named = load_named(read, _prior_of(request["named"]))
     text = hashlib.sha256(request["card"].encode("utf-8", "surrogatepass")).hexdigest()
     faults = [
         *_different(f"{file} versions", before["versions"], versions(), "install these versions"),
@@ -197,6 +197,16 @@ def _problem(before: Mapping[str, Any], path: Path, card: str | os.PathLike[str]
     law, robust, effects = request.get("law"), model.get("robust", False), model.get("effects", [])
     require_arguments(law=law, robust=robust, effects=effects, seed=before["seed"])
     return Problem(prepared_card(read, named, effects), law, robust)
+
+
+def _prior_of(named: Mapping[str, Any]) -> PriorCard | None:
+    """The shipped prior that a fit used, which may be another one than its card names; None if it is none of them."""
+    for name in card_names("priors"):
+        digest = named.get(f"prior {name}")
+        if digest is not None:
+            card = load_prior(name)
+            return card if NamedCards(card, {}, ()).digests[f"prior {name}"] == digest else None
+    return None
 
 
 def _different(place: str, wanted: Mapping[str, Any], got: Mapping[str, Any], remedy: str) -> Iterator[Fault]:

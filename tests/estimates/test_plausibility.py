@@ -80,6 +80,11 @@ def test_shipped_boards_are_asked_nothing_and_units_are_asked_about(name, prior)
     assert asked(board, prior) == ""
     for factor in (0.5, 2.0):  # an octave is no unit
         assert asked(read_as(board, factor), prior) == ""
+    speed = plate_speed(board)  # whatever the mistake, no material is so
+    for factor in (1.05 * FASTEST / speed, 1000.0, 0.95 * SLOWEST / speed):
+        assert "wanted those of a material that carries sound at 50 to 15000 m/s" in asked(
+            read_as(board, factor), prior
+        )
     assert "in rad/s?" in asked(read_as(board, 2 * np.pi), prior)
     assert "in kHz?" in asked(read_as(board, 1e-3), prior)
     assert "are length_x_mm and length_y_mm in cm?" in asked(measured_as(board, 0.1, SIDES), prior)

@@ -38,7 +38,8 @@ def assert_same(one, other):
 
 def again(board):
     read = read_board_text(card_text(board), board.name)
-    return board_from_card(read, tables=load_named(read).tables)
+    named = load_named(read)
+    return board_from_card(read, named.prior, named.tables)
 
 
 def comparable(board):

@@ -53,6 +53,15 @@ def test_what_is_marked_gets_its_line_and_the_rest_none(columns, drawn, tmp_path
     assert not panels[1, 1].lines
 
 
+@pytest.mark.parametrize(("value", "lines"), [(11.05, [11.05]), (None, [])])
+def test_one_column_is_drawn_alone(columns, drawn, tmp_path, value, lines):
+    write_corner_plot(tmp_path / "corner.png", {WORDS[0]: columns[WORDS[0]]}, {WORDS[0]: value})
+    (panel,) = drawn[0].axes
+
+    assert panel.get_xlabel() == WORDS[0]
+    assert [line.get_xdata()[0] for line in panel.lines] == lines
+
+
 def test_the_same_draws_give_the_same_file_and_no_state_of_pyplot(columns, tmp_path):
     from matplotlib import pyplot
 

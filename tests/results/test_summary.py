@@ -61,6 +61,13 @@ def test_the_json_has_the_keys_of_the_contract_in_their_order(place):
     assert list(entry) == CONTRACT[place]
 
 
+def test_constants_are_read_like_a_dict():
+    one = Elastic(1.0, 2.0, 3.0)
+
+    assert dict(one) == {"E_x": 1.0, "E_y": 2.0, "G_xy": 3.0} == dict(one.items())
+    assert ("E_x" in one, "D_x" in one, list(one), len(one)) == (True, False, ELASTIC, 3)
+
+
 def test_values_stand_where_they_belong_and_what_does_not_exist_is_null():
     found = read(SUMMARY)
 

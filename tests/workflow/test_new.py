@@ -106,6 +106,23 @@ def test_what_cannot_stand_on_a_card_is_refused_and_nothing_written(options, cod
     assert list(Path().iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"sizes": {"length_x_mm": 300, "length": 1}},
+         ["sizes length_x_mm: wanted one of length_x, length_y, thickness, mass, got", "did you mean length_x?",
+          "sizes length: wanted one of"]),
+        ({"sizes": {"mass": None, "thickness": [1]}}, ["mass: wanted a number, got nothing", "thickness: wanted a n"]),
+        ({"sizes": [1], "edges": None}, ["edges: wanted a text, got None", "sizes: wanted a dict of numbers, got [1]"]),
+    ],
+)  # fmt: skip
+def test_what_is_given_in_python_is_held_to_its_kind(given, said):
+    with pytest.raises(bayesplate.InputError) as refused:
+        new("mine", **given)
+    assert [passage for passage in said if passage not in str(refused.value)] == []
+    assert list(Path().iterdir()) == []
+
+
 @pytest.mark.parametrize("arguments", [["mine"], ["mine.toml", "--mass", "40"]])
 def test_a_card_that_is_there_is_not_overwritten(arguments):
     Path("mine.toml").write_text("mine", encoding="utf-8")

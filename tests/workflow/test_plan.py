@@ -71,6 +71,13 @@ def test_a_board_without_frequencies_is_planned_from_its_prior(planned):
     assert found["sequences"][0]["gain"]["score"] >= scores[0]
 
 
+def test_plates_of_no_material_are_passed_over():
+    """The default prior of the moduli, which are independent there, holds some."""
+    free = bayesplate.Setup.from_frequencies({}, edges="free")
+    board = bayesplate.Board.from_numbers("b", length_x=0.253, length_y=0.114, thickness=3e-3, mass=0.041, setups=free)
+    assert bayesplate.plan(board).summary.proposals
+
+
 def test_the_sheet_says_where_each_mode_will_be_and_is_seen(planned):
     _, found, printed = planned
     (bench,) = [one for one in found["bench"] if one["setup"] == "setup"]
@@ -110,6 +117,9 @@ def test_a_plan_is_no_run_and_fit_says_what_it_lacks(planned):
         (["--cost", "readng=3"], 3, "did you mean reading?"),
         (["--cost", "reading"], 2, "wanted CLASS=MINUTES"),
         (["--between", "grain_angel"], 3, "did you mean grain_angle?"),
+        (["--between", "clamp_rotation"], 3, "between: wanted a board on which clamp_rotation can act, got no edge is"),
+        (["--between", "none"], 3, "between: wanted one name of an effect or more, or None, got an empty list"),
+        (["--between", "air_loading", "--effects", "air_loading"], 3, "between: wanted effects that are not declared"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_and_leaves_nothing(arguments, code, said, tmp_path):

@@ -210,6 +210,25 @@ def test_points_of_another_shape_are_refused(clamped, theta, got):
         clamped.log_prob(theta)
 
 
+@pytest.mark.parametrize("use", [bayesplate.Problem.from_card, bayesplate.modes, bayesplate.compare, bayesplate.cite])
+def test_a_campaign_is_no_board(use):
+    with pytest.raises(bayesplate.InputError, match=r"card: wanted a board: .* got a Campaign \(its boards are"):
+        use(bayesplate.Campaign.from_card("spruce-half-tops"))
+
+
+def test_a_problem_is_one_already(clamped):
+    with pytest.raises(bayesplate.InputError, match=r"card: wanted a board: .* got a Problem \(it is one: use it"):
+        bayesplate.Problem.from_card(clamped)
+
+
+def test_the_frequencies_of_other_plates_need_the_exact_law(clamped):
+    """What `predict` says of itself: at draws of the prior the linear law is far off, near the estimate it is not."""
+    exact = bayesplate.Problem.from_card(BOARD, law="exact")
+    for theta, is_far in ((near(clamped, 20), False), (points(clamped, 20), True)):
+        off = 1200.0 * np.abs(np.log2(clamped.predict(theta) / exact.predict(theta)))
+        assert bool(np.nanmax(off) > 100.0) is is_far
+
+
 def test_points_outside_the_cube_are_refused(clamped):
     with pytest.raises(bayesplate.InputError, match=r"u: wanted numbers from 0 to 1, got 1\.5"):
         clamped.prior_transform([0.5, 1.5, 0.5, 0.5])

@@ -14,6 +14,7 @@ import bayesplate
 from bayesplate.cli import main
 from bayesplate.errors import InputError
 from bayesplate.results.versions import versions
+from bayesplate.workflow import repeat as home
 from bayesplate.workflow.repeat import default_repeat_folder, repeat
 
 BOARD = "fiemme-spruce-clamped"
@@ -72,6 +73,15 @@ def test_everything_that_differs_is_told_at_once_and_nothing_is_written(fitted, 
     assert f"card_sha256 card: wanted {fitted.summary['card_sha256']}" in run.stderr
     assert "request named prior weakly-informative: wanted 0000" in run.stderr
     assert not run.folder.exists()
+
+
+def test_a_shipped_prior_that_was_given_in_place_of_the_cards_is_taken_again(fitted, tmp_path):
+    given = bayesplate.Problem.from_card(BOARD, prior="spruce")
+    path = edited(fitted, tmp_path, lambda summary: summary["request"].update(named=given.prepared.named.digests))
+    found = home._problem(home._read(path), path, None)
+
+    assert found.prior == given.prior
+    assert found.board.inputs == given.board.inputs
 
 
 def test_a_card_that_is_named_too_must_be_the_same(fitted, tmp_path):

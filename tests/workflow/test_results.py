@@ -96,6 +96,10 @@ def test_a_figure_of_what_is_not_there_is_refused(results):
         results["fit"].plot.modes("free")
     with pytest.raises(bayesplate.InputError, match="name: wanted one of E_x, E_y, G_xy, D_x, D_y, D_s, got 'E_z'"):
         results["fit"].plot.corner(["E_x", "E_z"])
+    for names in ([], ["E_x", "E_x"], "E_x"):
+        with pytest.raises(bayesplate.InputError, match=r"names: wanted a list of one or more of E_x.* each once, got"):
+            results["fit"].plot.corner(names)
+    assert len(results["fit"].plot.corner(["E_x"]).axes) == 1
 
 
 def test_a_corner_plot_has_a_panel_for_every_pair_and_marks_least_squares(results):
