@@ -37,6 +37,8 @@ def read_recordings(
     rate: float | None = None,
     channels: str = CHANNELS[0],
     motion: Motion = "acceleration",
+    *,
+    was_played: bool = False,
 ) -> list[list[Read]]:
     """What every file holds.
 
@@ -49,6 +51,8 @@ def read_recordings(
         What the two channels of a sound file are: one of `CHANNELS`.
     motion : str
         What a response is whose file does not say it: one of `bayesplate.recordings.signals.MOTIONS`.
+    was_played : bool
+        Whether the files are what a loudspeaker was given: they may reach the largest value, and may be quiet.
 
     Returns
     -------
@@ -71,7 +75,7 @@ def read_recordings(
         except InputError as error:
             faults += error.faults
             continue
-        faults += [fault for one in read for fault in signal_faults(one)]
+        faults += [fault for one in read for fault in signal_faults(one, was_played=was_played)]
         found.append(read)
     if faults:
         raise InputError(faults)

@@ -160,7 +160,7 @@ def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recordin
     if not Path(sweep).exists():
         played = read_sweep(sweep)
         return [impulse_response(one, played) for one in recordings]
-    ((itself, *_),) = read_recordings([sweep])
+    ((itself, *_),) = read_recordings([sweep], was_played=True)
     if not isinstance(itself, Recording):
         raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
     off = [one for one in recordings if abs(one.rate / itself.rate - 1.0) > _RATE_OFF]
