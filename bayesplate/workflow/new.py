@@ -10,7 +10,7 @@ from bayesplate.cards import EDGE_NAMES, load_prior, physical_faults, read_board
 from bayesplate.cards.setup import EdgeWord, edge_words
 from bayesplate.cards.starter import Starter, starter_text
 from bayesplate.cards.values import Number, Refusal
-from bayesplate.cards.words import shown
+from bayesplate.cards.words import name_complaint, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
@@ -61,10 +61,7 @@ def new(
     InputError
         If there is a file of that name, or what was given cannot stand on a card; then nothing is written.
     """
-    card = Path(path)
-    card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
-    if card.exists():
-        raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
+    card = new_card_path(path)
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
     faults: list[Fault] = []
     if words is None:
@@ -87,6 +84,36 @@ def new(
         card.parent.mkdir(parents=True, exist_ok=True)
     write_text(card, text)
     return card
+
+
+def new_card_path(path: str | os.PathLike[str]) -> Path:
+    """Where a first card of that name would be written.
+
+    Raises
+    ------
+    InputError
+        If there is a file, or if a card cannot have that name.
+    """
+    card = Path(path)
+    card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
+    if card.exists():
+        raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
+    if wanted := name_complaint(card.stem):
+        raise InputError(Fault("name", wanted, shown(card.stem), "choose another name"))
+    return card
+
+
+def required_edges(edges: str) -> str:
+    """The same text, if it says how four edges are held.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
+    if edge_words(_ARRANGEMENTS.get(edges, edges)) is None:
+        raise InputError(Fault("edges", _EDGES_WANTED, shown(edges)))
+    return edges
 
 
 def example_labels(edges: str) -> list[str]:
