@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Callable, Sequence
+from hashlib import sha256
 from pathlib import Path
+
+import numpy as np
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.checks import signal_faults
@@ -77,9 +80,23 @@ def read_recordings(
             continue
         faults += [fault for one in read for fault in signal_faults(one, was_played=was_played)]
         found.append(read)
+    faults += _given_twice([one for own in found for one in own])
     if faults:
         raise InputError(faults)
     return found
+
+
+def _given_twice(read: Sequence[Read]) -> list[Fault]:
+    """Recordings of the same content: a copy tells nothing new, and would count as a repeat without any scatter."""
+    named: dict[bytes, list[str]] = {}
+    for one in read:
+        both = (one.response, one.force) if isinstance(one, Recording) else (one.values, one.frequency)
+        content = sha256()
+        for part in both:
+            content.update(b"" if part is None else np.ascontiguousarray(part).tobytes())
+        named.setdefault(content.digest(), []).append(one.name)
+    wanted, got, remedy = "each recording once", "the same samples again", "a copy is no new evidence: leave it out"
+    return [Fault(" and ".join(names), wanted, got, remedy) for names in named.values() if len(names) > 1]
 
 
 def _names(paths: Sequence[str | os.PathLike[str]]) -> list[str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
+from bayesplate.recordings.forces import force_fault
 from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, rising_again, usable
 from bayesplate.recordings.padding import common_padding
 from bayesplate.recordings.reading import Read
@@ -74,6 +75,9 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
     heard: list[tuple[Recording, list[Hit]]] = []
     remarks: list[str] = []
     for one in recordings:
+        if (no_force := force_fault(one)) is not None:
+            faults.append(no_force)
+            continue
         hits = find_hits(one)
         good = usable(hits)
         bad = [(number, hit) for number, hit in enumerate(hits, start=1) if hit.fault]

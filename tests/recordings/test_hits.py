@@ -122,6 +122,22 @@ def test_what_cannot_be_used_is_refused_with_every_hit_and_every_file():
         assert said in message
 
 
+def test_a_force_that_rings_or_is_the_response_is_none_and_told_once_for_each_file():
+    one = recording(TIMES, name="right.wav")
+    hiss = 1e-3 * np.random.default_rng(4).standard_normal(one.response.size)
+    exchanged = replace(one, name="exchanged.wav", force=one.response, response=one.force)
+    stereo = replace(one, name="stereo.wav", force=-0.8 * one.response + hiss)
+
+    assert len(take([[one]], 500.0).spectra.names) == 4
+    with pytest.raises(InputError) as caught:
+        take([[one], [exchanged], [stereo]], 500.0)
+
+    first, second = map(str, caught.value.faults)
+    assert first.startswith("exchanged.wav force: wanted a channel with a pulse for each hit, got one that rings on")
+    assert second.startswith("stereo.wav force: wanted a channel with a pulse for each hit, got nearly the same as the")
+    assert "--channels response,force where they are exchanged, response,response" in first
+
+
 def test_what_does_not_go_together_is_refused():
     hertz = np.arange(200) * 1.0
     response = FrequencyResponse("a.csv", hertz, np.ones(200) + 0j)

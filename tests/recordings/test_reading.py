@@ -167,6 +167,20 @@ def test_every_fault_of_every_file_is_told_at_once(tmp_path):
     assert len(caught.value.faults) == len(said)
 
 
+def test_a_recording_that_is_given_twice_is_refused_with_both_names(tmp_path):
+    """The same file, and its samples in a file of another kind; another hit is another recording."""
+    path = write_wav(tmp_path / "a.wav", RATE, RING)
+    samples = only(path).response
+    np.savetxt(tmp_path / "b.csv", samples, "%.17g", header="acceleration", comments="")
+    write_wav(tmp_path / "c.wav", RATE, RING[::-1])
+
+    with pytest.raises(InputError) as caught:
+        read_recordings([path, tmp_path / "b.csv", tmp_path / "c.wav"], rate=float(RATE))
+
+    (fault,) = caught.value.faults
+    assert str(fault).startswith("a.wav and b.csv: wanted each recording once, got the same samples again")
+
+
 def test_a_sound_file_of_another_rate_than_said_is_refused(tmp_path):
     path = write_wav(tmp_path / "a.wav", RATE, RING)
 
