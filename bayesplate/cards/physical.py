@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from bayesplate.cards.board import BoardCard
 from bayesplate.cards.setup import SetupSection
@@ -128,7 +128,6 @@ def _unresolved(where: str, resolution: float, pair: tuple[Label, Label], spacin
 
 
 def _place_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
-    spans = _spans(card, setup)
     places = [
         (f"attached {number} at_mm" + (f" {position}" if len(item.at_mm) > 1 else ""), place)
         for number, item in enumerate(setup.attached, start=1)
@@ -136,16 +135,26 @@ def _place_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[
     ]
     if setup.hammer is not None:
         places.append(("hammer.at_mm", setup.hammer.at_mm))
-    for key, (x, y) in places:
-        (left, right), (bottom, top) = spans["x"], spans["y"]
+    yield from off_the_board(card, setup, {f"{where} {key}": place for key, place in places})
+
+
+def off_the_board(card: BoardCard, setup: SetupSection, places: Mapping[str, tuple[float, float]]) -> Iterator[Fault]:
+    """A fault for each named place, mm, that is not on the part of the board that no clamp covers."""
+    (left, right), (bottom, top) = _spans(card, setup).values()
+    for where, (x, y) in places.items():
         if left < right and bottom < top and not (left <= x <= right and bottom <= y <= top):
             wanted = f"a place on the free part of the board, x {left:g} to {right:g} mm, y {bottom:g} to {top:g} mm"
-            yield Fault(f"{where} {key}", wanted, f"[{x:g}, {y:g}]", "from the corner of x0 and y0 of the whole board")
+            yield Fault(where, wanted, f"[{x:g}, {y:g}]", "from the corner of x0 and y0 of the whole board")
 
 
 def _mass_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
-    board = plate_mass_g(card)
     for number, item in enumerate(setup.attached, start=1):
-        if item.mass_g is not None and item.mass_g.mean >= board:
-            got = f"{item.mass_g.mean:g} g"
-            yield Fault(f"{where} attached {number} mass_g", f"less than the board's own {board:.4g} g", got)
+        if item.mass_g is not None:
+            yield from too_heavy(card, f"{where} attached {number} mass_g", item.mass_g.mean)
+
+
+def too_heavy(card: BoardCard, where: str, grams: float) -> Iterator[Fault]:
+    """A fault for a thing on the board that weighs as much as the board itself."""
+    board = plate_mass_g(card)
+    if grams >= board:
+        yield Fault(where, f"less than the board's own {board:.4g} g", f"{grams:g} g")

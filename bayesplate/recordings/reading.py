@@ -111,6 +111,8 @@ def _plain(name: str) -> str:
 
 def _require_file(path: Path, shown: str) -> None:
     """A regular file of a known kind and a size that fits into memory; looked at from outside only."""
+    if path.is_dir():
+        raise InputError(Fault(shown, "a recording", "a folder", f"give the files in it: {shown}/*.wav"))
     if path.suffix.lower() not in READERS:
         got = f'"{_plain(path.suffix)}"' if path.suffix else "no ending"
         raise InputError(Fault(shown, f"a recording: {', '.join(READERS)}", got, "save it as WAV or CSV"))
@@ -122,7 +124,7 @@ def _require_file(path: Path, shown: str) -> None:
     except OSError as error:
         raise InputError(Fault(shown, "a readable file", error.strerror or str(error))) from None
     if not stat.S_ISREG(status.st_mode):
-        raise InputError(Fault(shown, "a regular file", "a folder or a device"))
+        raise InputError(Fault(shown, "a regular file", "a device"))
     if status.st_size == 0:
         raise InputError(Fault(shown, "a recording", "an empty file", "record it again"))
     if status.st_size > LARGEST_FILE:

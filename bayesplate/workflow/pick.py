@@ -20,7 +20,7 @@ from bayesplate.results.folder import FIGURES, make_folder, require_new, write_t
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fragment import fragment_text
 from bayesplate.workflow.pick_words import show_pick
-from bayesplate.workflow.places import given_places
+from bayesplate.workflow.places import given_places, require_on_board
 from bayesplate.workflow.prepare import Prepared, prepare
 
 if TYPE_CHECKING:
@@ -129,6 +129,9 @@ def pick(
     )  # fmt: skip
     targets = () if out is None else require_new(Path(out), (FRAGMENT, PAGE, SUMMARY), force=force)
     prepared = None if card is None else _one_setup(prepare(card, may_lack_frequencies=True))
+    if prepared is not None:
+        # a microphone may be beside the board, and is nowhere on a card
+        require_on_board(prepared.card, hammer, () if motion == "pressure" else sensor, sensor_mass)
     pictures = {hertz: read_picture(path) for hertz, path in (sand or {}).items()}
     read = read_recordings(files, rate, channels, motion)
     read = [

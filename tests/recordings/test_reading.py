@@ -138,6 +138,7 @@ def test_every_fault_of_every_file_is_told_at_once(tmp_path):
     (tmp_path / "empty.wav").write_bytes(b"")
     (tmp_path / "noise.wav").write_bytes(b"RIFFnonsense")
     (tmp_path / "text.doc").write_text("hit")
+    (tmp_path / "taps").mkdir()
     write_wav(tmp_path / "three.wav", RATE, RING, RING, RING)
     (tmp_path / "unnamed.csv").write_text("1,2\n3,4\n")
     (tmp_path / "comma.csv").write_text("force;acceleration\n0,5;0,7\n")
@@ -149,6 +150,7 @@ def test_every_fault_of_every_file_is_told_at_once(tmp_path):
         "empty.wav: wanted a recording, got an empty file",
         "noise.wav: wanted a WAV file, got",
         'text.doc: wanted a recording: .wav, .csv, .flac, .uff, .unv, got ".doc"',
+        "taps: wanted a recording, got a folder (give the files in it: taps/*.wav)",
         "three.wav channels: wanted one channel, or two: force and response, got 3",
         "unnamed.csv line 1: wanted named columns",
         "comma.csv line 1: wanted commas between columns, got semicolons or tabs",
