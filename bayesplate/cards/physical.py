@@ -13,6 +13,7 @@ from bayesplate.labels import Label
 from bayesplate.quantities import Quantity
 
 LIGHTEST, HEAVIEST = 20.0, 25_000.0  # kg/m3: lighter than balsa foam, heavier than any metal in use
+_LIGHT, _HEAVY = 100.0, 9_000.0  # kg/m3: balsa and brass, between which a board is likely
 THICKEST_SHARE = 0.5  # of the shorter side; beyond it no plate theory holds
 
 
@@ -68,8 +69,7 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
         wanted = f"a density from {LIGHTEST:g} to {HEAVIEST:g} kg/m3"
         remedy = "mass in g, density in kg/m3, lengths in mm"
         if plate.mass_g is not None:
-            kilograms = LIGHTEST <= density * 1000 <= HEAVIEST
-            remedy = f"{plate.mass_g.mean:g} kg is {plate.mass_g.mean * 1000:g} g" if kilograms else remedy
+            remedy = next(_in_other_units(plate.mass_g.mean, density), remedy)
         yield Fault(f"{file} [plate] {key}", wanted, f"{density:.3g} kg/m3", remedy)
     shorter = min(plate.length_x_mm.mean, plate.length_y_mm.mean)
     if plate.thickness_mm.mean > THICKEST_SHARE * shorter:
@@ -83,6 +83,13 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
                 if not 0 <= value <= limits[axis]:
                     wanted = f"a place on the board, 0 to {limits[axis]:g} mm"
                     yield Fault(f"{file} [plate] {key}.{axis} {number}", wanted, f"{value:g} mm")
+
+
+def _in_other_units(mass: float, density: float) -> Iterator[str]:
+    """What a mass would be in g, had it been written in another unit of a balance: as far as a board can weigh that."""
+    for unit, grams in (("kg", 1000.0), ("oz", 28.3495)):
+        if _LIGHT <= density * grams <= _HEAVY:
+            yield f"{mass:g} {unit} is {mass * grams:.4g} g"
 
 
 def _free_span(length: Quantity, clamped: dict[str, float], start: str, end: str) -> tuple[float, float]:

@@ -74,6 +74,14 @@ def test_the_fragment_is_a_setup_and_completes_the_card(bench):
     assert read.ends_x == ("free", "free")
 
 
+def test_the_fragment_alone_is_no_card_and_says_what_it_is_for(bench):
+    folder, _ = bench
+    with pytest.raises(
+        InputError, match=r"setup\.toml: wanted a card, .* \(it completes a card: CARD --setup setup\.toml\)"
+    ):
+        bayesplate.check(folder / "out" / "setup.toml")
+
+
 def test_the_page_shows_everything_and_fetches_nothing(bench):
     folder, found = bench
     page = (folder / "out" / "recordings.html").read_text()
