@@ -32,14 +32,14 @@ def given_answers(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def asked_answers(path: str | None) -> dict[str, Any]:
     """The same from questions on the terminal, a name too where there is none; an empty answer leaves a matter open."""
-    from bayesplate.workflow.new import example_labels, new_card_path, required_edges
+    from bayesplate.workflow.new import example_labels, require_edges, require_path
 
     if path is not None:
-        new_card_path(path)  # before anything is asked in vain
+        require_path(path)  # before anything is asked in vain
     click.echo("An empty answer skips a question; an example stands in for it, marked on the card.", err=True)
-    told: dict[str, Any] = {"name": path or _asked("Name", "my-board", new_card_path)}
+    told: dict[str, Any] = {"name": path or _asked("Name", "my-board", require_path)}
     told["sizes"] = _answered({name: _number(question) for name, question in SIZES.items()})
-    told["edges"] = _asked("Edges: free, cantilever, clamped, supported", "free", required_edges)
+    told["edges"] = _asked("Edges: free, cantilever, clamped, supported", "free", require_edges)
     told["prior"] = click.prompt("Wood: spruce, or weakly-informative", default="weakly-informative", err=True)
     click.echo("Frequencies; (m,n) crosses m nodal lines along the grain and n across.", err=True)
     told["frequencies"] = _answered({label: _number(f"{label}, Hz") for label in example_labels(told["edges"])})

@@ -46,11 +46,10 @@ def signal_faults(one: Recording | FrequencyResponse, *, was_played: bool = Fals
     if one.force is not None:
         channels[f"{one.name} force"] = one.force
     for name, signal in channels.items():
-        faults = [*_channel_faults(one, signal, name)]
-        yield from faults if faults or was_played else _level_faults(one, signal, name)
+        yield from _channel_faults(one, signal, name, was_played=was_played)
 
 
-def _channel_faults(one: Recording, signal: Floats, name: str) -> Iterator[Fault]:
+def _channel_faults(one: Recording, signal: Floats, name: str, *, was_played: bool) -> Iterator[Fault]:
     if signal.size == 0:
         yield Fault(name, "samples", "none", "record it again")
         return
@@ -65,12 +64,15 @@ def _channel_faults(one: Recording, signal: Floats, name: str) -> Iterator[Fault
     spread = float(np.ptp(signal))
     if spread <= (_SILENT * one.full_scale if np.isfinite(one.full_scale) else _SMALLEST):
         yield Fault(name, "a sound", "silence", "is the right channel connected?")
+    elif not was_played:
+        yield from _level_faults(one, signal, name)
 
 
 def _level_faults(one: Recording, signal: Floats, name: str) -> Iterator[Fault]:
     """Too loud for what records it, or so quiet that its numbers are mostly rounding."""
     height = float(np.ptp(signal)) / 2.0
-    if height < min(_TOO_QUIET * one.full_scale, _N_STEPS * _step(signal)) and np.isfinite(one.full_scale):
+    is_quiet = np.isfinite(one.full_scale) and height < _TOO_QUIET * one.full_scale
+    if is_quiet and height < _N_STEPS * _step(signal):
         got = f"{20.0 * np.log10(height / one.full_scale):.0f} dB of what the file can hold"
         yield Fault(name, "a signal that is more than rounding", got, "too quiet: turn the gain up, or go closer")
     elif (count := clipped_samples(signal, one.full_scale)) > 0:

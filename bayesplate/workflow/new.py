@@ -61,7 +61,7 @@ def new(
     InputError
         If there is a file of that name, or what was given cannot stand on a card; then nothing is written.
     """
-    card = new_card_path(path)
+    card = _free_path(path)
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
     faults: list[Fault] = []
     if words is None:
@@ -86,34 +86,25 @@ def new(
     return card
 
 
-def new_card_path(path: str | os.PathLike[str]) -> Path:
-    """Where a first card of that name would be written.
-
-    Raises
-    ------
-    InputError
-        If there is a file, or if a card cannot have that name.
-    """
+def _free_path(path: str | os.PathLike[str]) -> Path:
     card = Path(path)
     card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
     if card.exists():
         raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
-    if wanted := name_complaint(card.stem):
-        raise InputError(Fault("name", wanted, shown(card.stem), "choose another name"))
     return card
 
 
-def required_edges(edges: str) -> str:
-    """The same text, if it says how four edges are held.
+def require_path(path: str | os.PathLike[str]) -> None:
+    """Refuse what `new` would refuse of a path by itself: a file that exists, a name that no card can have."""
+    card = _free_path(path)
+    if wanted := name_complaint(card.stem):
+        raise InputError(Fault("name", wanted, shown(card.stem), "choose another name"))
 
-    Raises
-    ------
-    InputError
-        If it does not.
-    """
+
+def require_edges(edges: str) -> None:
+    """Refuse a text that does not say how four edges are held."""
     if edge_words(_ARRANGEMENTS.get(edges, edges)) is None:
         raise InputError(Fault("edges", _EDGES_WANTED, shown(edges)))
-    return edges
 
 
 def example_labels(edges: str) -> list[str]:
