@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import click
+
+from bayesplate.errors import InputError
 
 SIZES = {
     "length_x": "Length along the grain, mm",
@@ -28,19 +30,34 @@ def given_answers(options: Mapping[str, Any]) -> dict[str, Any]:
     return told
 
 
-def asked_answers(ask_name: bool) -> dict[str, Any]:
-    """The same from questions on the terminal; an empty answer leaves the matter open."""
-    from bayesplate.workflow.new import example_labels
+def asked_answers(path: str | None) -> dict[str, Any]:
+    """The same from questions on the terminal, a name too where there is none; an empty answer leaves a matter open."""
+    from bayesplate.workflow.new import example_labels, require_edges, require_path
 
+    if path is not None:
+        require_path(path)  # before anything is asked in vain
     click.echo("An empty answer skips a question; an example stands in for it, marked on the card.", err=True)
-    told: dict[str, Any] = {"name": click.prompt("Name", default="my-board", err=True)} if ask_name else {}
+    told: dict[str, Any] = {"name": path or _asked("Name", "my-board", require_path)}
     told["sizes"] = _answered({name: _number(question) for name, question in SIZES.items()})
-    told["edges"] = click.prompt("Edges: free, cantilever, clamped, supported", default="free", err=True)
+    told["edges"] = _asked("Edges: free, cantilever, clamped, supported", "free", require_edges)
     told["prior"] = click.prompt("Wood: spruce, or weakly-informative", default="weakly-informative", err=True)
     click.echo("Frequencies; (m,n) crosses m nodal lines along the grain and n across.", err=True)
     told["frequencies"] = _answered({label: _number(f"{label}, Hz") for label in example_labels(told["edges"])})
     told["notes"] = click.prompt("Notes", default="", show_default=False, err=True)
     return told
+
+
+def _asked(question: str, default: str, require: Callable[[str], object]) -> str:
+    """An answer that can be used: it is asked again until it can."""
+
+    def usable(text: str) -> str:
+        try:
+            require(text)
+        except InputError as error:
+            raise click.BadParameter(str(error)) from None
+        return text
+
+    return str(click.prompt(question, default=default, value_proc=usable, err=True))
 
 
 def _number(question: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from shlex import quote
 from typing import Any
 
 import click
@@ -294,12 +295,16 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
     with reporting(as_json=as_json, debug=debug):
         from bayesplate.workflow.new import new as run
 
-        told = options if given or as_json or quiet else asked_answers(path is None)
-        card = run(path or told.pop("name", "my-board"), **told)
+        told = {"name": path or "my-board"} | (options if given or as_json or quiet else asked_answers(path))
+        card = run(told.pop("name"), **told)
         if as_json:
             print_json({"path": str(card)})
         elif not quiet:
-            say(f"written to {card}. Next: bayesplate modes {card}, which shows where to tap, and bayesplate check")
+            shown = quote(str(card))
+            say(
+                f"written to {card}. Next: bayesplate modes {shown}, which shows the figures and where to listen; "
+                f"bayesplate plan {shown}, where to tap; with frequencies bayesplate check {shown}"
+            )
 
 
 @main.command()
@@ -347,7 +352,8 @@ def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bo
             print_json(result.summary)
         elif not quiet:
             print_shown(show_pick(result.summary))
-            say(f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit CARD --setup {out}/{FRAGMENT}")
+            completes = f"{quote(given['card'] or 'CARD')} --setup {quote(f'{out}/{FRAGMENT}')}"
+            say(f"written to {out}: {FRAGMENT}, {PAGE}. Next: bayesplate fit {completes}")
 
 
 @main.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import Any
 
 import click
@@ -110,12 +111,13 @@ def mass_kg(context: click.Context, option: click.Parameter, given: str | None) 
     if given is None:
         return None
     try:
-        mass, sd = (*(1e-3 * float(part) for part in given.split(",")), 0.0)[:2]
+        grams, sd = (*(float(part) for part in given.split(",", 1)), 0.0)[:2]
     except ValueError:
-        raise click.BadParameter(
-            f"wanted a mass in g, or mass and standard deviation, got {given!r}: 0.6,0.1"
-        ) from None
-    return mass, sd
+        grams, sd = 0.0, 0.0
+    if not (0.0 <= sd <= grams < inf and grams > 0.0):
+        wanted = "wanted a mass in g, or mass and standard deviation, with decimal points"
+        raise click.BadParameter(f"{wanted}, got {given!r}: 0.6 or 0.6,0.1")
+    return 1e-3 * grams, 1e-3 * sd
 
 
 def sand_pictures(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[float, str]:

@@ -121,7 +121,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
         if debug:
             traceback.print_exc()
         _fail(str(error), error.exit_code, as_json, [vars(fault) for fault in error.faults])
-    except KeyboardInterrupt as stopped:
+    except (KeyboardInterrupt, click.Abort) as stopped:  # at a question both keys that end it abort
         _fail(str(stopped) or "interrupted", INTERRUPTED, as_json)
     except BrokenPipeError:
         _close_output()

@@ -12,7 +12,7 @@ from bayesplate.cards.board import (
 from bayesplate.cards.campaign import CampaignCard, SharedSection, is_campaign, load_campaign
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
 from bayesplate.cards.named import NamedCards, load_named
-from bayesplate.cards.physical import physical_faults, plate_mass_g
+from bayesplate.cards.physical import off_the_board, physical_faults, plate_mass_g, too_heavy
 from bayesplate.cards.prior import PriorCard, StatedPrior, load_prior
 from bayesplate.cards.remarks import remarks
 from bayesplate.cards.rows import Columns, Template
@@ -63,9 +63,11 @@ __all__ = [
     "load_coefficients",
     "load_named",
     "load_prior",
+    "off_the_board",
     "physical_faults",
     "plain",
     "plate_mass_g",
     "read_board_text",
     "remarks",
+    "too_heavy",
 ]

@@ -28,7 +28,7 @@ from bayesplate.cards.values import (
     read_words,
 )
 from bayesplate.cards.words import EFFECT_NAMES, quoted, shown
-from bayesplate.errors import Fault, plain
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.quantities import Quantity
 
 DEFAULT_PRIOR = "weakly-informative"
@@ -213,6 +213,9 @@ def _read_board(
 ) -> BoardCard:
     own, file = file, plain(file)
     table = read_table(data, file)
+    if {*table} == {"setup"} and isinstance(table["setup"], dict):
+        remedy = f"it completes a card: CARD --setup {file}"
+        raise InputError(Fault(file, "a card, which has a [plate]", "a [setup] alone, as pick writes it", remedy))
     if setup is not None:
         together, file = merged(table, file, setup)
         data = together.encode("utf-8", "surrogatepass")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from bayesplate.cards.board import BoardCard
 from bayesplate.cards.setup import SetupSection
@@ -13,6 +13,7 @@ from bayesplate.labels import Label
 from bayesplate.quantities import Quantity
 
 LIGHTEST, HEAVIEST = 20.0, 25_000.0  # kg/m3: lighter than balsa foam, heavier than any metal in use
+_LIGHT, _HEAVY = 100.0, 9_000.0  # kg/m3: balsa and brass, between which a board is likely
 THICKEST_SHARE = 0.5  # of the shorter side; beyond it no plate theory holds
 
 
@@ -68,8 +69,7 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
         wanted = f"a density from {LIGHTEST:g} to {HEAVIEST:g} kg/m3"
         remedy = "mass in g, density in kg/m3, lengths in mm"
         if plate.mass_g is not None:
-            kilograms = LIGHTEST <= density * 1000 <= HEAVIEST
-            remedy = f"{plate.mass_g.mean:g} kg is {plate.mass_g.mean * 1000:g} g" if kilograms else remedy
+            remedy = next(_in_other_units(plate.mass_g.mean, density), remedy)
         yield Fault(f"{file} [plate] {key}", wanted, f"{density:.3g} kg/m3", remedy)
     shorter = min(plate.length_x_mm.mean, plate.length_y_mm.mean)
     if plate.thickness_mm.mean > THICKEST_SHARE * shorter:
@@ -83,6 +83,13 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
                 if not 0 <= value <= limits[axis]:
                     wanted = f"a place on the board, 0 to {limits[axis]:g} mm"
                     yield Fault(f"{file} [plate] {key}.{axis} {number}", wanted, f"{value:g} mm")
+
+
+def _in_other_units(mass: float, density: float) -> Iterator[str]:
+    """What a mass would be in g, had it been written in another unit of a balance: as far as a board can weigh that."""
+    for unit, grams in (("kg", 1000.0), ("oz", 28.3495)):
+        if _LIGHT <= density * grams <= _HEAVY:
+            yield f"{mass:g} {unit} is {mass * grams:.4g} g"
 
 
 def _free_span(length: Quantity, clamped: dict[str, float], start: str, end: str) -> tuple[float, float]:
@@ -128,7 +135,6 @@ def _unresolved(where: str, resolution: float, pair: tuple[Label, Label], spacin
 
 
 def _place_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
-    spans = _spans(card, setup)
     places = [
         (f"attached {number} at_mm" + (f" {position}" if len(item.at_mm) > 1 else ""), place)
         for number, item in enumerate(setup.attached, start=1)
@@ -136,16 +142,26 @@ def _place_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[
     ]
     if setup.hammer is not None:
         places.append(("hammer.at_mm", setup.hammer.at_mm))
-    for key, (x, y) in places:
-        (left, right), (bottom, top) = spans["x"], spans["y"]
+    yield from off_the_board(card, setup, {f"{where} {key}": place for key, place in places})
+
+
+def off_the_board(card: BoardCard, setup: SetupSection, places: Mapping[str, tuple[float, float]]) -> Iterator[Fault]:
+    """A fault for each named place, mm, that is not on the part of the board that no clamp covers."""
+    (left, right), (bottom, top) = _spans(card, setup).values()
+    for where, (x, y) in places.items():
         if left < right and bottom < top and not (left <= x <= right and bottom <= y <= top):
             wanted = f"a place on the free part of the board, x {left:g} to {right:g} mm, y {bottom:g} to {top:g} mm"
-            yield Fault(f"{where} {key}", wanted, f"[{x:g}, {y:g}]", "from the corner of x0 and y0 of the whole board")
+            yield Fault(where, wanted, f"[{x:g}, {y:g}]", "from the corner of x0 and y0 of the whole board")
 
 
 def _mass_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
-    board = plate_mass_g(card)
     for number, item in enumerate(setup.attached, start=1):
-        if item.mass_g is not None and item.mass_g.mean >= board:
-            got = f"{item.mass_g.mean:g} g"
-            yield Fault(f"{where} attached {number} mass_g", f"less than the board's own {board:.4g} g", got)
+        if item.mass_g is not None:
+            yield from too_heavy(card, f"{where} attached {number} mass_g", item.mass_g.mean)
+
+
+def too_heavy(card: BoardCard, where: str, grams: float) -> Iterator[Fault]:
+    """A fault for a thing on the board that weighs as much as the board itself."""
+    board = plate_mass_g(card)
+    if grams >= board:
+        yield Fault(where, f"less than the board's own {board:.4g} g", f"{grams:g} g")

@@ -8,6 +8,7 @@ from typing import Any
 from bayesplate.cards.board import BoardCard
 from bayesplate.cards.repeated import CALIPER, RULE, SCALES, are_alike
 from bayesplate.cards.setup import SetupSection
+from bayesplate.quantities import Quantity
 
 THICK_SHARE = 0.1
 """Thickness over the shorter free side beyond which a thin plate is too stiff."""
@@ -16,6 +17,8 @@ LARGE_NOISE = 0.2
 """Relative noise beyond which frequencies say next to nothing: a modulus goes with their square."""
 
 _SHEAR = "transverse_shear"
+_ROUND = (1.0, 2.0, 5.0)
+_MOST_TOLD = 3
 _SIZES = {
     "length_x_mm": ("length along x", f"{RULE:g} mm"),
     "length_y_mm": ("length along y", f"{RULE:g} mm"),
@@ -39,7 +42,7 @@ def remarks(card: BoardCard, effects: Collection[str]) -> tuple[str, ...]:
     """
     found = [*_exact_thickness(card), *_assumed_resolutions(card)]
     for setup in card.setups:
-        found += [*_thick(card, setup, effects), *_noisy(setup)]
+        found += [*_thick(card, setup, effects), *_noisy(setup), *_finer_than_said(setup), *_twice(setup)]
     return tuple(dict.fromkeys(found))
 
 
@@ -90,3 +93,34 @@ def _noisy(setup: SetupSection) -> Iterator[str]:
     vague = [str(label) for label, hz in setup.frequencies_hz.items() if hz.sd > LARGE_NOISE * hz.mean]
     if vague:
         yield f"{where}: more than {100 * LARGE_NOISE:g} % uncertain, so they say next to nothing: {', '.join(vague)}"
+
+
+def _finer_than_said(setup: SetupSection) -> Iterator[str]:
+    """A step of rounding on which the readings do not lie; one that is no round number may itself be rounded."""
+    step = setup.resolution_hz
+    if step is None or float(f"{step:e}".partition("e")[0]) not in _ROUND:
+        return
+    named = [(f"{hz:g} of {label}", hz) for label, q in setup.frequencies_hz.items() for hz in _as_read(q)]
+    finer = [name for name, hz in named if abs(2.0 * hz / step - round(2.0 * hz / step)) > 1e-6]
+    if finer:
+        told = ", ".join(finer[:_MOST_TOLD]) + (" and others" if len(finer) > _MOST_TOLD else "")
+        yield (
+            f"setup '{setup.name}': resolution_hz = {step:g} says that frequencies are rounded to multiples of "
+            f"{step:g} Hz, and {told} are none: state the step of the last digit that was read, or leave it out"
+        )
+
+
+def _twice(setup: SetupSection) -> Iterator[str]:
+    """A peak without a label at the very frequency of a labelled one: it would count as two."""
+    labelled = {q.mean: label for label, q in setup.frequencies_hz.items()}
+    for hz in (q.mean for q in (*setup.unlabelled_hz, *(peak.hz for peak in setup.peaks))):
+        if hz in labelled:
+            yield (
+                f"setup '{setup.name}': the peak without a label at {hz:g} Hz is where {labelled[hz]} is: if it is the "
+                "same peak, leave it out, for it counts as a second mode"
+            )
+
+
+def _as_read(quantity: Quantity) -> tuple[float, ...]:
+    """The numbers that were read; none where a mean is stated with its standard deviation."""
+    return tuple(quantity.readings) or ((quantity.mean,) if quantity.is_exact else ())

@@ -31,7 +31,7 @@ EFFECT_NAMES = (
 )
 
 LONGEST_NAME = 80
-NAME_RULE = f"letters, digits, '.', '_' or '-', beginning with a letter or digit, at most {LONGEST_NAME} characters"
+NAME_RULE = f"A-Z, a-z, 0-9, '.', '_' or '-', beginning with a letter or digit, at most {LONGEST_NAME} characters"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _RESERVED = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT") for n in range(10))}
 _UNIT = re.compile(r"_(mm|g|kg_m3|hz|gpa|percent|n_m)$")

@@ -14,7 +14,13 @@ from bayesplate.recordings.signals import FrequencyResponse, Recording
 Floats = NDArray[np.float64]
 
 _FLAT = 4
-"""Samples in a row at the very top: a wave that is not cut off passes it with one."""
+"""Samples in a row at the very top that may be a wave that was cut off."""
+_CUT = 4.0
+"""Steps of the numbers that a wave would have gone on rising, had it not been cut off: rounding flattens it by one."""
+_N_STEPS = 100
+"""Largest values among which the step is looked for, and steps below which a recording is too quiet."""
+_TOO_QUIET = 10.0 ** (-50.0 / 20.0)
+"""Of full scale; a converter of 16 bits has the steps above left there, one of 24 bits many more."""
 _SILENT = 1e-5
 """Of full scale: less than the last bit of 16."""
 _FASTEST, _SLOWEST = 1e6, 200.0
@@ -22,8 +28,8 @@ _LARGEST, _SMALLEST = 1e100, 1e-100
 """Of numbers without a unit: what lies between them can be squared and divided."""
 
 
-def signal_faults(one: Recording | FrequencyResponse) -> Iterator[Fault]:
-    """Every fault of a recording or a frequency response, with its name."""
+def signal_faults(one: Recording | FrequencyResponse, *, was_played: bool = False) -> Iterator[Fault]:
+    """Every fault of a recording or a frequency response, with its name; the level of what was played is nobody's."""
     if isinstance(one, FrequencyResponse):
         if not np.isfinite(one.values).all():
             yield Fault(one.name, "finite numbers", f"line {_first(one.values)} is none")
@@ -36,12 +42,14 @@ def signal_faults(one: Recording | FrequencyResponse) -> Iterator[Fault]:
         yield Fault(
             f"{one.name} rate", f"{_SLOWEST:g} to {_FASTEST:g} samples a second", f"{one.rate:g}", "is it in Hz?"
         )
-    yield from _channel_faults(one, one.response, one.name if one.force is None else f"{one.name} response")
+    channels = {one.name if one.force is None else f"{one.name} response": one.response}
     if one.force is not None:
-        yield from _channel_faults(one, one.force, f"{one.name} force")
+        channels[f"{one.name} force"] = one.force
+    for name, signal in channels.items():
+        yield from _channel_faults(one, signal, name, was_played=was_played)
 
 
-def _channel_faults(one: Recording, signal: Floats, name: str) -> Iterator[Fault]:
+def _channel_faults(one: Recording, signal: Floats, name: str, *, was_played: bool) -> Iterator[Fault]:
     if signal.size == 0:
         yield Fault(name, "samples", "none", "record it again")
         return
@@ -56,13 +64,27 @@ def _channel_faults(one: Recording, signal: Floats, name: str) -> Iterator[Fault
     spread = float(np.ptp(signal))
     if spread <= (_SILENT * one.full_scale if np.isfinite(one.full_scale) else _SMALLEST):
         yield Fault(name, "a sound", "silence", "is the right channel connected?")
+    elif not was_played:
+        yield from _level_faults(one, signal, name)
+
+
+def _level_faults(one: Recording, signal: Floats, name: str) -> Iterator[Fault]:
+    """Too loud for what records it, or so quiet that its numbers are mostly rounding."""
+    height = float(np.ptp(signal)) / 2.0
+    is_quiet = np.isfinite(one.full_scale) and height < _TOO_QUIET * one.full_scale
+    if is_quiet and height < _N_STEPS * _step(signal):
+        got = f"{20.0 * np.log10(height / one.full_scale):.0f} dB of what the file can hold"
+        yield Fault(name, "a signal that is more than rounding", got, "too quiet: turn the gain up, or go closer")
     elif (count := clipped_samples(signal, one.full_scale)) > 0:
         got = f"{count} samples cut off at the largest value"
         yield Fault(name, "a signal that is not clipped", got, "turn the gain down, or hit more softly")
 
 
 def clipped_samples(signal: Floats, full_scale: float) -> int:
-    """How many samples stand in runs at the largest or the smallest value; 0 if it was passed as a wave does.
+    """How many samples stand in runs at the largest or the smallest value beyond which the wave would have gone.
+
+    A parabola that stays above a height for a while falls, within the same while before and after, by eight times what
+    it rises above that height. Where it rises by no more than the rounding, nothing was cut off.
 
     Parameters
     ----------
@@ -76,10 +98,26 @@ def clipped_samples(signal: Floats, full_scale: float) -> int:
         if top <= 0.0:
             continue
         at_top = side >= top * (1.0 - 1e-9)
-        runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at_top.view(np.int8), [0]]))))[::2]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], at_top.view(np.int8), [0]])))
         least = 2 if top > 0.9 * full_scale else _FLAT
-        total += int(runs[runs >= least].sum())
+        runs = [(first, stop) for first, stop in edges.reshape(-1, 2) if stop - first >= least]
+        if runs:
+            rises = 8.0 * _CUT * _step(side)
+            total += sum(int(stop - first) for first, stop in runs if _fall_beside(side, first, stop) > rises)
     return total
+
+
+def _fall_beside(side: Floats, first: int, stop: int) -> float:
+    """By how much a wave falls before and after a run at its top, within as many samples: the smaller of the two."""
+    length = stop - first
+    beside = [part for part in (side[max(first - length, 0) : first], side[stop : stop + length]) if part.size]
+    return min((float(side[first] - part.min()) for part in beside), default=0.0)
+
+
+def _step(signal: Floats) -> float:
+    """The smallest difference among the largest values: what one bit, or one digit, is worth there."""
+    values = np.unique(signal)[-_N_STEPS:]
+    return float(np.diff(values).min()) if values.size > 1 else 0.0
 
 
 def _is_beyond(values: NDArray[np.generic]) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.recordings.onsets import onsets, soft_onsets
 from bayesplate.recordings.signals import Recording
 
 if TYPE_CHECKING:
@@ -23,17 +24,10 @@ LEAST_FALL = 10.0
 """dB by which a sound must have fallen before the next hit."""
 BOUNCE = 0.1
 """s after a hit within which another one is a bounce of the hammer."""
-_BLOCK = 0.002
-"""s over which a sound's power is taken."""
-_RISE = 10.0
-"""dB by which a hit stands above what was heard just before."""
-_ABOVE_FLOOR = 20.0
-"""dB by which a hit stands above the quiet of the recording."""
-_BELOW_LOUDEST = 26.0
-"""dB below the loudest hit at which nothing is a hit any more."""
-_LOOK_BACK = 5
 _AFTER_SOUND = 0.004
 """s after a tap sets in, when finger or knuckle have left the board."""
+_SETTLED = 0.03
+"""s after a hit and before the next one in which a rise of the sound is that hit."""
 _OF_PULSE, _OF_BOUNCE = 0.05, 0.1
 """Share of the greatest force that belongs to a pulse, and from which on another pulse is a hit."""
 _AFTER_FORCE = 0.0005
@@ -67,9 +61,8 @@ def find_hits(recording: Recording) -> list[Hit]:
         pulses = _pulses(recording.force, recording.rate)
         lag = round(_AFTER_FORCE * recording.rate)
     else:
-        onsets = _onsets(recording.response, recording.rate)
         lag = round(_AFTER_SOUND * recording.rate)
-        pulses = [(onset, onset) for onset in onsets]
+        pulses = [(onset, onset) for onset in onsets(recording.response, recording.rate)]
     ends = [*(begin for begin, _ in pulses[1:]), recording.response.size][: len(pulses)]
     hits = []
     after_bounce = False
@@ -117,35 +110,17 @@ def _pulses(force: Floats, rate: float) -> list[tuple[int, int]]:
     return [(int(b), int(e)) for b, e, is_hit in zip(begins, ends, strong, strict=True) if is_hit]
 
 
-def _onsets(response: Floats, rate: float) -> list[int]:
-    """Where a sound sets in: its power leaps above what was heard just before, and above the quiet of all."""
-    block = max(round(_BLOCK * rate), 1)
-    n = response.size // block
-    if n < 2 * _LOOK_BACK:
-        return []
-    # How the slope changes from sample to sample: a hit is a click, the ringing of a board and hum are not.
-    change = np.diff(response[: n * block], n=2, prepend=response[[0, 0]])
-    power = np.mean(change.reshape(n, block) ** 2, axis=1)
-    floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
-    level = 10.0 * (np.log10(np.maximum(power, 1e-300)) - np.log10(floor))
-    before = np.full(n, 0.0)
-    before[1:] = level[:-1]
-    for back in range(2, _LOOK_BACK + 1):
-        before[back:] = np.maximum(before[back:], level[:-back])
-    rises = np.flatnonzero((level - before > _RISE) & (level > _ABOVE_FLOOR) & (level > level.max() - _BELOW_LOUDEST))
-    return _first_of_each(rises, block, rate)
-
-
-def _first_of_each(rises: NDArray[np.intp], block: int, rate: float) -> list[int]:
-    """Onsets in samples: what sets in within a few blocks of another is the same hit."""
-    apart = max(round(0.01 * rate), 1)
-    onsets: list[int] = []
-    for rise in rises * block:
-        if not onsets or rise - onsets[-1] > apart:
-            onsets.append(int(rise))
-    return onsets
-
-
 def usable(hits: Sequence[Hit]) -> list[Hit]:
     """Those without a fault."""
     return [hit for hit in hits if not hit.fault]
+
+
+def rising_again(recording: Recording, hits: Sequence[Hit], duration: float) -> list[float]:
+    """Times at which a board is heard anew within some seconds after a hit, s from the beginning of the recording."""
+    again = np.array(soft_onsets(recording.response, recording.rate)) / recording.rate
+    found = []
+    for hit in hits:
+        first = hit.start / recording.rate + _SETTLED
+        last = min(hit.start / recording.rate + duration, hit.stop / recording.rate - _SETTLED)
+        found += [float(time) for time in again[(again > first) & (again < last)]]
+    return found

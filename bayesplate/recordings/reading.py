@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Callable, Sequence
+from hashlib import sha256
 from pathlib import Path
+
+import numpy as np
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.checks import signal_faults
@@ -37,6 +40,8 @@ def read_recordings(
     rate: float | None = None,
     channels: str = CHANNELS[0],
     motion: Motion = "acceleration",
+    *,
+    was_played: bool = False,
 ) -> list[list[Read]]:
     """What every file holds.
 
@@ -49,6 +54,8 @@ def read_recordings(
         What the two channels of a sound file are: one of `CHANNELS`.
     motion : str
         What a response is whose file does not say it: one of `bayesplate.recordings.signals.MOTIONS`.
+    was_played : bool
+        Whether the files are what a loudspeaker was given: they may reach the largest value, and may be quiet.
 
     Returns
     -------
@@ -71,11 +78,25 @@ def read_recordings(
         except InputError as error:
             faults += error.faults
             continue
-        faults += [fault for one in read for fault in signal_faults(one)]
+        faults += [fault for one in read for fault in signal_faults(one, was_played=was_played)]
         found.append(read)
+    faults += _given_twice([one for own in found for one in own])
     if faults:
         raise InputError(faults)
     return found
+
+
+def _given_twice(read: Sequence[Read]) -> list[Fault]:
+    """Recordings of the same content: a copy tells nothing new, and would count as a repeat without any scatter."""
+    named: dict[bytes, list[str]] = {}
+    for one in read:
+        both = (one.response, one.force) if isinstance(one, Recording) else (one.values, one.frequency)
+        content = sha256()
+        for part in both:
+            content.update(b"" if part is None else np.ascontiguousarray(part).tobytes())
+        named.setdefault(content.digest(), []).append(one.name)
+    wanted, got, remedy = "each recording once", "the same samples again", "a copy is no new evidence: leave it out"
+    return [Fault(" and ".join(names), wanted, got, remedy) for names in named.values() if len(names) > 1]
 
 
 def _names(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
@@ -90,6 +111,8 @@ def _plain(name: str) -> str:
 
 def _require_file(path: Path, shown: str) -> None:
     """A regular file of a known kind and a size that fits into memory; looked at from outside only."""
+    if path.is_dir():
+        raise InputError(Fault(shown, "a recording", "a folder", f"give the files in it: {shown}/*.wav"))
     if path.suffix.lower() not in READERS:
         got = f'"{_plain(path.suffix)}"' if path.suffix else "no ending"
         raise InputError(Fault(shown, f"a recording: {', '.join(READERS)}", got, "save it as WAV or CSV"))
@@ -101,7 +124,7 @@ def _require_file(path: Path, shown: str) -> None:
     except OSError as error:
         raise InputError(Fault(shown, "a readable file", error.strerror or str(error))) from None
     if not stat.S_ISREG(status.st_mode):
-        raise InputError(Fault(shown, "a regular file", "a folder or a device"))
+        raise InputError(Fault(shown, "a regular file", "a device"))
     if status.st_size == 0:
         raise InputError(Fault(shown, "a recording", "an empty file", "record it again"))
     if status.st_size > LARGEST_FILE:

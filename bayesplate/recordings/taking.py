@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, usable
+from bayesplate.recordings.forces import force_fault
+from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, rising_again, usable
 from bayesplate.recordings.padding import common_padding
 from bayesplate.recordings.reading import Read
 from bayesplate.recordings.signals import FrequencyResponse, Recording
@@ -19,6 +20,7 @@ _OVER_HIGHEST = 2.5
 _SHORT = 0.5
 """Share of the usual length below which a decay is left out, so that it does not shorten all others."""
 _RATE_OFF = 1e-6
+_MOST_TIMES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,9 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
     heard: list[tuple[Recording, list[Hit]]] = []
     remarks: list[str] = []
     for one in recordings:
+        if (no_force := force_fault(one)) is not None:
+            faults.append(no_force)
+            continue
         hits = find_hits(one)
         good = usable(hits)
         bad = [(number, hit) for number, hit in enumerate(hits, start=1) if hit.fault]
@@ -89,7 +94,9 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
     if faults:
         raise InputError(faults)
     kept, short = _without_short(heard)
-    return Heard(decay_spectra(kept, highest), tuple((one, tuple(hits)) for one, hits in kept), (*remarks, *short))
+    spectra = decay_spectra(kept, highest)
+    remarks += [*short, *_risen(kept, spectra.duration)]
+    return Heard(spectra, tuple((one, tuple(hits)) for one, hits in kept), tuple(remarks))
 
 
 def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> Heard:
@@ -139,6 +146,19 @@ def _recording_faults(recordings: Sequence[Recording], highest: float) -> list[F
         if one.motion != first.motion:
             faults.append(Fault(one.name, f"{first.motion}, as {first.name}", one.motion, "pick them apart"))
     return faults
+
+
+def _risen(heard: Sequence[tuple[Recording, Sequence[Hit]]], duration: float) -> list[str]:
+    """Recordings in which something else is heard while the board rings down."""
+    told = []
+    for one, hits in heard:
+        if times := rising_again(one, hits, duration):
+            at = ", ".join(f"{time:.2f}" for time in times[:_MOST_TIMES]) + (" and more" * (len(times) > _MOST_TIMES))
+            told.append(
+                f"{one.name}: the sound rises again within a ring-down, at {at} s: a soft tap or a noise, which makes "
+                "lines that are no modes (record it again, or cut that hit out)"
+            )
+    return told
 
 
 def _without_short(heard: Sequence[tuple[Recording, list[Hit]]]) -> tuple[list[tuple[Recording, list[Hit]]], list[str]]:

@@ -144,7 +144,9 @@ def _draw_marks(panel: Axes, marks: Marks) -> None:
 
 def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> None:
     """The last row: the combined modes under their heading."""
-    which = "measured" if any(mode.measured_hz is not None for mode in sheet.modes) else "lowest named"
+    mixed = {name for one in sheet.combined for name in one.weights}
+    are_measured = all(mode.measured_hz is not None for mode in sheet.modes if mode.name in mixed)
+    which = "measured" if are_measured else "lowest named"
     told = f"Mixtures of the {which} modes that would each answer to one stiffness alone"
     _text(figure, A4[0] / 2, top - 0.10, told, fontsize=9, weight="bold")
     told = "No board rings like this: the mixtures show where each stiffness is at work (darker: moves more)."

@@ -10,7 +10,7 @@ from bayesplate.cards import EDGE_NAMES, load_prior, physical_faults, read_board
 from bayesplate.cards.setup import EdgeWord, edge_words
 from bayesplate.cards.starter import HALF_TOP, Starter, starter_text
 from bayesplate.cards.values import Number, Refusal
-from bayesplate.cards.words import did_you_mean, shown
+from bayesplate.cards.words import did_you_mean, name_complaint, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
@@ -68,10 +68,7 @@ def new(
     wrong += [Fault(k, "a dict of numbers", repr(v)) for k, v in by_name.items() if not isinstance(v, Mapping | None)]
     if wrong:
         raise InputError(wrong)
-    card = Path(path)
-    card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
-    if card.exists():
-        raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
+    card = _free_path(path)
     words = edge_words(_ARRANGEMENTS.get(edges, edges))
     faults = [
         Fault(f"sizes {name}", f"one of {', '.join(SIZES)}", shown(name), did_you_mean(str(name), SIZES))
@@ -98,6 +95,27 @@ def new(
         card.parent.mkdir(parents=True, exist_ok=True)
     write_text(card, text)
     return card
+
+
+def _free_path(path: str | os.PathLike[str]) -> Path:
+    card = Path(path)
+    card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
+    if card.exists():
+        raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
+    return card
+
+
+def require_path(path: str | os.PathLike[str]) -> None:
+    """Refuse what `new` would refuse of a path by itself: a file that exists, a name that no card can have."""
+    card = _free_path(path)
+    if wanted := name_complaint(card.stem):
+        raise InputError(Fault("name", wanted, shown(card.stem), "choose another name"))
+
+
+def require_edges(edges: str) -> None:
+    """Refuse a text that does not say how four edges are held."""
+    if edge_words(_ARRANGEMENTS.get(edges, edges)) is None:
+        raise InputError(Fault("edges", _EDGES_WANTED, shown(edges)))
 
 
 def example_labels(edges: str) -> list[str]:

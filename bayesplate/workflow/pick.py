@@ -19,8 +19,9 @@ from bayesplate.recordings.taking import Heard, take, take_impulses
 from bayesplate.results.folder import FIGURES, make_folder, require_new, write_text
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fragment import fragment_text
+from bayesplate.workflow.pick_sand import pictures_of, upright
 from bayesplate.workflow.pick_words import show_pick
-from bayesplate.workflow.places import given_places
+from bayesplate.workflow.places import given_places, require_on_board
 from bayesplate.workflow.prepare import Prepared, prepare
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 
 FRAGMENT, PAGE, SUMMARY = "setup.toml", "recordings.html", "pick.json"
 _RATE_OFF = 1e-6
-_SAND_OFF = 0.03
-"""Relative distance up to which a picture of sand belongs to a peak."""
 
 FilePath = str | os.PathLike[str]
 Place = tuple[float, float]
@@ -129,6 +128,9 @@ def pick(
     )  # fmt: skip
     targets = () if out is None else require_new(Path(out), (FRAGMENT, PAGE, SUMMARY), force=force)
     prepared = None if card is None else _one_setup(prepare(card, may_lack_frequencies=True))
+    if prepared is not None:
+        # a microphone may be beside the board, and is nowhere on a card
+        require_on_board(prepared.card, hammer, () if motion == "pressure" else sensor, sensor_mass)
     pictures = {hertz: read_picture(path) for hertz, path in (sand or {}).items()}
     read = read_recordings(files, rate, channels, motion)
     read = [
@@ -160,7 +162,7 @@ def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recordin
     if not Path(sweep).exists():
         played = read_sweep(sweep)
         return [impulse_response(one, played) for one in recordings]
-    ((itself, *_),) = read_recordings([sweep])
+    ((itself, *_),) = read_recordings([sweep], was_played=True)
     if not isinstance(itself, Recording):
         raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
     off = [one for one in recordings if abs(one.rate / itself.rate - 1.0) > _RATE_OFF]
@@ -186,8 +188,9 @@ def _summary(
     remarks = list(heard.remarks)
     labels = None
     if prepared is not None:
-        shown, beside = _pictures_of(picked, pictures)
-        remarks += beside
+        kept, turned = upright(prepared.board, pictures)
+        shown, beside = pictures_of(picked, kept)
+        remarks += [*turned, *beside]
         labels, told = _labelled(prepared, picked, flips, shown)
         remarks += told
     elif pictures:
@@ -227,23 +230,10 @@ def _labelled(
     from bayesplate.workflow.pick_labels import label_peaks
 
     try:
-        return label_peaks(prepared.board, prepared.prior, picked, flips, shown), []
+        labels = label_peaks(prepared.board, prepared.prior, picked, flips, shown)
+        return labels, [*labels.doubts]
     except NotIdentifiableError as error:
         return None, [f"no labels: {error}"]
-
-
-def _pictures_of(picked: Picked, pictures: Mapping[float, Floats]) -> tuple[dict[int, list[Floats]], list[str]]:
-    """Pictures by the number of the likely peak nearest to their frequency, and those without one."""
-    found: dict[int, list[Floats]] = {}
-    told = []
-    likely = picked.likely
-    for hertz, picture in pictures.items():
-        off = [abs(mode.frequency / hertz - 1.0) for mode in likely]
-        if not off or min(off) > _SAND_OFF:
-            told.append(f"no peak within {100.0 * _SAND_OFF:g} % of the sand at {hertz:g} Hz")
-        else:
-            found.setdefault(off.index(min(off)), []).append(picture)
-    return found, told
 
 
 def _each_once(named: Mapping[int, tuple[str, float]]) -> dict[int, tuple[str, float]]:

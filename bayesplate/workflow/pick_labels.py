@@ -6,7 +6,7 @@ assigned to modes by the likelihood that the fit uses, with what residues and sa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,8 @@ _POLARITY_SURE = float(np.log(20.0))
 _STATED, _BEYOND_DOUBT = 0.5, 0.99
 """Probability from which on a label is stated: where sand and residues speak for it too, and where they do not."""
 _GRID = np.linspace(0.0, 1.0, 61)
+_MOSTLY, _CLEARLY = 0.9, float(np.log(20.0))
+"""Probability of a mode by the frequencies, and ln of the odds by the sand, from which on the two are compared."""
 _NEAR = 0.15
 """Relative distance within which sand and residues choose among the modes."""
 
@@ -51,11 +53,14 @@ class Labels:
         The same from sand and residues alone, among the modes nearby; empty where neither tells anything.
     flips : bool or None
         Whether force and response have opposite polarity; None if that does not show.
+    doubts : tuple of str
+        Pictures that show another mode than their frequency says.
     """
 
     probabilities: tuple[dict[str, float], ...]
     by_evidence: tuple[dict[str, float], ...]
     flips: bool | None
+    doubts: tuple[str, ...] = ()
 
     def of(self, peak: int) -> list[tuple[str, float]]:
         """Labels of one likely peak, the most probable first."""
@@ -117,6 +122,7 @@ def label_peaks(
     if flips is not None:
         signed = bare_board(board, likely, picked, flips)
         known = [one.with_peaks(signed) for one in known]
+    doubts = tuple(_other_modes(known[int(np.argmax(shares))], likely, pictures))
     evidence = [_evidence(one, picked, pictures) for one in known]
     weights = np.log(shares) + [one.gain(own) for one, own in zip(known, evidence, strict=True)]
     shares = np.exp(weights - weights.max())
@@ -126,7 +132,7 @@ def label_peaks(
     for one, own, share in zip(known, evidence, shares, strict=True):
         _add(totals, one.probabilities(own), one.names, share)
         _add(alone, _alone(own, one, likely), one.names, share)
-    return Labels(tuple(map(_sorted, totals)), tuple(map(_sorted, alone)), flips)
+    return Labels(tuple(map(_sorted, totals)), tuple(map(_sorted, alone)), flips, doubts)
 
 
 def proposing(likely: Sequence[PickedMode]) -> Sequence[PickedMode]:
@@ -190,6 +196,23 @@ def _evidence(known: MostlyKnown, picked: Picked, pictures: Mapping[int, Sequenc
         for picture in own:
             evidence[peak] += sand_evidence(picture, known.shapes(_GRID))
     return evidence
+
+
+def _other_modes(
+    known: MostlyKnown, likely: Sequence[PickedMode], pictures: Mapping[int, Sequence[Floats]]
+) -> Iterator[str]:
+    """What to ask of a picture that shows another mode than the one that its peak is by all frequencies."""
+    probabilities = known.probabilities(None)
+    for peak, own in pictures.items():
+        expected = int(np.argmax(probabilities[peak]))
+        for picture in own if probabilities[peak, expected] > _MOSTLY else ():
+            evidence = sand_evidence(picture, known.shapes(_GRID))
+            shown = int(np.argmax(evidence))
+            if evidence[shown] - evidence[expected] > _CLEARLY:
+                yield (
+                    f"the sand at {likely[peak].frequency:.4g} Hz shows {known.names[shown]}, and its frequency is "
+                    f"that of {known.names[expected]}: is it the picture of this peak, x from left to right?"
+                )
 
 
 def _alone(evidence: Floats, known: MostlyKnown, likely: Sequence[PickedMode]) -> Floats:

@@ -73,7 +73,7 @@ def test_nothing_needs_to_be_shared(tmp_path):
         ('name = "my-campaign"', 'name = "other"', 'my-campaign.toml name: wanted "my-campaign"'),
         ('"spruce-free-2L", ', "", "my-campaign.toml boards: wanted at least two boards, got 1"),
         ("./my-board.toml", "spruce-free-2L", "my-campaign.toml boards: wanted each board once"),
-        ("./my-board.toml", "my board", "my-campaign.toml boards 2: wanted letters"),
+        ("./my-board.toml", "my board", "my-campaign.toml boards 2: wanted A-Z, a-z"),
         ('effect = "attached_mass"', 'effect = "attached_mas"', 'my-campaign.toml [[shared]] 1 effect: wanted "transv'),
         (
             'as = "ratio"',

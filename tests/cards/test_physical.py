@@ -27,6 +27,8 @@ CASES = [
      "a rounding finer than the spacing of (1,0) and (1,1), 46.3333 Hz", "50 Hz", "these labels cannot be told apart"),
     ("mass_g = 41.0", "mass_g = 0.041", "[plate] mass_g", "a density from 20 to 25000 kg/m3", "0.474 kg/m3",
      "0.041 kg is 41 g"),
+    ("mass_g = 41.0", "mass_g = 1.45", "[plate] mass_g", "a density from 20 to 25000 kg/m3", "16.8 kg/m3",
+     "1.45 oz is 41.11 g"),
     ("mass_g = 41.0", "mass_g = 41000", "[plate] mass_g", "a density from 20 to 25000 kg/m3", "4.74e+05 kg/m3",
      "mass in g, density in kg/m3, lengths in mm"),
     ("mass_g = 41.0", "density_kg_m3 = 4.7", "[plate] density_kg_m3", "a density from 20 to 25000 kg/m3", "4.7 kg/m3",

@@ -19,7 +19,7 @@ EDGES = 'edges = { x0 = "clamped", x1 = "free", y0 = "free", y1 = "free" }'
 SETUP = "[setup] "
 FREQUENCY = '[setup] frequencies_hz."(1,0)"'
 UNKNOWN = "an unknown key"
-NAME_RULE = "letters, digits, '.', '_' or '-', beginning with a letter or digit, at most 80 characters"
+NAME_RULE = "A-Z, a-z, 0-9, '.', '_' or '-', beginning with a letter or digit, at most 80 characters"
 GRAMMAR = 'two whole numbers from 0 to 11, written like "(1,0)"'
 
 NUMBERS = [

@@ -62,6 +62,37 @@ def test_noise_alone_holds_no_hit():
     assert find_hits(Recording("quiet", RATE, quiet, quiet[::-1])) == []
 
 
+def with_hiss(softest: float, rate: float = 44_100.0) -> Recording:
+    """Four taps of which one is soft, in hiss as a telephone records it, far above what a board rings at."""
+    heard = np.zeros(round(7.0 * rate))
+    for share, at in zip([1.0, softest, 0.9, 0.8], TIMES, strict=True):
+        first = round(at * rate)
+        heard[first:] += share * hits(np.random.default_rng(1), [0.0], HAMMER, rate=rate, seconds=7.0 - at)[1]
+    hiss = 2e-3 * np.abs(heard).max() * np.random.default_rng(2).standard_normal(heard.size)
+    hum = 1e-2 * np.abs(heard).max() * np.sin(2.0 * np.pi * 50.0 * np.arange(heard.size) / rate)
+    return Recording("tap.wav", rate, heard + hiss + hum)
+
+
+def test_a_soft_tap_is_found_in_the_hiss_of_a_wide_band_and_a_softer_one_is_told():
+    found = find_hits(with_hiss(0.4))
+
+    np.testing.assert_allclose([hit.onset / 44_100.0 for hit in found], TIMES, atol=0.004)
+
+    softer = take([[with_hiss(0.08)]], 500.0)
+
+    assert len(softer.spectra.names) == 3
+    (told,) = softer.remarks
+    assert told.startswith("tap.wav: the sound rises again within a ring-down, at 1.90 s: a soft tap or a noise")
+    assert take([[with_hiss(0.4)]], 500.0).remarks == ()
+
+
+def test_hum_alone_is_no_hit_where_the_recording_begins():
+    times = np.arange(88_200) / 44_100.0
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(times.size)
+
+    assert find_hits(Recording("hum.wav", 44_100.0, np.sin(2.0 * np.pi * 50.0 * times) + noise)) == []
+
+
 def test_what_can_be_used_is_used_and_the_rest_is_told():
     taken = take([[recording([0.5, 0.56, 1.9, 3.3, 4.7])]], 500.0)
 
@@ -89,6 +120,22 @@ def test_what_cannot_be_used_is_refused_with_every_hit_and_every_file():
         "slow.wav rate: wanted 4000 Hz, as quiet.wav, got 1000 Hz",
     ):
         assert said in message
+
+
+def test_a_force_that_rings_or_is_the_response_is_none_and_told_once_for_each_file():
+    one = recording(TIMES, name="right.wav")
+    hiss = 1e-3 * np.random.default_rng(4).standard_normal(one.response.size)
+    exchanged = replace(one, name="exchanged.wav", force=one.response, response=one.force)
+    stereo = replace(one, name="stereo.wav", force=-0.8 * one.response + hiss)
+
+    assert len(take([[one]], 500.0).spectra.names) == 4
+    with pytest.raises(InputError) as caught:
+        take([[one], [exchanged], [stereo]], 500.0)
+
+    first, second = map(str, caught.value.faults)
+    assert first.startswith("exchanged.wav force: wanted a channel with a pulse for each hit, got one that rings on")
+    assert second.startswith("stereo.wav force: wanted a channel with a pulse for each hit, got nearly the same as the")
+    assert "--channels response,force where they are exchanged, response,response" in first
 
 
 def test_what_does_not_go_together_is_refused():

@@ -114,6 +114,8 @@ def spoilt(name: str) -> np.ndarray:
         signal[:] = 0.0
     elif name == "short":
         signal = signal[:800]
+    elif name == "quiet":
+        signal = np.round(50.0 * RING) / 2.0**15
     elif name == "clipped":
         signal = np.clip(signal, -0.3, 0.3)
     return signal
@@ -124,15 +126,19 @@ FAULTS = {
     "silent": "silent.wav: wanted a sound, got silence (is the right channel connected?)",
     "short": "short.wav: wanted 0.25 s or more, got 0.1 s (let the board ring out)",
     "clipped": "clipped.wav: wanted a signal that is not clipped, got",
+    "quiet": "quiet.wav: wanted a signal that is more than rounding, got -56 dB of what the file can hold (too quiet",
 }
 
 
 def test_every_fault_of_every_file_is_told_at_once(tmp_path):
     for name in FAULTS:
-        wavfile.write(tmp_path / f"{name}.wav", RATE, spoilt(name))
+        signal = spoilt(name)
+        stored = np.round(2.0**15 * signal).astype(np.int16) if name == "quiet" else signal
+        wavfile.write(tmp_path / f"{name}.wav", RATE, stored)
     (tmp_path / "empty.wav").write_bytes(b"")
     (tmp_path / "noise.wav").write_bytes(b"RIFFnonsense")
     (tmp_path / "text.doc").write_text("hit")
+    (tmp_path / "taps").mkdir()
     write_wav(tmp_path / "three.wav", RATE, RING, RING, RING)
     (tmp_path / "unnamed.csv").write_text("1,2\n3,4\n")
     (tmp_path / "comma.csv").write_text("force;acceleration\n0,5;0,7\n")
@@ -144,6 +150,7 @@ def test_every_fault_of_every_file_is_told_at_once(tmp_path):
         "empty.wav: wanted a recording, got an empty file",
         "noise.wav: wanted a WAV file, got",
         'text.doc: wanted a recording: .wav, .csv, .flac, .uff, .unv, got ".doc"',
+        "taps: wanted a recording, got a folder (give the files in it: taps/*.wav)",
         "three.wav channels: wanted one channel, or two: force and response, got 3",
         "unnamed.csv line 1: wanted named columns",
         "comma.csv line 1: wanted commas between columns, got semicolons or tabs",
@@ -160,6 +167,20 @@ def test_every_fault_of_every_file_is_told_at_once(tmp_path):
     message = str(caught.value)
     assert [line for line in said if line not in message] == []
     assert len(caught.value.faults) == len(said)
+
+
+def test_a_recording_that_is_given_twice_is_refused_with_both_names(tmp_path):
+    """The same file, and its samples in a file of another kind; another hit is another recording."""
+    path = write_wav(tmp_path / "a.wav", RATE, RING)
+    samples = only(path).response
+    np.savetxt(tmp_path / "b.csv", samples, "%.17g", header="acceleration", comments="")
+    write_wav(tmp_path / "c.wav", RATE, RING[::-1])
+
+    with pytest.raises(InputError) as caught:
+        read_recordings([path, tmp_path / "b.csv", tmp_path / "c.wav"], rate=float(RATE))
+
+    (fault,) = caught.value.faults
+    assert str(fault).startswith("a.wav and b.csv: wanted each recording once, got the same samples again")
 
 
 def test_a_sound_file_of_another_rate_than_said_is_refused(tmp_path):
@@ -189,6 +210,23 @@ def test_a_wave_that_just_reaches_its_top_is_not_clipped():
     assert clipped_samples(np.round(100.0 * RING) / 100.0, np.inf) == 0
     assert clipped_samples(np.array([0.0, 1.0, 0.0, -1.0] * 50), 1.0) == 0
     assert clipped_samples(np.clip(RING, -0.6, 0.6), np.inf) > 20
+
+
+@pytest.mark.parametrize("height", [60.0, 300.0, 32767.0])
+def test_a_tip_that_rounding_flattens_is_not_clipped_and_one_that_is_cut_off_is(height):
+    """A slow wave of so many steps: its tip is narrower than one of them for up to a dozen samples."""
+    wave = height * np.exp(-3.0 * TIMES) * np.sin(2.0 * np.pi * 45.0 * TIMES)
+
+    assert clipped_samples(np.round(wave) / 2.0**15, 1.0) == 0
+    assert clipped_samples(np.round(np.clip(wave, -0.6 * height, 0.6 * height)) / 2.0**15, 1.0) > 20
+
+
+def test_what_a_loudspeaker_was_given_may_be_at_its_top_and_quiet(tmp_path):
+    for name in ("clipped", "quiet"):
+        wavfile.write(tmp_path / f"{name}.wav", RATE, np.round(2.0**15 * spoilt(name)).astype(np.int16))
+        with pytest.raises(InputError, match="turn the gain"):
+            read_recordings([tmp_path / f"{name}.wav"])
+        read_recordings([tmp_path / f"{name}.wav"], was_played=True)
 
 
 @pytest.mark.parametrize(("ending", "library"), [(".flac", "soundfile"), (".uff", "pyuff")])

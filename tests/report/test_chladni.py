@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,16 @@ def test_a_panel_a_mode_and_its_words():
     assert "Hz at the estimate" in texts[1]
     assert any("Edges: hatched = clamped, thin = free, dashed = supported." in text for text in texts)
     assert any("begin at (1,0)" in text for text in texts)
+    assert any("Mixtures of the lowest named modes" in text for text in texts)  # which mix (1,0), not measured
+
+
+def test_mixtures_of_measured_modes_are_said_to_be_that():
+    sheet = made()
+    combined = tuple(replace(one, weights={"(0,0)": 1.0}) for one in sheet.combined)
+
+    _, texts = words(chladni_sheet(replace(sheet, combined=combined)))
+
+    assert any("Mixtures of the measured modes" in text for text in texts)
 
 
 def test_nodal_lines_lie_where_the_shape_is_zero():

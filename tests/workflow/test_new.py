@@ -75,6 +75,26 @@ def test_the_examples_are_modes_that_the_board_has(edges):
         assert labels[:3] == ['"(1,1)"', '"(2,0)"', '"(0,2)"']
 
 
+def test_a_name_and_edges_that_cannot_be_are_asked_again_at_once():
+    Path("there.toml").write_text("mine", encoding="utf-8")
+    answers = ["Böden", "there", "mine", "", "", "", "", "round", "cantilever", *[""] * 12]
+    result = invoke(answers="\n".join(answers))
+
+    assert result.exit_code == 0, result.output
+    for said in ("name: wanted A-Z, a-z, 0-9", "there.toml: wanted a new file", 'edges: wanted "free"'):
+        assert said in result.stderr
+    assert 'x0 = "clamped"' in Path("mine.toml").read_text(encoding="utf-8")
+    assert invoke("Böden").exit_code == 3  # with nothing to answer
+
+
+def test_the_end_of_the_answers_is_an_interruption():
+    result = invoke("first", answers="550\n")
+
+    assert result.exit_code == 130
+    assert result.stderr.endswith("interrupted\n")
+    assert list(Path().iterdir()) == []
+
+
 def test_options_ask_nothing():
     options = ["--length-x", "253", "--edges", "cantilever", "--title", 'a "b" \\ ü', "--frequency", "( 1, 0 ) = 52"]
     result = invoke("mine", *options)

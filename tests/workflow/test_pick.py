@@ -74,6 +74,14 @@ def test_the_fragment_is_a_setup_and_completes_the_card(bench):
     assert read.ends_x == ("free", "free")
 
 
+def test_the_fragment_alone_is_no_card_and_says_what_it_is_for(bench):
+    folder, _ = bench
+    with pytest.raises(
+        InputError, match=r"setup\.toml: wanted a card, .* \(it completes a card: CARD --setup setup\.toml\)"
+    ):
+        bayesplate.check(folder / "out" / "setup.toml")
+
+
 def test_the_page_shows_everything_and_fetches_nothing(bench):
     folder, found = bench
     page = (folder / "out" / "recordings.html").read_text()
@@ -127,6 +135,37 @@ def test_refused_files_leave_no_folder_and_name_every_fault(tmp_path):
 def test_every_bad_argument_is_named(given, said):
     with pytest.raises(InputError, match=said):
         bayesplate.pick(**given)
+
+
+def test_places_and_masses_that_its_card_cannot_have_are_refused_before_anything_is_read(tmp_path):
+    (tmp_path / "planted.toml").write_text(CARD)
+    at = {"hammer": [(0.6, 0.02)], "sensor": [(0.02, -0.003), (0.58, 0.217)]}
+
+    with pytest.raises(InputError) as caught:
+        bayesplate.pick(["a.wav", "b.wav"], card=tmp_path / "planted.toml", sensor_mass=(0.3, 0.0), **at)
+    with pytest.raises(
+        InputError, match=r"sensor_mass: wanted at most 2% of the board's 253.8 g for a sensor that rov"
+    ):
+        bayesplate.pick(
+            ["a.wav", "b.wav"], card=tmp_path / "planted.toml", sensor_mass=(0.03, 0.0), sensor=[(0, 0), (0.1, 0)]
+        )
+    with pytest.raises(InputError, match=r"a\.wav: wanted a recording"):
+        bayesplate.pick(["a.wav"], card=tmp_path / "planted.toml", sensor=[(-0.01, 0.0)], motion="pressure")
+
+    hammer, sensor, mass = map(str, caught.value.faults)
+    assert hammer.startswith(
+        "hammer: wanted a place on the free part of the board, x 0 to 580 mm, y 0 to 217 mm, got [600,"
+    )
+    assert sensor.startswith("sensor 1: wanted a place on the free part of the board")
+    assert mass == "sensor_mass: wanted less than the board's own 253.8 g, got 300 g"
+
+
+@pytest.mark.parametrize("given", ["0,6", "0,6,0,1", "nan", "-1", "a"])
+def test_the_mass_of_the_sensor_is_asked_for_in_grams(given):
+    result = CliRunner().invoke(main, ["pick", "a.wav", "--sensor-mass", given])
+
+    assert result.exit_code == 2
+    assert f"wanted a mass in g, or mass and standard deviation, with decimal points, got '{given}'" in result.stderr
 
 
 BAD_FRAGMENTS = {

@@ -3,14 +3,17 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from made_recordings import CARD, board
+from generator.sand import photograph
+from made_recordings import CARD, SIDES, board
 
 from bayesplate.recordings.contract import LabelChance, PickedRow
 from bayesplate.recordings.picking import PickedMode
 from bayesplate.results.words import chances
 from bayesplate.workflow import pick_labels
 from bayesplate.workflow.pick_labels import FEWEST_SURE, Labels, label_peaks, proposing
+from bayesplate.workflow.pick_sand import upright
 from bayesplate.workflow.prepare import prepare
 
 CASES = {
@@ -57,6 +60,29 @@ PEAK = PickedMode(
     frequency=0.0, sd=0.0, noise_sd=0.0, scatter_sd=0.0, window_sd=0.0, damping=0.01, damping_sd=0.001, mobility=(1.0,),
     mobility_sd=(0.1,), complexity=0.0, alike=1.0, amplitude=1.0, seen=1.0, spurious=0.0, kind="",
 )  # fmt: skip
+
+
+def test_a_picture_of_another_mode_or_crosswise_is_told(tmp_path):
+    """Sand of the modes themselves is the negative control."""
+    (tmp_path / "planted.toml").write_text(CARD)
+    prepared = prepare(tmp_path / "planted.toml", may_lack_frequencies=True)
+    likely = tuple(replace(PEAK, frequency=hz, sd=1e-3 * hz) for hz in board().damped[:8])
+    picked = SimpleNamespace(likely=likely, spectra=SimpleNamespace(force=None, between=((None, None),)))
+    rng = np.random.default_rng(4)
+    sand = [photograph(rng, board().modes.shape(m), SIDES) for m in (2, 3)]
+    names = ["({},{})".format(*name) for name, _ in board().modes.names()[:4]]
+
+    right = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [sand[0]], 3: [sand[1]]})
+    wrong = label_peaks(prepared.stated, prepared.prior, picked, None, {2: [sand[1]], 3: [sand[1]]})
+    kept, told = upright(prepared.board, {145.0: sand[0], 150.0: sand[1].T})
+
+    assert right.doubts == ()
+    (doubt,) = wrong.doubts
+    assert f"shows {names[3]}, and its frequency is that of {names[2]}: is it the picture of this peak" in doubt
+    assert [*kept] == [145.0]
+    assert told[0].startswith(
+        "the sand at 150 Hz left out: the picture is higher than wide, the board 580 mm along x and"
+    )
 
 
 @pytest.mark.parametrize("rule", ["the sure ones", "all of them"])
