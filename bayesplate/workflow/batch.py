@@ -15,7 +15,7 @@ from bayesplate.errors import (
 )
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.batch_summary import FORMAT, BatchSummary, Failure
+from bayesplate.results.batch_summary import FORMAT, BatchSummary, Doubt, Failure
 from bayesplate.results.board_journal import Journal
 from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.board_table import TableKind, require_table_kind, write_table
@@ -185,10 +185,12 @@ def _interruptions_told() -> Iterator[None]:
 
 
 def _summary(rows: Iterable[BoardRow], seed: int, versions: Mapping[str, str], aside: tuple[str, ...]) -> BatchSummary:
-    failures, n, n_fitted = [], 0, 0
+    failures, doubts, n, n_fitted = [], [], 0, 0
     for row in rows:
         n += 1
         n_fitted += row.is_fitted
         if not row.is_fitted:
             failures.append(Failure(row.name, row.outcome, row.message))
-    return BatchSummary(FORMAT, seed, versions, n, n_fitted, n - n_fitted, tuple(failures), aside)
+        if row.doubt:
+            doubts.append(Doubt(row.name, row.doubt))
+    return BatchSummary(FORMAT, seed, versions, n, n_fitted, n - n_fitted, tuple(failures), tuple(doubts), aside)

@@ -24,7 +24,7 @@ from bayesplate.errors import (
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.batch_summary import FORMAT
 from bayesplate.results.board_journal import Journal
-from bayesplate.results.board_rows import BoardRow, row_of
+from bayesplate.results.board_rows import WORDS, BoardRow, row_of
 from bayesplate.results.folder import BOARDS, SUMMARY
 from bayesplate.results.versions import versions
 from bayesplate.workflow.batch_boards import Source
@@ -115,7 +115,7 @@ class Run:
         request = replace(self.request, seed=seed, tables=dict(named.tables))
         tables = {table: repr(one) for table, one in sorted(named.tables.items())}
         asked = {**asdict(replace(request, tables={})), "tables": tables}
-        key = _hash(FORMAT, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
+        key = _hash(FORMAT, WORDS, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
         arguments = (card, named.prior, request)
         call = Call(fit_board, arguments)
         if self.folders:
