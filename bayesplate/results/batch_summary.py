@@ -61,4 +61,4 @@ class BatchSummary:
         lines += [f"{one.name}: {one.outcome}: {one.message}" for one in self.failed[:_MOST_TOLD]]
         if self.n_failed > _MOST_TOLD:
             lines.append(f"and {self.n_failed - _MOST_TOLD} more, in {table}")
-        return "\n".join([*lines, "mend their cards: --resume then fits these alone"])
+        return "\n".join([*lines, "correct their cards or rows: --resume then fits these alone"])

@@ -62,6 +62,8 @@ class BoardRow:
         Those of `NUMBERS` that a fitted board has.
     joint : Joint or None
         How its constants vary together.
+    readings_sha256 : str
+        Of what was measured on a fitted board.
     """
 
     name: str
@@ -73,6 +75,7 @@ class BoardRow:
     told: Mapping[str, str] | None = None
     numbers: Mapping[str, float | None] | None = None
     joint: Joint | None = None
+    readings_sha256: str = ""
 
     @property
     def is_fitted(self) -> bool:
