@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from made_batches import TEMPLATE, card_text, write_cards
+from made_summaries import SUMMARY
 from runs import files_in
 
 import bayesplate
@@ -383,6 +385,34 @@ def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table,
     assert told["prior"].startswith("tops.csv row 5 -> prior.toml [material] prior -> ")
     assert told["twice"] == "tops.csv row 6 -> wanted a name of its own, got twice more than once"
     assert told["Twice"].startswith("tops.csv row 8 -> ")
+
+
+def test_doubts_of_a_fit_and_of_copied_rows_reach_the_table_and_the_summary_and_not_the_journal(table, monkeypatch):
+    """A copy that is taken out leaves no doubt behind when the run is continued."""
+
+    def made(workers, calls):
+        for key, call in calls:
+            future: Future[Any] = Future()
+            future.set_result(
+                replace(SUMMARY, name=(name := call.arguments[0].name), doubts=("misread?",) * (name == "c"))
+            )
+            yield key, future
+
+    monkeypatch.setattr("bayesplate.workflow.batch_run.computed", made)
+    header, *rows = 'name,"(0,0)","(0,1)","(1,0)"', "a,57,100,130", "b,57,100,130", "c,58,100,130"
+    found = []
+    for some, resume in ((rows, False), (rows[1:], True)):
+        table.write_text("\n".join([header, *some]))
+        template = table.parent / "template.toml"
+        result = bayesplate.batch(table, table.parent / "out", template=template, report=False, resume=resume)
+        doubts = {one.name: one.doubt for one in result.summary.doubts}
+        assert {
+            name: row["doubt"] for name, row in rows_of(result.table.read_bytes()).items() if row["doubt"]
+        } == doubts
+        found.append(doubts)
+
+    copied = "every reading is that of {} to the last digit: one board twice, or a copy?"
+    assert found == [{"a": copied.format("b"), "b": copied.format("a"), "c": "misread?"}, {"c": "misread?"}]
 
 
 def test_a_folder_keeps_what_stands_behind_a_point_in_its_name(table):
