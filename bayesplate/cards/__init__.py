@@ -11,11 +11,12 @@ from bayesplate.cards.board import (
 )
 from bayesplate.cards.campaign import CampaignCard, SharedSection, is_campaign, load_campaign
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
+from bayesplate.cards.copies import readings_sha256
 from bayesplate.cards.named import NamedCards, load_named
 from bayesplate.cards.physical import off_the_board, physical_faults, plate_mass_g, too_heavy
 from bayesplate.cards.prior import PriorCard, StatedPrior, load_prior
 from bayesplate.cards.remarks import remarks
-from bayesplate.cards.rows import Columns, Template
+from bayesplate.cards.rows import Columns
 from bayesplate.cards.setup import (
     MISSED,
     SPURIOUS,
@@ -27,6 +28,7 @@ from bayesplate.cards.setup import (
     SetupSection,
 )
 from bayesplate.cards.shelf import card_names, find
+from bayesplate.cards.template import Template
 from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
 from bayesplate.errors import plain
 
@@ -68,6 +70,7 @@ __all__ = [
     "plain",
     "plate_mass_g",
     "read_board_text",
+    "readings_sha256",
     "remarks",
     "too_heavy",
 ]

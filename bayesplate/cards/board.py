@@ -17,7 +17,7 @@ from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.repeated import CALIPER, FURTHEST_SIZES, RULE, SCALES
 from bayesplate.cards.schema import Section, place, validated
 from bayesplate.cards.setup import SetupSection
-from bayesplate.cards.shelf import find
+from bayesplate.cards.shelf import CAMPAIGN_REMEDY, find
 from bayesplate.cards.values import (
     Number,
     read_format,
@@ -27,7 +27,7 @@ from bayesplate.cards.values import (
     read_text,
     read_words,
 )
-from bayesplate.cards.words import EFFECT_NAMES, quoted, shown
+from bayesplate.cards.words import EFFECT_NAMES, name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.quantities import Quantity
 
@@ -216,6 +216,8 @@ def _read_board(
     if {*table} == {"setup"} and isinstance(table["setup"], dict):
         remedy = f"it completes a card: CARD --setup {file}"
         raise InputError(Fault(file, "a card, which has a [plate]", "a [setup] alone, as pick writes it", remedy))
+    if "boards" in table and not {"plate", "setup"} & table.keys():
+        raise InputError(Fault(file, "a board card", "a campaign", CAMPAIGN_REMEDY))
     if setup is not None:
         together, file = merged(table, file, setup)
         data = together.encode("utf-8", "surrogatepass")
@@ -239,9 +241,13 @@ def _read_board(
 def name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
     """The name of a card must be the name of its file."""
     name = table.get("name")
-    if isinstance(name, str) and name != stem:
-        return [Fault(f"{file} name", f"{quoted(stem)}, the name of the file", quoted(name))]
-    return []
+    if not isinstance(name, str) or name == stem:
+        return []
+    complaint = name_complaint(stem)
+    if complaint:
+        remedy = "rename the file" + ("" if name_complaint(name) else f" to {name}.toml")
+        return [Fault(file, complaint, quoted(stem), remedy)]
+    return [Fault(f"{file} name", f"{quoted(stem)}, the name of the file", quoted(name))]
 
 
 def _mass_faults(table: Mapping[str, Any], file: str) -> list[Fault]:

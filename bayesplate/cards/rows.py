@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import copy
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from bayesplate.cards.board import BoardCard, MaterialSection, PlateSection, read_board_text
-from bayesplate.cards.reading import read_file, read_table
-from bayesplate.cards.shelf import find
+from bayesplate.cards.cells import Cell, card_text, is_empty, value, word
+from bayesplate.cards.template import Inside, Template
 from bayesplate.cards.words import did_you_mean, quoted
-from bayesplate.cards.writing import array, number, table, text, whole
-from bayesplate.errors import Fault, InputError, plain
-
-Cell = str | float | int | None
+from bayesplate.errors import Fault, InputError
 
 _TEXTS = ("name", "title", "source", "notes")
+_WORDS = (*_TEXTS, "prior")
+"""Keys whose values are texts, also where a cell looks like a number."""
 _SECTIONS = {
     **dict.fromkeys(PlateSection.model_fields, "plate"),
     **dict.fromkeys(MaterialSection.model_fields, "material"),
 }
-_WEIGHED = ("mass_g", "density_kg_m3")
 _MODE = re.compile(r"(?:(?P<setup>[A-Za-z0-9._-]+) )?\((?P<m>\d{1,3}), ?(?P<n>\d{1,3})\)")
 _SD = " sd"
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _MOST_COLUMNS = 500
 
 
@@ -34,30 +29,13 @@ _MOST_COLUMNS = 500
 class _Place:
     """Where the cells of a column go: the keys that lead there, and whether they are standard deviations."""
 
-    inside: tuple[str, ...]
+    inside: Inside
     is_sd: bool
 
-
-class Template:
-    """The card of what is common to all boards of a table.
-
-    Parameters
-    ----------
-    card : str or path
-        Name of a shipped board card, or a path; it need not have frequencies.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read as a table.
-    """
-
-    def __init__(self, card: str | Path) -> None:
-        self.path = find("boards", card)
-        self.content = read_table(read_file(self.path), plain(self.path.name))
-        setups = self.content.get("setup")
-        listed = setups if isinstance(setups, list) else [setups]
-        self.setups = [str(one.get("name", "")) for one in listed if isinstance(one, dict)]
+    @property
+    def value(self) -> _Place:
+        """Where the values go whose standard deviations these are."""
+        return _Place(self.inside, False)
 
 
 class Columns:
@@ -69,6 +47,7 @@ class Columns:
     names : sequence of str
         The header of the table: `name`, `title`, a key of [plate] or [material], or the label of a mode as "(1,1)",
         after the name of its setup where there are several; with " sd" behind it the standard deviation of that column.
+        A column without a name is none, and its cells are empty.
     file : str
         The table, as messages show it.
 
@@ -82,23 +61,41 @@ class Columns:
         self.template, self.names, self.file = template, tuple(names), file
         if len(names) > _MOST_COLUMNS:
             raise InputError(Fault(file, f"at most {_MOST_COLUMNS} columns", str(len(names))))
-        faults = [
-            Fault(f"{file} column {i}", "each column once", f"{quoted(name)} again")
-            for i, name in enumerate(names, start=1)
-            if name in names[: i - 1]
-        ]
-        self._places: list[_Place] = []
+        faults: list[Fault] = []
+        self._places: list[_Place | None] = []
         for i, name in enumerate(names, start=1):
-            place = self._place(name)
-            if isinstance(place, _Place):
-                self._places.append(place)
-            else:
+            place = self._place(name) if name else None
+            if isinstance(place, str):
                 wanted = "a key of a board card, or the label of a mode"
                 faults.append(Fault(f"{file} column {i}", wanted, quoted(name), place))
+                place = None
+            elif place is not None and place in self._places:
+                first = names[self._places.index(place)]
+                got = quoted(name) + (" again" if first == name else f", which is {quoted(first)} again")
+                faults.append(Fault(f"{file} column {i}", "each column once", got))
+                place = None
+            self._places.append(place)
+        faults += [*self._lone_sds(), *self._common_readings()]
         if "name" not in names:
             faults.append(Fault(file, "a column with the names of the boards", "none", 'call it "name"'))
         if faults:
             raise InputError(faults)
+
+    def _lone_sds(self) -> Iterator[Fault]:
+        """A standard deviation without a value would be left out silently."""
+        for i, place in enumerate(self._places, start=1):
+            if place is not None and place.is_sd and place.value not in self._places:
+                wanted = f"a column {quoted(self.names[i - 1].removesuffix(_SD))} beside it"
+                remedy = "a value on the template has its standard deviation there"
+                yield Fault(f"{self.file} column {i}", wanted, f"{quoted(self.names[i - 1])} alone", remedy)
+
+    def _common_readings(self) -> Iterator[Fault]:
+        """What the template has read would silently be read on every board."""
+        own = {place.inside for place in self._places if place is not None}
+        stray = [words for words, inside in self.template.readings() if inside not in own]
+        if stray:
+            wanted, remedy = "no reading that has no column in the table", "leave it off: every board would have it"
+            yield Fault(f"{self.template.file} (the template)", wanted, ", ".join(stray), remedy)
 
     def _place(self, name: str) -> _Place | str:
         """Where a column goes; otherwise what to do."""
@@ -114,129 +111,65 @@ class Columns:
         setup = mode["setup"]
         if setup is None and len(self.template.setups) == 1:
             return _Place(("setup", self.template.setups[0], label), bare != name)
-        if setup in self.template.setups:
+        if setup is not None and setup in self.template.setups:
             return _Place(("setup", setup, label), bare != name)
+        if self.template.setups in ([], [""]):
+            return f"the template has no setup of a name: write the label alone, {quoted(label)}"
         return f"the setups of the template are {', '.join(map(quoted, self.template.setups))}: write the name of one"
 
     def name_of(self, row: Sequence[Cell]) -> str:
         """The name of the board of a row, as it stands there."""
         at = self.names.index("name")
-        return "" if at >= len(row) or row[at] is None else str(row[at]).strip()
+        return (word(row[at]) or "") if at < len(row) else ""
 
-    def card(self, row: Sequence[Cell], number: int) -> BoardCard:
+    def card(self, row: Sequence[Cell]) -> BoardCard:
         """The card of a row.
 
         Parameters
         ----------
         row : sequence of str, number or None
             Empty cells say nothing: the template's entry stays, but a mode was not read.
-        number : int
-            Of the row, the first below the header being 1.
 
         Raises
         ------
         InputError
-            With every fault of the card that it would be.
+            With every fault of the cells, or of the card that they would be.
         """
-        place = f"{self.file} row {number}"
-        if len(row) > len(self.names):
-            raise InputError(Fault(place, f"{len(self.names)} cells, as the header has", str(len(row))))
+        values, faults = self._values(row)
         name = self.name_of(row)
         if not name:
-            raise InputError(Fault(place, "a name", "an empty cell"))
-        try:
-            return read_board_text(_card_text(self._filled(row)), name, beside=self.template.path.parent)
-        except InputError as error:
-            faults = [Fault(f"{place} -> {one.place}", one.wanted, one.got, one.remedy) for one in error.faults]
-            raise InputError(faults) from None
+            faults.append(Fault("name", "a name", "an empty cell"))
+        if faults:
+            raise InputError(faults)
+        return read_board_text(card_text(self.template.filled(values)), name, beside=self.template.path.parent)
 
-    def _filled(self, row: Sequence[Cell]) -> dict[str, Any]:
-        """The template with the cells of a row in it."""
-        content = copy.deepcopy(self.template.content)
-        padded = [*row, *[None] * (len(self.names) - len(row))]
-        cells = {place: _value(cell) for place, cell in zip(self._places, padded, strict=True)}
-        plate = content.get("plate")
-        weighed = [key for key in _WEIGHED if cells.get(_Place(("plate", key), False)) is not None]
-        if weighed and isinstance(plate, dict):
-            for key in _WEIGHED:
-                plate.pop(key, None)
-        for place, value in cells.items():
-            if not place.is_sd:
-                _put(content, place.inside, value, cells.get(_Place(place.inside, True)))
-        return content
-
-
-def _put(content: dict[str, Any], inside: Sequence[str], value: Any, sd: Any) -> None:
-    """One cell at its place, with its standard deviation if there is one."""
-    if inside[0] == "setup":
-        setups = content["setup"]
-        of_setup = [setups] if isinstance(setups, dict) else setups
-        setup = next(one for one in of_setup if isinstance(one, dict) and str(one.get("name", "")) == inside[1])
-        section, key = setup.setdefault("frequencies_hz", {}), inside[2]
-        if isinstance(section, dict):
-            section.pop(key, None)
-    elif len(inside) == 2:
-        section, key = content.setdefault(inside[0], {}), inside[1]
-    else:
-        section, key = content, inside[0]
-    if value is not None and isinstance(section, dict):
-        section[key] = value if sd is None else {"mean": value, "sd": sd}
+    def _values(self, row: Sequence[Cell]) -> tuple[dict[Inside, Any], list[Fault]]:
+        """What a row says by the keys of a card, and what is wrong with its cells beside one another."""
+        n = len(self.names)
+        if any(not is_empty(cell) for cell in row[n:]):
+            remedy = "does a decimal comma divide a number into two cells? write a point"
+            return {}, [Fault("cells", f"{n}, as the header has", str(len(row)), remedy)]
+        padded = [*row[:n], *[None] * (n - len(row))]
+        values: dict[Inside, Any] = {}
+        faults: list[Fault] = []
+        for i, (place, cell) in enumerate(zip(self._places, padded, strict=True), start=1):
+            if place is not None and not place.is_sd:
+                values[place.inside] = word(cell) if place.inside[-1] in _WORDS else value(cell)
+            elif place is None and not is_empty(cell):
+                faults.append(Fault(f"column {i}", "an empty cell, for the column has no name", quoted(str(cell))))
+        for name, place, cell in zip(self.names, self._places, padded, strict=True):
+            if place is not None and place.is_sd and (sd := value(cell)) is not None:
+                faults += _sd_faults(name, place, values[place.inside])
+                values[place.inside] = {"mean": values[place.inside], "sd": sd}
+        return values, faults
 
 
-def _value(cell: Cell) -> Any:
-    """A cell as a card has it: a number, several with semicolons between them as readings, otherwise a text."""
-    if not isinstance(cell, str):
-        return cell
-    stripped = cell.strip()
-    if not stripped:
-        return None
-    parts = [_number(part) for part in stripped.split(";")]
-    if any(part is None for part in parts):
-        return stripped
-    return parts[0] if len(parts) == 1 else parts
-
-
-def _number(part: str) -> float | None:
-    try:
-        return float(part)
-    except ValueError:
-        return None
-
-
-def _card_text(content: Mapping[str, Any]) -> str:
-    """A card as TOML, one line for each of its keys."""
-    return "".join(f"{_key(key)} = {_toml(value)}\n" for key, value in content.items())
-
-
-def _key(key: str) -> str:
-    return key if _BARE.fullmatch(key) else text(key)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int):
-        return whole(value)
-    if isinstance(value, float):
-        return number(value)
-    if isinstance(value, Mapping):
-        return table({_key(key): _toml(one) for key, one in value.items()})
-    if isinstance(value, list | tuple):
-        return array([_toml(one) for one in value])
-    return text(value if isinstance(value, str) else str(value))
-
-
-def csv_rows(data: bytes, file: str) -> Iterator[list[str]]:
-    """The rows of a CSV file in UTF-8, the header first; raises InputError where it is no such text."""
-    import csv
-    import io
-
-    try:
-        stream = io.StringIO(data.decode("utf-8-sig"), newline="")
-    except UnicodeDecodeError as error:
-        got = f"the byte 0x{data[error.start]:02x} at offset {error.start}"
-        raise InputError(Fault(file, "UTF-8 text", got, "save the file as UTF-8")) from None
-    try:
-        yield from (row for row in csv.reader(stream, strict=True) if row)
-    except csv.Error as error:
-        raise InputError(Fault(file, "a CSV table, commas between its cells", plain(str(error)))) from None
+def _sd_faults(name: str, place: _Place, of: Any) -> Iterator[Fault]:
+    """A standard deviation beside nothing, or beside readings."""
+    if of is None:
+        is_mode = place.inside[0] == "setup"
+        remedy = "leave both empty where it was not read" if is_mode else "leave both to the template"
+        yield Fault(quoted(name.removesuffix(_SD)), "a value beside its standard deviation", "an empty cell", remedy)
+    elif isinstance(of, list):
+        wanted, got = "readings, or a value and its standard deviation", "readings and a standard deviation"
+        yield Fault(quoted(name), wanted, got, "leave it empty: readings have a scatter of their own")

@@ -11,6 +11,7 @@ from bayesplate.errors import Fault, InputError, plain
 
 CardKind = Literal["boards", "priors", "coefficients", "campaigns"]
 _SINGULAR = {"boards": "board", "priors": "prior", "coefficients": "coefficient", "campaigns": "campaign"}
+CAMPAIGN_REMEDY = "check, fit, diagnose and plan take it"
 _PACKAGE = Path(__file__).resolve().parents[1]
 _INSTALLED = _PACKAGE / "models"
 _CHECKOUT = _PACKAGE.parent / "models"
@@ -65,7 +66,7 @@ def find(kind: CardKind, name_or_path: str | os.PathLike[str], beside: Path | No
     here = Path(f"{text}.toml")
     is_possible = "\0" not in text and len(text) < 200
     if kind == "boards" and text in card_names("campaigns"):
-        remedy = "it is a campaign: check, fit and diagnose take it"
+        remedy = f"it is a campaign: {CAMPAIGN_REMEDY}"
     elif is_possible and here.is_file():
         remedy = f"there is a file here: write {quoted(str(here))}"
     elif is_possible and Path(text).suffix and Path(text).is_file():

@@ -30,7 +30,7 @@ from bayesplate.report.style import (
 )
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.grading import Grading
-from bayesplate.results.grading_table import best_first
+from bayesplate.results.grading_table import best_first, marked
 from bayesplate.results.log_figures import FIGURES
 from bayesplate.results.words import percent
 
@@ -58,7 +58,7 @@ def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
     return {
         "constants": [sorted_picture(graded)],
         "makers": [speed_picture(graded)],
-        "limits": [] if graded.meets_all is None else [limits_picture(graded)],
+        "limits": [] if graded.meets_all is None or not len(graded.trusted) else [limits_picture(graded)],
         "pairs": [pairs_picture(graded)] if graded.pairs else [],
     }
 
@@ -80,7 +80,7 @@ def sorted_picture(graded: Grading) -> Picture:
         panel.plot(middle[order], rows, "o", color=BLUE, mec="black", mew=0.5 if is_named else 0.0,
                    ms=5 if is_named else 1.5, zorder=3, rasterized=as_pixels)  # fmt: skip
         if is_named:
-            _named_rows(panel, [short(drawable(graded.names[i]), _LONGEST) for i in order])
+            _named_rows(panel, [_shown(graded, i) for i in order])
         else:
             panel.set(ylim=(n - 0.5, -0.5), ylabel="rank")
             panel.yaxis.label.set_fontsize(SMALL)
@@ -91,6 +91,8 @@ def sorted_picture(graded: Grading) -> Picture:
         told.append(f"{name} from {middle.min():.3g} to {middle.max():.3g} GPa, half of the boards above "
                     f"{np.median(middle):.3g}")  # fmt: skip
     caption = "Dot: median. Bar: 90 % interval. Where the bars of two boards overlap, their order is not sure."
+    if len(graded.trusted) < n:
+        caption += " Boards with a question mark are in doubt." if is_named else " Boards in doubt are among them."
     return Picture("boards-sorted", "The boards, sorted", f"{n} boards. {'; '.join(told)}.", caption, figure)
 
 
@@ -110,7 +112,7 @@ def speed_picture(graded: Grading) -> Picture:
     panel.set_xlim(middle - 0.65 * width, middle + 0.65 * width)
     _lines_of_equal_ratio(panel, speed[0] / density[0])
     if len(graded.names) <= _MOST_LABELLED:
-        _name_points(panel, density[0], speed[0], [short(drawable(name), _LONGEST) for name in graded.names])
+        _name_points(panel, density[0], speed[0], [_shown(graded, i) for i in range(len(density[0]))])
     panel.set_xlabel("density, kg/m³", fontsize=SMALL)
     panel.set_ylabel("wave speed along the grain, m/s", fontsize=SMALL)
     ratio = speed[0] / density[0]
@@ -142,16 +144,16 @@ def _name_points(panel: Axes, x: Floats, y: Floats, names: Sequence[str]) -> Non
 
 
 def limits_picture(graded: Grading) -> Picture:
-    """How probably the boards meet all limits, the most probable first."""
+    """How probably the boards meet all limits, the most probable first; without those in doubt."""
     assert graded.meets_all is not None
-    order = best_first(graded)
+    order = best_first(graded)[: len(graded.trusted)]
     is_named = len(order) <= MOST_NAMED
     values = 100.0 * graded.meets_all[order]
     figure, (panel,) = stacked([_ROW * len(order) + 0.1 if is_named else _CROWD], left=_LEFT, bottom=0.5)
     if is_named:
         colours = [GREEN if value >= 90.0 else VERMILLION if value < 10.0 else SKY for value in values]
         panel.barh(np.arange(len(order)), values, height=0.65, color=colours, edgecolor="black", lw=0.5)
-        _named_rows(panel, [short(drawable(graded.names[i]), _LONGEST) for i in order])
+        _named_rows(panel, [_shown(graded, i) for i in order])
     else:
         panel.plot(values, np.arange(1, len(order) + 1), color=BLUE, lw=1.6)
         panel.set(ylim=(len(order), 0))
@@ -160,7 +162,7 @@ def limits_picture(graded: Grading) -> Picture:
     panel.set_xlim(0, 100)
     panel.axvline(90, color=DARK, lw=0.8, ls="--")
     panel.set_xlabel("probability that the board meets all limits, %", fontsize=SMALL)
-    n_sure = int((graded.meets_all >= 0.9).sum())
+    n_sure = int((graded.meets_all[order] >= 0.9).sum())
     alt = f"{n_sure} of {len(order)} boards meet all limits with 90 % or more."
     caption = f"{alt}{' Green: 90 % and more; red: less than 10 %.' if is_named else ''}"
     return Picture("limits", "Which boards meet the specification", alt, caption, figure)
@@ -197,6 +199,12 @@ def pairs_picture(graded: Grading) -> Picture:
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)
     caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where all its bars lie in the grey."
     return Picture("pairs", "Pairs that may match", f"Probabilities: {alt}.", caption, figure)
+
+
+def _shown(graded: Grading, place: int) -> str:
+    """The name of a board, as far as it has room, with its mark."""
+    name = graded.names[place]
+    return short(drawable(name), _LONGEST) + marked(graded, place).removeprefix(name)
 
 
 def _ends(spread: tuple[Floats, Floats, Floats]) -> Floats:

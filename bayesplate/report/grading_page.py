@@ -11,14 +11,14 @@ from bayesplate.report.saving import save_pictures
 from bayesplate.results.batch_summary import BatchSummary
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
 from bayesplate.results.grading import TARGET, Grading
-from bayesplate.results.grading_table import MOST_LISTED, best_first, grading_tables
+from bayesplate.results.grading_table import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
 from bayesplate.results.log_figures import limit_told
 from bayesplate.results.pairs import LEAST_PROBABILITY
 from bayesplate.results.tables import Table
 from bayesplate.results.words import percent
 
 GRADING_PAGE = "grading.html"
-_TABLES = ("constants", "makers", "limits", "pairs")
+_TABLES = ("constants", "makers", "limits", "pairs", "doubts")
 
 
 def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, has_pages: bool) -> Path:
@@ -58,7 +58,7 @@ def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, 
         tables=tables,
         matching=matching_sentence(graded),
         has_target=TARGET in graded.request.figures,
-        links=[(graded.names[i], f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
+        links=[(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
         if has_pages
         else [],
     )
@@ -71,11 +71,12 @@ def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
     """The page in short."""
     told = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
     if graded.meets_all is not None and graded.names:
+        meets = graded.meets_all[graded.trusted]
         limits = ", ".join(limit_told(name, limit) for name, limit in graded.request.limits.items())
-        n_sure, n_maybe = int((graded.meets_all >= 0.9).sum()), int((graded.meets_all >= 0.5).sum())
+        n_sure, n_maybe = int((meets >= 0.9).sum()), int((meets >= 0.5).sum())
         told.append(
             f"{limits}: {n_sure} boards meet this with 90 % or more, {n_maybe} with 50 % or more; "
-            f"{float(graded.meets_all.sum()):.1f} are to be expected."
+            f"{float(meets.sum()):.1f} are to be expected."
         )
     if graded.pairs:
         best = graded.pairs[0]
@@ -84,7 +85,8 @@ def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
             f"{len(graded.pairs)} pairs are proposed; the likeliest match is {first} with {second}, "
             f"{percent(best.probability)}."
         )
-    return tuple(told)
+    in_doubt = doubts_sentence(graded)
+    return (*told, f"{in_doubt}.") if in_doubt else tuple(told)
 
 
 def matching_sentence(graded: Grading) -> str:

@@ -1,4 +1,4 @@
-"""batch.json as types: how many boards of a batch were fitted, and why the others were not."""
+"""batch.json as types: how many boards of a batch were fitted, which are in doubt, and why others were not fitted."""
 
 from __future__ import annotations
 
@@ -19,6 +19,14 @@ class Failure:
 
 
 @dataclass(frozen=True)
+class Doubt:
+    """A board that was fitted and whose constants are not to be trusted, and why."""
+
+    name: str
+    doubt: str
+
+
+@dataclass(frozen=True)
 class BatchSummary:
     """What became of the boards of a batch.
 
@@ -31,6 +39,8 @@ class BatchSummary:
     n_boards, n_fitted, n_failed : int
     failed : tuple of Failure
         In the order of their names.
+    doubts : tuple of Doubt
+        Of the boards that were fitted, in the order of their names.
     aside : tuple of str
         Files beside the cards that are cards of another kind.
     """
@@ -42,6 +52,7 @@ class BatchSummary:
     n_fitted: int
     n_failed: int
     failed: tuple[Failure, ...]
+    doubts: tuple[Doubt, ...]
     aside: tuple[str, ...]
 
     def failures_text(self, table: str) -> str:
@@ -50,4 +61,4 @@ class BatchSummary:
         lines += [f"{one.name}: {one.outcome}: {one.message}" for one in self.failed[:_MOST_TOLD]]
         if self.n_failed > _MOST_TOLD:
             lines.append(f"and {self.n_failed - _MOST_TOLD} more, in {table}")
-        return "\n".join([*lines, "mend their cards: --resume then fits these alone"])
+        return "\n".join([*lines, "correct their cards or rows: --resume then fits these alone"])

@@ -25,7 +25,7 @@ MAKERS = (
 _ENDS = ("mean", "sd", "q05", "q50", "q95")
 _CORRELATED = (*MODULI, "density")
 _PAIRS = tuple((a, b) for i, a in enumerate(_CORRELATED) for b in _CORRELATED[i + 1 :])
-WORDS = ("name", "outcome", "message", "card_sha256", "seed", "theory", "law", "effects", "prior")
+WORDS = ("name", "outcome", "message", "doubt", "card_sha256", "seed", "theory", "law", "effects", "prior")
 """Columns of texts, but for the seed."""
 NUMBERS = (
     *(f"{name}_{end}" for name in MODULI for end in _ENDS),
@@ -51,6 +51,8 @@ class BoardRow:
         "fitted", or why there are no constants, in two or three words.
     message : str
         Of the error; empty for a fitted board.
+    doubt : str
+        Why the constants of a fitted board are not to be trusted; empty where nothing speaks against them.
     card_sha256 : str
         Empty where no card could be read.
     seed : int or None
@@ -60,16 +62,20 @@ class BoardRow:
         Those of `NUMBERS` that a fitted board has.
     joint : Joint or None
         How its constants vary together.
+    readings_sha256 : str
+        Of what was measured on a fitted board.
     """
 
     name: str
     outcome: str
     message: str = ""
+    doubt: str = ""
     card_sha256: str = ""
     seed: int | None = None
     told: Mapping[str, str] | None = None
     numbers: Mapping[str, float | None] | None = None
     joint: Joint | None = None
+    readings_sha256: str = ""
 
     @property
     def is_fitted(self) -> bool:
@@ -79,8 +85,8 @@ class BoardRow:
     def cells(self) -> list[str | float | int | None]:
         """The row, in the order of `WORDS` and `NUMBERS`."""
         told, numbers = self.told or {}, self.numbers or {}
-        texts = [self.name, self.outcome, self.message, self.card_sha256, self.seed]
-        return [*texts, *(told.get(word) for word in WORDS[5:]), *(numbers.get(name) for name in NUMBERS)]
+        texts = [self.name, self.outcome, self.message, self.doubt, self.card_sha256, self.seed]
+        return [*texts, *(told.get(word) for word in WORDS[len(texts) :]), *(numbers.get(name) for name in NUMBERS)]
 
     def to_json(self) -> dict[str, Any]:
         """The row as JSON keeps it between two runs."""
@@ -102,6 +108,7 @@ def row_of(summary: Summary) -> BoardRow:
     return BoardRow(
         name=summary.name,
         outcome=FITTED,
+        doubt="; ".join(summary.doubts),
         card_sha256=summary.card_sha256,
         seed=summary.seed,
         told={

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,8 @@ class Grading:
     ----------
     request : GradingRequest
     names : tuple of str
+    doubts : tuple of str
+        Why a board's constants are not to be trusted, empty where nothing speaks against them.
     log_mean : (n, 7) array
         Of the names of `JOINT`.
     triangles : (n, 28) array of float32
@@ -67,10 +69,12 @@ class Grading:
     meets_all : (n,) array or None
         Of all limits together; None where there is none.
     pairs : tuple of Pair
+        None of them with a board in doubt.
     """
 
     request: GradingRequest
     names: tuple[str, ...]
+    doubts: tuple[str, ...]
     log_mean: Floats
     triangles: Floats
     meets: Mapping[str, Floats]
@@ -82,6 +86,11 @@ class Grading:
         mean, sd = figure.log(self.log_mean[boards], self.triangles[boards])
         middle, low, high = (np.exp(mean + at * sd) / figure.per_unit for at in (0.0, -_NINETY, _NINETY))
         return middle, low, high
+
+    @property
+    def trusted(self) -> NDArray[np.intp]:
+        """Places of the boards that are not in doubt."""
+        return np.flatnonzero([not one for one in self.doubts])
 
     @property
     def partners(self) -> tuple[NDArray[np.int32], Floats]:
@@ -110,6 +119,7 @@ def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
     Grading
     """
     names: list[str] = []
+    doubts: list[str] = []
     log_mean: Floats = np.empty((len(rows), 7))
     upper: Floats = np.empty((len(rows), 28), dtype=np.float32)
     for row in rows:
@@ -117,10 +127,13 @@ def grade(rows: Sequence[BoardRow], request: GradingRequest) -> Grading:
             log_mean[len(names)] = row.joint.log_mean
             upper[len(names)] = triangle(row.joint.log_covariance)
             names.append(row.name)
+            doubts.append(row.doubt)
     log_mean, upper = log_mean[: len(names)], upper[: len(names)]
     meets, meets_all = _meets(log_mean, upper, request.limits)
-    pairs = proposed_pairs(log_mean, upper, request.match_percent)
-    return Grading(request, tuple(names), log_mean, upper, meets, meets_all, pairs)
+    graded = Grading(request, tuple(names), tuple(doubts), log_mean, upper, meets, meets_all, ())
+    some = graded.trusted
+    pairs = proposed_pairs(log_mean[some], upper[some], request.match_percent)
+    return replace(graded, pairs=tuple(Pair(int(some[p.first]), int(some[p.second]), p.probability) for p in pairs))
 
 
 def _meets(

@@ -20,6 +20,7 @@ from bayesplate.results.words import percent, plus_minus
 GRADING = "grading.csv"
 MOST_LISTED, MOST_ON_TERMINAL = 100, 20
 """Boards that a table for people has; all of them are in grading.csv."""
+_MARK = "?"
 _AT_ONCE = 256
 """Boards whose figures are computed together."""
 
@@ -31,13 +32,16 @@ class _Number:
 
 
 def best_first(graded: Grading) -> list[int]:
-    """Places of the boards: by the probability of meeting the limits, otherwise by E_x, the greatest first."""
+    """Places of the boards: by the probability of meeting the limits, otherwise by E_x, the greatest first.
+
+    Those in doubt are the last.
+    """
     by = graded.log_mean[:, 0] if graded.meets_all is None else graded.meets_all
-    return sorted(range(len(graded.names)), key=lambda i: (-float(by[i]), graded.names[i]))
+    return sorted(range(len(graded.names)), key=lambda i: (bool(graded.doubts[i]), -float(by[i]), graded.names[i]))
 
 
 def grading_tables(graded: Grading, most: int = MOST_LISTED) -> dict[str, Table]:
-    """The tables for people, by what they hold: "constants", "makers", "limits", "pairs"; none that would be empty.
+    """The tables for people, by what they hold, from "constants" to "doubts"; none that would be empty.
 
     Parameters
     ----------
@@ -54,11 +58,28 @@ def grading_tables(graded: Grading, most: int = MOST_LISTED) -> dict[str, Table]
         "constants": _figures_table(graded, some, f"Constants, median ± sd{which}", moduli),
         "makers": _figures_table(graded, some, f"Figures of makers, median ± sd{which}", graded.request.figures),
     }
-    if graded.meets_all is not None:
-        tables["limits"] = _limits_table(graded, some, which)
+    trusted = [i for i in order if not graded.doubts[i]]
+    if graded.meets_all is not None and trusted:
+        tables["limits"] = _limits_table(graded, trusted[:most], _which(most, len(trusted)))
     if graded.pairs:
         tables["pairs"] = _pairs_table(graded, most)
+    doubted = order[len(trusted) :]
+    if doubted:
+        rows = tuple((graded.names[i], graded.doubts[i]) for i in doubted[:most])
+        tables["doubts"] = Table(f"Boards in doubt{_which(most, len(doubted))}", ("board", "doubt"), rows)
     return tables
+
+
+def doubts_sentence(graded: Grading) -> str:
+    """How many boards are in doubt, and what is made of them; empty where none is."""
+    n = len(graded.names) - len(graded.trusted)
+    if not n:
+        return ""
+    found = "1 board is" if n == 1 else f"{n} boards are"
+    return (
+        f"{found} in doubt, for the fit itself says that the constants are not to be trusted: neither paired nor "
+        "counted among those that meet limits"
+    )
 
 
 def _which(most: int, n: int) -> str:
@@ -67,9 +88,15 @@ def _which(most: int, n: int) -> str:
 
 def _figures_table(graded: Grading, some: list[int], title: str, figures: dict[str, LogFigure]) -> Table:
     columns = [_column(graded, some, figure) for figure in figures.values()]
-    rows = tuple((graded.names[i], *cells) for i, *cells in zip(some, *columns, strict=True))
+    rows = tuple((marked(graded, i), *cells) for i, *cells in zip(some, *columns, strict=True))
     heads = (_head(name, figure) for name, figure in figures.items())
-    return Table(title, ("board", *heads), rows)
+    told = f"; {_MARK} in doubt" if any(graded.doubts[i] for i in some) else ""
+    return Table(f"{title}{told}", ("board", *heads), rows)
+
+
+def marked(graded: Grading, place: int) -> str:
+    """The name of a board, with a question mark if it is in doubt."""
+    return graded.names[place] + (f" {_MARK}" if graded.doubts[place] else "")
 
 
 def _head(name: str, figure: LogFigure) -> str:
@@ -129,7 +156,7 @@ def _header(graded: Grading) -> list[Cell]:
     limits = (f"probability_{name}" for name in graded.meets)
     whole = [] if graded.meets_all is None else ["probability_all_limits"]
     ends = (f"{name}_{end}" for name in figures for end in ("q50", "q05", "q95"))
-    return ["name", *ends, *limits, *whole, "partner", "probability_of_match"]
+    return ["name", *ends, *limits, *whole, "partner", "probability_of_match", "doubt"]
 
 
 def _rows(graded: Grading) -> Iterator[list[Cell]]:
@@ -143,4 +170,4 @@ def _rows(graded: Grading) -> Iterator[list[Cell]]:
             limits = [float(one[i]) for one in graded.meets.values()]
             whole = [] if graded.meets_all is None else [float(graded.meets_all[i])]
             match = [None, None] if partner[i] < 0 else [graded.names[partner[i]], float(probability[i])]
-            yield [graded.names[i], *numbers, *limits, *whole, *match]
+            yield [graded.names[i], *numbers, *limits, *whole, *match, graded.doubts[i]]

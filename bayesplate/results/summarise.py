@@ -149,6 +149,7 @@ def summarise(
             *input_remarks(draws, board),
         ),
         warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
+        doubts=doubts_of(problem, assessment, certificate),
         request=request,
     )
 
@@ -249,3 +250,12 @@ def warnings_of(problem: PosedProblem, assessment: Assessment) -> list[str]:
             f"the exact law misses full solves by up to {assessment.exact_worst:.2f} cents at the rim of the posterior"
         )
     return sentences
+
+
+def doubts_of(problem: PosedProblem, assessment: Assessment, certificate: Certificate) -> tuple[str, ...]:
+    """Those of the warnings that are reasons not to trust the constants.
+
+    A label that a veering leaves open is none: the fit counts with both modes.
+    """
+    of_readings = (one for one in problem.doubts if one not in problem.veerings)
+    return (*of_readings, *assessment.doubts, *contradiction(certificate))

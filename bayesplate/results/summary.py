@@ -185,6 +185,8 @@ class Summary(Run):
     certificate : Certificate
         Whether the draws agree with an answer in closed form on the same readings.
     identifiability, warnings : tuple of str
+    doubts : tuple of str
+        Those of the warnings that are reasons not to trust the constants.
     request : Request or None
         None for a board of a campaign, whose draws follow from all boards.
     """
@@ -210,6 +212,7 @@ class Summary(Run):
     certificate: Certificate
     identifiability: tuple[str, ...]
     warnings: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
     request: Request | None = None
 
     def __repr__(self) -> str:

@@ -15,12 +15,13 @@ from bayesplate.errors import (
 )
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.batch_summary import FORMAT, BatchSummary, Failure
+from bayesplate.results.batch_summary import FORMAT, BatchSummary, Doubt, Failure
 from bayesplate.results.board_journal import Journal
 from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.board_table import TableKind, require_table_kind, write_table
 from bayesplate.results.folder import OutputFolder, json_text, run_of_its_own, write_text
 from bayesplate.results.grading import Grading, GradingRequest, grade
+from bayesplate.results.told_rows import told_rows
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.batch_boards import boards_of
 from bayesplate.workflow.batch_pool import dask_cluster, processes
@@ -62,7 +63,8 @@ class BatchResult:
 
 def default_batch_folder(source: str | os.PathLike[str]) -> Path:
     """Where the command line writes a batch unless it is told: results/NAME, of the folder or the table."""
-    return Path("results") / (Path(source).resolve().stem or "batch")
+    path = Path(source).resolve()
+    return Path("results") / ((path.name if path.is_dir() else path.stem) or "batch")
 
 
 @run_of_its_own()
@@ -145,8 +147,8 @@ def batch(
         with _interruptions_told():
             places = run.fitted(by, journal, progress)
         aside, versions = tuple(boards.aside), run.versions
+        rows = told_rows(journal.rows(places), boards.place)
         del boards, run  # where the cards of very many boards stand is not needed any more
-        rows = journal.rows(places)
         written = write_table(folder.path, table, rows)
         graded = grade(rows, grading or GradingRequest())
         summary = _summary(rows, seed, versions, aside)
@@ -185,10 +187,12 @@ def _interruptions_told() -> Iterator[None]:
 
 
 def _summary(rows: Iterable[BoardRow], seed: int, versions: Mapping[str, str], aside: tuple[str, ...]) -> BatchSummary:
-    failures, n, n_fitted = [], 0, 0
+    failures, doubts, n, n_fitted = [], [], 0, 0
     for row in rows:
         n += 1
         n_fitted += row.is_fitted
         if not row.is_fitted:
             failures.append(Failure(row.name, row.outcome, row.message))
-    return BatchSummary(FORMAT, seed, versions, n, n_fitted, n - n_fitted, tuple(failures), aside)
+        if row.doubt:
+            doubts.append(Doubt(row.name, row.doubt))
+    return BatchSummary(FORMAT, seed, versions, n, n_fitted, n - n_fitted, tuple(failures), tuple(doubts), aside)

@@ -8,14 +8,17 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bayesplate.cards import BoardCard, Columns, Template, load_board_in, plain
+from bayesplate.cards.cells import Cell, is_empty
+from bayesplate.cards.csv_table import csv_table
 from bayesplate.cards.reading import read_file, read_table
-from bayesplate.cards.rows import Cell, csv_rows
 from bayesplate.errors import Fault, InputError
 from bayesplate.results.board_table import parquet_library
 
 LARGEST_TABLE = 100_000_000
 """Bytes; hundreds of thousands of boards, and ten times as much in memory."""
 _LONGEST = 1e9
+_WANTED = "a folder of cards, or a table (.csv or .parquet)"
+_OF_SHEETS = (".tsv", ".tab", ".txt", ".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
 _OF_OTHER_CARDS = {"boards", "coefficients", "E_x", "D_x", "noise_percent"}
 """Keys that a campaign, a coefficient table and a prior card have and a board card has not."""
 
@@ -32,6 +35,9 @@ class Source(Protocol):
 
     def card(self, at: int) -> BoardCard:
         """The card of the board at a place among the names; raises InputError with all its faults."""
+
+    def place(self, at: int) -> str:
+        """Where that board stands, as messages show it; empty where its own file says so."""
 
 
 class Folder:
@@ -80,6 +86,10 @@ class Folder:
             raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
         return load_board_in(self._path, file)
 
+    def place(self, at: int) -> str:
+        """Nothing: the faults of a card name its file."""
+        return ""
+
     def _is_inside(self, file: str) -> bool:
         return os.path.realpath(os.path.join(self._path, file)).startswith(self._inside)
 
@@ -107,13 +117,13 @@ class Table:
     """
 
     def __init__(self, path: Path, template: str | Path) -> None:
-        file = plain(path.name)
-        header, self._rows = _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
-        self._columns = Columns(Template(template), header, file)
-        if not self._rows:
-            raise InputError(Fault(file, "a row for each board", "no row"))
-        own = (plain(self._columns.name_of(row)) for row in self._rows)
-        named = sorted((name or f"row-{i}", i) for i, name in enumerate(own, start=1))
+        self._file = plain(path.name)
+        header, self._rows = _read_parquet(path) if _ending(path) == ".parquet" else _read_csv(path)
+        self._columns = Columns(Template(template), header, self._file)
+        filled = [i for i, row in enumerate(self._rows, start=1) if not all(map(is_empty, row))]
+        if not filled:
+            raise InputError(Fault(self._file, "a row for each board", "no row"))
+        named = sorted((plain(self._columns.name_of(self._rows[i - 1])) or f"row-{i}", i) for i in filled)
         self.names: Sequence[str] = [name for name, _ in named]
         self.alike: Sequence[tuple[str, ...]] = [()] * len(named)
         self.aside: Sequence[str] = ()
@@ -121,8 +131,11 @@ class Table:
 
     def card(self, at: int) -> BoardCard:
         """The card of a row; raises InputError with all its faults."""
-        number = self._numbers[at]
-        return self._columns.card(self._rows[number - 1], number)
+        return self._columns.card(self._rows[self._numbers[at] - 1])
+
+    def place(self, at: int) -> str:
+        """The table and the number of the row, the first below the header being 1."""
+        return f"{self._file} row {self._numbers[at]}"
 
 
 def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] | None) -> Source:
@@ -138,13 +151,20 @@ def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] |
         if template is not None:
             raise InputError(Fault("--template", "a table of boards beside it", "a folder of cards"))
         return Folder(path)
-    if path.suffix not in (".csv", ".parquet"):
-        got = "another file" if path.exists() else "nothing there"
-        raise InputError(Fault(plain(str(path)), "a folder of cards, or a table (.csv or .parquet)", got))
+    if not path.exists():
+        got, looked = "nothing there", f"looked in {plain(str(path.absolute().parent))}"
+        raise InputError(Fault(plain(str(path)), _WANTED, got, looked))
+    if _ending(path) not in (".csv", ".parquet"):
+        remedy = "save the table as CSV" if _ending(path) in _OF_SHEETS else ""
+        raise InputError(Fault(plain(str(path)), _WANTED, "another file", remedy))
     if template is None:
         remedy = "a board card with what all boards have in common"
         raise InputError(Fault("--template", "a card for the table", "none", remedy))
     return Table(path, os.fspath(template))
+
+
+def _ending(path: Path) -> str:
+    return path.suffix.lower()
 
 
 def _cards_in(folder: Path) -> list[str]:
@@ -168,23 +188,19 @@ def _alike(content: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(edges)
 
 
-def _read_csv(path: Path) -> tuple[list[str], list[list[Cell]]]:
+def _read_csv(path: Path) -> tuple[Sequence[str], Sequence[Sequence[Cell]]]:
     file = plain(path.name)
     try:
         if not path.is_file():
-            raise InputError(Fault(file, "a regular file", "a device, or another that is none"))
+            raise InputError(Fault(file, "a regular file", "another kind"))
         if path.stat().st_size > LARGEST_TABLE:
             raise InputError(Fault(file, f"a table of at most {LARGEST_TABLE:,} bytes", "a larger one"))
-        rows = csv_rows(path.read_bytes(), file)
+        return csv_table(path.read_bytes(), file)
     except OSError as error:
         raise InputError(Fault(plain(str(path)), "a readable table", error.strerror or str(error))) from None
-    header = next(rows, None)
-    if header is None:
-        raise InputError(Fault(file, "a table with a header", "an empty file"))
-    return [name.strip() for name in header], [list(row) for row in rows]
 
 
-def _read_parquet(path: Path) -> tuple[list[str], list[list[Cell]]]:
+def _read_parquet(path: Path) -> tuple[Sequence[str], Sequence[Sequence[Cell]]]:
     file = plain(path.name)
     arrow = parquet_library(file)
     try:

@@ -15,6 +15,8 @@ from bayesplate.results.normal_box import MOST
 
 _RANGE = "positive numbers, the least before the greatest, at least one of them"
 _MATCHED = tuple(name for name in FIGURES if name[0] in "EG" or name == "density")
+_MOST_PERCENT = 1000.0
+_PERCENTS = f"positive per cents up to {_MOST_PERCENT:g}, as 10 or E_x=10,E_y=15, of {', '.join(_MATCHED)}"
 
 
 def grading_request(match: str | None, limits: Sequence[str], rigidity: float | None) -> GradingRequest:
@@ -43,9 +45,15 @@ def grading_request(match: str | None, limits: Sequence[str], rigidity: float | 
     found: dict[str, tuple[float | None, float | None]] = {}
     for one in limits:
         name, _, ends = one.partition("=")
-        read = _limit(name.strip(), ends, one, faults)
+        key = name.strip()
+        if key in found:
+            faults.append(
+                Fault(f"--limit {plain(one)}", "each quantity once", f"{key} again", "both ends: LEAST:GREATEST")
+            )
+            continue
+        read = _limit(key, ends, one, faults)
         if read is not None:
-            found[name.strip()] = read
+            found[key] = read
     if rigidity is not None and not (math.isfinite(rigidity) and rigidity > 0.0):
         faults.append(Fault("--rigidity", "a positive number of N m", f"{rigidity:g}"))
     if faults:
@@ -59,18 +67,27 @@ def _matched(match: str | None, faults: list[Fault]) -> dict[str, float] | None:
         return None
     parts = [part.strip() for part in match.split(",") if part.strip()]
     if len(parts) == 1 and "=" not in parts[0]:
-        parts = [f"{name}={parts[0]}" for name in MODULI]
-    found = {}
+        percent = _percent(parts[0])
+        if percent is None:
+            faults.append(Fault("--match", _PERCENTS, quoted(parts[0])))
+        return None if percent is None else dict.fromkeys(MODULI, percent)
+    found: dict[str, float] = {}
     for part in parts:
-        name, _, value = part.partition("=")
-        percent = _number(value)
-        if name not in _MATCHED or percent is None or not 0.0 < percent <= 1000.0:
+        name, _, value = (one.strip() for one in part.partition("="))
+        percent = _percent(value)
+        if name not in _MATCHED or percent is None:
             remedy = did_you_mean(name, _MATCHED) if name not in _MATCHED else ""
-            wanted = f"per cents, as 10 or E_x=10,E_y=15, of {', '.join(_MATCHED)}"
-            faults.append(Fault("--match", wanted, quoted(part), remedy))
+            faults.append(Fault("--match", _PERCENTS, quoted(part), remedy))
+        elif name in found:
+            faults.append(Fault("--match", "each quantity once", f"{name} again"))
         else:
             found[name] = percent
     return found
+
+
+def _percent(text: str) -> float | None:
+    percent = _number(text)
+    return percent if percent is not None and 0.0 < percent <= _MOST_PERCENT else None
 
 
 def _limit(name: str, ends: str, told: str, faults: list[Fault]) -> tuple[float | None, float | None] | None:

@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from bayesplate.cards import load_named
+from bayesplate.cards import load_named, readings_sha256
 from bayesplate.errors import (
     BayesplateError,
     InputError,
@@ -24,7 +24,7 @@ from bayesplate.errors import (
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.batch_summary import FORMAT
 from bayesplate.results.board_journal import Journal
-from bayesplate.results.board_rows import BoardRow, row_of
+from bayesplate.results.board_rows import WORDS, BoardRow, row_of
 from bayesplate.results.folder import BOARDS, SUMMARY
 from bayesplate.results.versions import versions
 from bayesplate.workflow.batch_boards import Source
@@ -71,7 +71,7 @@ class Run:
             places[at] = place
             done.tell(row.is_fitted)
 
-        def calls() -> Iterator[tuple[tuple[int, str, str, int], Call]]:
+        def calls() -> Iterator[tuple[tuple[int, _Posed], Call]]:
             twice = _named_twice(self.boards.names)
             for at in sorted(range(len(self.boards.names)), key=self.boards.alike.__getitem__):
                 posed = self._posed(at, twice)
@@ -80,12 +80,12 @@ class Run:
                 elif (row := self._done(posed.key, at, journal)) is not None:
                     write(at, posed.key, row)
                 else:
-                    yield (at, posed.key, posed.card_sha256, posed.seed), posed.call
+                    yield (at, posed), posed.call
 
         with closing(computed(by, calls())) as answers:
-            for (at, key, card_sha256, seed), future in answers:
-                row = _answer(self.boards.names[at], future)
-                write(at, key, row if row.is_fitted else replace(row, card_sha256=card_sha256, seed=seed))
+            for (at, posed), future in answers:
+                row = replace(_answer(self.boards.names[at], future), card_sha256=posed.card_sha256, seed=posed.seed)
+                write(at, posed.key, replace(row, readings_sha256=posed.readings_sha256 if row.is_fitted else ""))
         return places
 
     def _done(self, key: str, at: int, journal: Journal) -> BoardRow | None:
@@ -115,12 +115,12 @@ class Run:
         request = replace(self.request, seed=seed, tables=dict(named.tables))
         tables = {table: repr(one) for table, one in sorted(named.tables.items())}
         asked = {**asdict(replace(request, tables={})), "tables": tables}
-        key = _hash(FORMAT, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
+        key = _hash(FORMAT, WORDS, self.versions, card.name, card.sha256, named.prior.to_card(), asked)
         arguments = (card, named.prior, request)
         call = Call(fit_board, arguments)
         if self.folders:
             call = Call(fit_board_into, (self.folder.resolve() / BOARDS / card.name, self.report, *arguments))
-        return _Posed(key, call, card.sha256, seed)
+        return _Posed(key, call, card.sha256, seed, readings_sha256(card))
 
 
 @dataclass(frozen=True)
@@ -131,6 +131,7 @@ class _Posed:
     call: Call
     card_sha256: str
     seed: int
+    readings_sha256: str
 
 
 class _Done:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bayesplate.campaigns.population import require_moduli
 from bayesplate.campaigns.shared import Shared, shared_by
-from bayesplate.cards import CampaignCard, PriorCard, is_campaign, load_campaign, load_prior
+from bayesplate.cards import CampaignCard, PriorCard, is_campaign, load_campaign, load_prior, readings_sha256
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.workflow.arguments import require_arguments
@@ -157,6 +157,17 @@ def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[P
         Fault(f"{file} boards", "boards with names of their own", f"{one.board.name} again")
         for i, one in enumerate(boards)
         if one.board.name.casefold() in names[:i]
+    ]
+    read = [readings_sha256(one.card) for one in boards]
+    faults += [
+        Fault(
+            f"{file} boards",
+            "each board once",
+            f"{one.board.name} with every reading of {boards[read.index(read[i])].board.name}",
+            "a board and its copy would count twice",
+        )
+        for i, one in enumerate(boards)
+        if read[i] in read[:i] and one.board.name.casefold() not in names[:i]
     ]
     population = None
     if card.population is not None:

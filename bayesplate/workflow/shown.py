@@ -30,7 +30,7 @@ from bayesplate.results.command_tables import (
 from bayesplate.results.comparison import Comparison
 from bayesplate.results.folder import json_text
 from bayesplate.results.grading import Grading
-from bayesplate.results.grading_table import MOST_ON_TERMINAL, grading_tables
+from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables
 from bayesplate.results.notebook import html
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
@@ -122,7 +122,8 @@ def show_batch(summary: BatchSummary, grading: Grading) -> Shown:
     aside = tuple(f"{file} is a card of another kind and was left aside" for file in summary.aside)
     closing = f"{summary.n_fitted} of {summary.n_boards} boards fitted."
     tables = tuple(table for name, table in grading_tables(grading, MOST_ON_TERMINAL).items() if name != "makers")
-    return Shown(tables, aside, (), closing)
+    in_doubt = doubts_sentence(grading)
+    return Shown(tables, aside, (in_doubt,) if in_doubt else (), closing)
 
 
 def show_compare(comparison: Comparison) -> Shown:

@@ -55,6 +55,15 @@ def test_what_cannot_be_shared_is_refused_board_by_board(tmp_path):
         bayesplate.Campaign.from_card(path)
 
 
+def test_a_board_and_its_copy_do_not_count_as_two(tmp_path):
+    path = write_campaign(tmp_path)
+    copy = (tmp_path / "board-0.toml").read_text().replace('"board-0"', '"other"').replace("format = 1", "format = 1\n")
+    (tmp_path / "other.toml").write_text(copy)
+    path.write_text(path.read_text().replace('"./board-2.toml"', '"./other.toml"'))
+    with pytest.raises(InputError, match="boards: wanted each board once, got other with every reading of board-0"):
+        bayesplate.Campaign.from_card(path)
+
+
 def test_effects_of_the_campaign_are_declared_on_every_board_as_its_own(tmp_path):
     path = write_campaign(tmp_path)
     text = path.read_text()

@@ -121,6 +121,8 @@ def test_a_campaign_is_told_from_a_board(tmp_path, monkeypatch):
     assert not is_campaign("nothing.toml")
     assert not is_campaign(load_board("spruce-free-2R").path)
     assert not is_campaign(3)
+    with pytest.raises(InputError, match=r"^my-campaign.toml: wanted a board card, got a campaign \(check, fit,"):
+        load_board(path)
 
 
 @pytest.mark.parametrize("name", card_names("campaigns"))

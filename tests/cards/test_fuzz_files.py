@@ -21,6 +21,7 @@ from bayesplate.workflow.batch_boards import boards_of
 
 BOARD = "finnish-spruce-cantilever"
 CARD = (shelf_folder("boards") / f"{BOARD}.toml").read_text(encoding="utf-8")
+TEMPLATE = CARD.partition("[setup.frequencies_hz]")[0].replace(BOARD, "template")
 CAMPAIGN = """\
 format = 1
 name = "together"
@@ -74,7 +75,7 @@ BENCH: dict[str, Path] = {}
 def folder(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Where the files lie."""
     BENCH["folder"] = tmp_path_factory.mktemp("fuzz")
-    (BENCH["folder"] / "template.toml").write_text(CARD.replace(BOARD, "template"), encoding="utf-8")
+    (BENCH["folder"] / "template.toml").write_text(TEMPLATE, encoding="utf-8")
 
 
 def spliced(text: str) -> st.SearchStrategy[str]:
@@ -215,7 +216,7 @@ def test_a_huge_number_beside_a_fragment_or_a_table_is_a_fault_of_its_key(tmp_pa
     table = read_table(text.encode(), "board.toml")
     (tmp_path / "fragment.toml").write_text(FRAGMENT)
     merged_text, _ = merged(table, "board.toml", tmp_path / "fragment.toml")
-    (tmp_path / "template.toml").write_text(text.replace(BOARD, "template"))
+    (tmp_path / "template.toml").write_text(TEMPLATE.replace("length_x_mm = 253", f"length_x_mm = {HUGE}"))
     (tmp_path / "boards.csv").write_text(ROWS)
     boards = boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
 

@@ -38,5 +38,5 @@ def test_the_example_runs_the_shipped_campaign(example):
 
 
 def test_other_commands_say_that_it_is_a_campaign():
-    with pytest.raises(bayesplate.InputError, match="check, fit and diagnose take it"):
+    with pytest.raises(bayesplate.InputError, match="check, fit, diagnose and plan take it"):
         bayesplate.compare("spruce-half-tops")

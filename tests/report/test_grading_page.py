@@ -20,16 +20,16 @@ LOG = np.log([12e9, 0.9e9, 0.7e9, 25.0, 2.0, 5.0, 440.0])
 EVIL = "<script>alert(1)</script>"
 
 
-def page_of(folder, n: int, request: GradingRequest, name: str = "top", said: str = EVIL):
+def page_of(folder, n: int, request: GradingRequest, name: str = "top", said: str = EVIL, doubt: str = ""):
     """The page of boards made by hand, and its text."""
     rng = np.random.default_rng(7)
     rows = []
     for i in range(n):
         mean = LOG + 0.05 * rng.standard_normal(7)
         joint = Joint(JOINT, tuple(mean), tuple(map(tuple, 4e-4 * np.eye(7))))
-        rows.append(BoardRow(f"{name}-{i}", "fitted", joint=joint))
+        rows.append(BoardRow(f"{name}-{i}", "fitted", doubt=doubt if i == 1 else "", joint=joint))
     failed = (Failure("<b>" if said == EVIL else said, "refused", said),)
-    summary = BatchSummary(1, 1, {}, n + 1, n, 1, failed, ())
+    summary = BatchSummary(1, 1, {}, n + 1, n, 1, failed, (), ())
     graded = grade(rows, request)
     path = write_grading_page(folder, graded, summary, has_pages=True)
     return graded, path.read_text(encoding="utf-8")
@@ -74,6 +74,17 @@ def test_the_page_says_what_was_found(few):
         for ending in ("png", "svg")
     }
     assert not re.search(r'(src|href)="(?!data:|boards/top-\d/report\.html")', page)  # nothing is fetched
+
+
+def test_a_board_in_doubt_has_its_place_on_the_page_and_is_not_counted(tmp_path):
+    graded, page = page_of(tmp_path, 6, GradingRequest(limits={"E_x": (11e9, 13e9)}), doubt=EVIL)
+    text = " ".join(Read(page).text.split())
+
+    assert faults(Read(page)) == []
+    assert text.count("Boards in doubt") >= 2
+    assert text.count(EVIL) == 2  # the doubt, and the message of a board that was not fitted
+    assert "1 board is in doubt" in text
+    assert f"{float(np.delete(graded.meets_all, 1).sum()):.1f} are to be expected" in text
 
 
 def test_the_page_keeps_to_itself(few):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from made_summaries import SUMMARY
 
@@ -9,7 +11,10 @@ from bayesplate.results.board_journal import Journal
 from bayesplate.results.board_rows import NUMBERS, WORDS, BoardRow, row_of
 from bayesplate.results.board_table import write_table
 
-ROW, REFUSED = row_of(SUMMARY), BoardRow("bad", "refused", "=cmd|' /C calc'!A0")
+ROW, REFUSED = (
+    row_of(replace(SUMMARY, doubts=("misread?", "scatter"))),
+    BoardRow("bad", "refused", "=cmd|' /C calc'!A0"),
+)
 
 
 def row_of_key(journal, key):
@@ -23,6 +28,7 @@ def test_rows_come_back_to_the_last_bit(tmp_path):
 
     assert [again.place(key) for key in ("one", "two", "three")] == [*places, None]
     assert list(again.rows(places)) == list(journal.rows(places)) == [ROW, REFUSED]
+    assert ROW.doubt == "misread?; scatter"
     assert len(ROW.cells()) == len(WORDS) + len(NUMBERS) == len(REFUSED.cells())
     journal.close()
     again.close()

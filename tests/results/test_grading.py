@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import pytest
 from bayesplate.plate.material import derived_quantities, moduli
 from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.grading import GradingRequest, grade
-from bayesplate.results.grading_table import MOST_ON_TERMINAL, grading_tables, write_grading
+from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables, write_grading
 from bayesplate.results.joint import JOINT, Joint
 from bayesplate.results.log_figures import FIGURES, target_thickness, triangle
 from bayesplate.results.normal_box import box_probability
@@ -209,6 +211,30 @@ def test_tables_for_people_and_for_sheets(values, tmp_path):
     assert tables["limits"].columns == ("board", "E_x from 10 GPa", "all of them")
     header, *lines = write_grading(tmp_path, graded).read_text().splitlines()
     assert header.startswith("name,E_x_q50,E_x_q05,E_x_q95,")
-    assert header.endswith("target_thickness_q95,probability_E_x,probability_all_limits,partner,probability_of_match")
+    assert header.endswith("_thickness_q95,probability_E_x,probability_all_limits,partner,probability_of_match,doubt")
     assert len(lines) == 30
     assert grading_tables(grade(rows[-1:], GradingRequest())) == {}
+
+
+def test_a_board_in_doubt_is_marked_and_the_last_and_neither_paired_nor_counted(values, tmp_path):
+    """The doubtful one is the likeliest partner of the first, and would be the first among those within the limits."""
+    same = boards(values, [(1.0, 1.0, 1.0), (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), (1.04, 1.0, 1.0)])
+    limits = {"E_x": (None, 50e9)}
+    rows = [replace(same[0], name="z-0"), replace(same[1], name="a-1", doubt="20 Hz too high"), *same[2:4]]
+    graded = grade(rows, GradingRequest(limits=limits))
+    tables = grading_tables(graded, MOST_ON_TERMINAL)
+
+    assert {p.first for p in graded.pairs} | {p.second for p in graded.pairs} <= {0, 2, 3}
+    assert (graded.pairs[0].first, graded.pairs[0].second) == (0, 3)
+    assert [row[0] for row in tables["constants"].rows] == ["b3", "z-0", "b2", "a-1 ?"]
+    assert tables["constants"].title.endswith("; ? in doubt")
+    assert "a-1" not in {row[0].split()[0] for row in tables["limits"].rows}
+    assert tables["doubts"].rows == (("a-1", "20 Hz too high"),)
+    assert doubts_sentence(graded).startswith("1 board is in doubt")
+    with write_grading(tmp_path, graded).open() as stream:
+        assert [row["doubt"] for row in csv.DictReader(stream)] == ["", "20 Hz too high", "", ""]
+
+    every = grade([replace(row, doubt="?") for row in rows], GradingRequest(limits=limits))
+    assert "limits" not in grading_tables(every)
+    assert every.pairs == ()
+    assert doubts_sentence(grade(same, GradingRequest())) == ""

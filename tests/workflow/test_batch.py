@@ -13,12 +13,16 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from made_batches import TEMPLATE, card_text, write_cards
+from made_summaries import SUMMARY
 from runs import files_in
 
 import bayesplate
@@ -26,10 +30,11 @@ from bayesplate.cards import load_named, load_prior, read_board_text
 from bayesplate.cli import main
 from bayesplate.errors import BatchError, CheckpointError, InputError
 from bayesplate.results.folder import json_text
+from bayesplate.workflow.batch import default_batch_folder
 from bayesplate.workflow.batch_boards import boards_of
 from bayesplate.workflow.batch_pool import Call, WorkerDied, Workers, computed, processes
 
-WHY = "mend their cards: --resume then fits these alone"
+WHY = "correct their cards or rows: --resume then fits these alone"
 
 
 def rows_of(table: bytes) -> dict[str, dict[str, str]]:
@@ -339,17 +344,81 @@ def test_a_table_in_parquet_says_the_same(table, tmp_path):
     import pyarrow
     from pyarrow import parquet
 
-    rows = list(csv.DictReader(io.StringIO(TABLE)))[:2]
+    (tmp_path / "tops.csv").write_text(TABLE.replace("top-1", "1").replace("top-2", "007"))
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "tops.csv").read_text())))[:2]
     columns = {name: [row[name] for row in rows] for name in rows[0]}
     hertz = {name: [float(one) if one else None for one in columns[name]] for name in columns if "(" in name}
     parquet.write_table(pyarrow.table(columns | hertz), tmp_path / "tops.parquet")
     texts = []
     for file in ("tops.csv", "tops.parquet"):
         boards = boards_of(tmp_path / file, tmp_path / "template.toml")
-        texts.append([boards.card(at).text for at, name in enumerate(boards.names) if name in ("top-1", "top-2")])
+        texts.append([boards.card(at).text for at, name in enumerate(boards.names) if name in ("1", "007")])
 
     assert texts[0] == texts[1]
     assert len(texts[0]) == 2
+
+
+def computed_here(workers, calls):
+    """`computed` without a worker."""
+    for key, call in calls:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(call.function(*call.arguments))
+        except InputError as error:
+            future.set_exception(error)
+        yield key, future
+
+
+def test_faults_of_rows_name_the_table_and_the_row_as_it_is_counted_there(table, tmp_path, monkeypatch):
+    """Lines without a word count but are no boards; so a fault of sizes, of a card that a row names, and of a name."""
+    monkeypatch.setattr("bayesplate.workflow.batch_run.computed", computed_here)
+    header = 'name,thickness_mm,density_kg_m3,prior,"(0,0)","(0,1)","(1,0)",,'
+    rows = [",,,,", header, "", "thick,3 mm,400,,57,100,130,,", ",,,,,,,,", "light,3,2,,57,100,130,,"]
+    rows += ["prior,3,400,x.toml,57,100,130", "twice,3,400,,57,100,130", "", "Twice,3,400,,58,100,131"]
+    table.write_text("\n".join(["", *rows]))
+    result = bayesplate.batch(table, tmp_path / "out", template=tmp_path / "template.toml", report=False)
+    told = {one.name: one.message for one in result.summary.failed}
+
+    assert told["thick"].startswith("tops.csv row 2 -> thick.toml [plate] thickness_mm: wanted a number")
+    assert set(told) == {"thick", "light", "prior", "twice", "Twice"}
+    assert told["light"].startswith("tops.csv row 4 -> light.toml [plate] density_kg_m3: wanted a density")
+    assert told["prior"].startswith("tops.csv row 5 -> prior.toml [material] prior -> ")
+    assert told["twice"] == "tops.csv row 6 -> wanted a name of its own, got twice more than once"
+    assert told["Twice"].startswith("tops.csv row 8 -> ")
+
+
+def test_doubts_of_a_fit_and_of_copied_rows_reach_the_table_and_the_summary_and_not_the_journal(table, monkeypatch):
+    """A copy that is taken out leaves no doubt behind when the run is continued."""
+
+    def made(workers, calls):
+        for key, call in calls:
+            future: Future[Any] = Future()
+            future.set_result(
+                replace(SUMMARY, name=(name := call.arguments[0].name), doubts=("misread?",) * (name == "c"))
+            )
+            yield key, future
+
+    monkeypatch.setattr("bayesplate.workflow.batch_run.computed", made)
+    header, *rows = 'name,"(0,0)","(0,1)","(1,0)"', "a,57,100,130", "b,57,100,130", "c,58,100,130"
+    found = []
+    for some, resume in ((rows, False), (rows[1:], True)):
+        table.write_text("\n".join([header, *some]))
+        template = table.parent / "template.toml"
+        result = bayesplate.batch(table, table.parent / "out", template=template, report=False, resume=resume)
+        doubts = {one.name: one.doubt for one in result.summary.doubts}
+        assert {
+            name: row["doubt"] for name, row in rows_of(result.table.read_bytes()).items() if row["doubt"]
+        } == doubts
+        found.append(doubts)
+
+    copied = "every reading is that of {} to the last digit: one board twice, or a copy?"
+    assert found == [{"a": copied.format("b"), "b": copied.format("a"), "c": "misread?"}, {"c": "misread?"}]
+
+
+def test_a_folder_keeps_what_stands_behind_a_point_in_its_name(table):
+    (table.parent / "2024.01").mkdir()
+    assert default_batch_folder(table.parent / "2024.01") == Path("results/2024.01")
+    assert default_batch_folder(table) == Path("results/tops")
 
 
 HEADERS = [
@@ -373,9 +442,12 @@ def test_what_cannot_be_a_batch_is_refused_and_nothing_is_written(cards, tmp_pat
     empty.mkdir()
     table = tmp_path / "x.csv"
     table.write_text("name\nx\n")
+    tabs = shutil.copy(table, tmp_path / "x.TSV")
     for source, options, said in (
         (empty, {}, r"wanted a folder with board cards \(NAME.toml\), got none in it"),
         (tmp_path / "nowhere", {}, "wanted a folder of cards, or a table .*, got nothing there"),
+        (tmp_path / "nothere.csv", {"template": "x.toml"}, "wanted a folder of cards.*got nothing there .looked in"),
+        (tabs, {"template": "x.toml"}, "wanted a folder of cards.*got another file .save the table as CSV"),
         (table, {}, "--template: wanted a card for the table"),
         (cards, {"template": "x.toml"}, "--template: wanted a table of boards beside it, got a folder"),
         (cards, {"workers": 0, "table": "xls"}, "(?s)workers: wanted.*table: wanted"),

@@ -36,6 +36,19 @@ def test_everything_that_cannot_be_read_is_said_at_once():
     assert "--rigidity: wanted a positive number of N m, got -3" in said
 
 
+def test_what_is_said_twice_is_refused_and_no_tolerance_is_nothing():
+    """The last one won."""
+    with pytest.raises(InputError) as refused:
+        grading_request("E_x=10,E_x=20", ["E_x=11:", "density=:450", "E_x=:12"], None)
+
+    assert [str(fault) for fault in refused.value.faults] == [
+        "--match: wanted each quantity once, got E_x again",
+        "--limit E_x=:12: wanted each quantity once, got E_x again (both ends: LEAST:GREATEST)",
+    ]
+    with pytest.raises(InputError, match=r'^--match: wanted positive per cents up to 1000, .*, got "0"$'):
+        grading_request("0", [], None)
+
+
 RANGE = "positive numbers, the least before the greatest, at least one of them"
 
 
