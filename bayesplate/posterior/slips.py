@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
-from bayesplate.estimates.refit import N_CONSTANTS, most_likely, normal_misfit, sensitivities
+from bayesplate.estimates.refit import N_CONSTANTS, Bounds, most_likely, normal_misfit, sensitivities
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
@@ -43,6 +43,8 @@ _ANYWHERE = np.log(16.0)
 """Width in ln f over which a reading of something else may lie: two octaves either way."""
 _OPEN = 1e-6
 """Sensitivity of ln f to the logarithm of a constant, in its best combination of readings, below which it is open."""
+_REACH = np.log(1000.0)
+"""How far a refit may take ln of a constant: much farther than any slip, and numbers still."""
 _N_REFITTED = 3
 """Slips, the likeliest to first order, whose odds after a refit are compared."""
 _NOISE_SDS = np.linspace(-3.0, 14.0, 69)
@@ -217,9 +219,15 @@ class SlipSearch:
         """Residuals of the most likely constants where a slip is mended."""
         target = slip.mended(self.target)
         scales = reading_sd(self.board.setups, self._medians * np.exp(self.log_widening))
-        bounds = self._parameters.fitted_bounds
-        x = most_likely(start.predict, normal_misfit(target, scales), start.x, bounds, slip.left_out)
+        x = most_likely(start.predict, normal_misfit(target, scales), start.x, self._within(start.x), slip.left_out)
         return _Fit.at(start.predict, x, target)
+
+    def _within(self, x: Floats) -> Bounds:
+        """Limits of the fitted columns: constants stay within reach, for a slip may leave one of them open."""
+        bounds = self._parameters.fitted_bounds
+        reach = np.full(x.size, np.inf)
+        reach[:N_CONSTANTS] = _REACH
+        return Bounds(np.maximum(bounds.lower, x - reach), np.minimum(bounds.upper, x + reach))
 
     def _elsewhere(self, slip: Slip) -> _Fit | None:
         """The readings beside the plate that least squares finds where a slip is mended, from a start of its own.

@@ -104,7 +104,7 @@ def test_the_name_must_be_that_of_the_file(board_file: Path) -> None:
     other = board_file.rename(board_file.with_name("other.toml"))
     with refused('other.toml name: wanted "other", the name of the file, got "my-board"'):
         load_board(other)
-    rule = "letters, digits, '.', '_' or '-', beginning with a letter or digit, at most 80 characters"
+    rule = "A-Z, a-z, 0-9, '.', '_' or '-', beginning with a letter or digit, at most 80 characters"
     with refused(f'my board.toml: wanted {rule}, got "my board" (rename the file to my-board.toml)'):
         load_board(other.rename(board_file.with_name("my board.toml")))
 

@@ -49,8 +49,10 @@ def picked(tmp_path_factory):
     """Recordings between as many places as names, picked by the command line; the names, and what it left and said."""
     folder = tmp_path_factory.mktemp("bench")
     names = [*STEERS, *(f"{one}.wav" for one in PAYLOADS if "$" in one and "/" not in one)]
-    force, heard = hits(np.random.default_rng(2), [0.05], (0.02, 0.02))
-    arguments = [str(write_wav(folder / name, 4000.0, force, heard)) for name in names]
+    arguments = []
+    for i, name in enumerate(names):
+        force, heard = hits(np.random.default_rng(2 + i), [0.05], (0.02, 0.02))
+        arguments.append(str(write_wav(folder / name, 4000.0, force, heard)))
     for i in range(len(names)):
         arguments += ["--hammer", f"{20 + 10 * i},20"]
     out = folder / "o\x1b[2J\x07\u202eut"
