@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bayesplate.workflow.shown import Table
 
+_SENTENCE = 40
+"""Characters in a line from which on a cell is a text and no number: it begins at the left."""
 _UNBROKEN = 16
 """A number with its uncertainty, or an interval, of at most so many characters stays in one line."""
 
@@ -75,8 +77,10 @@ def _grid(table: Table, widths: Sequence[int]) -> Any:
     from rich.text import Text
 
     grid = Grid(title=Text(table.title), title_justify="left", title_style="bold")
-    for i, (column, width) in enumerate(zip(table.columns, widths, strict=True)):
-        grid.add_column(Text(column), justify="left" if i == 0 else "right", width=width, overflow="fold")
+    cells = zip(*table.rows, strict=True) if table.rows else [()] * len(table.columns)
+    for i, (column, width, own) in enumerate(zip(table.columns, widths, cells, strict=True)):
+        is_text = i == 0 or any(_longest_line(cell) > _SENTENCE for cell in own)
+        grid.add_column(Text(column), justify="left" if is_text else "right", width=width, overflow="fold")
     for row in table.rows:
         grid.add_row(*(Text(cell) for cell in row))
     return grid

@@ -65,3 +65,8 @@ def test_a_table_that_fits_is_a_grid_and_one_that_does_not_is_stacked():
         "  a reason in words: not",
         "  needed",
     ]
+
+
+def test_numbers_end_at_the_right_and_sentences_begin_at_the_left():
+    rows = (("a", "1.5", "a sentence of more characters than any number has"), ("b", "12", "short"))
+    assert "│ b     │    12 │ short " in "\n".join(printed(Table("t", ("board", "value", "doubt"), rows), 80))

@@ -22,7 +22,6 @@ from bayesplate.plate.material import moduli
 from bayesplate.plate.setup import Setup
 
 CoefficientSource = Literal["sensitivity", "training", "published"]
-SOURCES: tuple[CoefficientSource, ...] = get_args(CoefficientSource)
 SAME_ASPECT = 0.01
 """Relative difference up to which a table counts as made for the aspect ratio of a board."""
 _GPA = 1e9
