@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,8 +23,24 @@ which the reader is told."""
 _LOG_MILLION = np.log(1e6)
 
 
-def slip_remarks(posterior: Posterior, centre: NDArray[np.float64]) -> tuple[str, ...]:
-    """What a reader of the constants must know of the readings, a sentence each, the worst first.
+class Remarks(NamedTuple):
+    """What a reader of the constants must know of the readings, a sentence each.
+
+    Attributes
+    ----------
+    slips : tuple of str
+        The likeliest slip, if one explains the readings.
+    others : tuple of str
+        Otherwise the two readings whose order is least like the plate's, unless no plate fits; and whether the noise
+        that the residuals want is far above its prior.
+    """
+
+    slips: tuple[str, ...]
+    others: tuple[str, ...]
+
+
+def reading_remarks(posterior: Posterior, centre: NDArray[np.float64]) -> Remarks:
+    """What is to be said of the readings of a posterior.
 
     Parameters
     ----------
@@ -33,18 +51,16 @@ def slip_remarks(posterior: Posterior, centre: NDArray[np.float64]) -> tuple[str
 
     Returns
     -------
-    tuple of str
-        The likeliest slip, or else the two readings whose order is least like the plate's, unless no plate fits; and
-        whether the noise that the residuals want is far above its prior.
+    Remarks
     """
     search = SlipSearch(posterior, centre)
     is_lost = is_too_wide(posterior.board, search.log_widening)
-    found, slip = [], search.likeliest(anywhere=is_lost)
+    noise = noise_remarks(posterior.board, search.log_widening)
+    slip = search.likeliest(anywhere=is_lost)
     if slip is not None:
-        found.append(_exchange(search.board, slip) if slip.is_exchange else _stray(search, slip))
-    elif not is_lost and (slip := search.disordered()) is not None:
-        found.append(_disorder(search.board, slip))
-    return (*found, *noise_remarks(posterior.board, search.log_widening))
+        return Remarks((_exchange(search.board, slip) if slip.is_exchange else _stray(search, slip),), noise)
+    pair = None if is_lost else search.disordered()
+    return Remarks((), noise if pair is None else (_disorder(search.board, pair), *noise))
 
 
 def noise_remarks(board: Board, log_widening: float) -> tuple[str, ...]:

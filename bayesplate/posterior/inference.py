@@ -28,7 +28,7 @@ from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.contradictions import require_possible_noise, require_reachable
 from bayesplate.posterior.convergence import Convergence
-from bayesplate.posterior.doubts import is_too_wide, noise_remarks, slip_remarks
+from bayesplate.posterior.doubts import Remarks, is_too_wide, noise_remarks, reading_remarks
 from bayesplate.posterior.first_labels import propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
@@ -84,9 +84,18 @@ class PosedProblem:
     def doubts(self) -> tuple[str, ...]:
         """What is unusual about the constants and the readings, before anything is sampled: a sentence each."""
         constants = unusual(self.board, self.prior, self.estimate.rigidities)
+        return (*constants, *self.slips, *self._readings.others)
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """Those of the doubts that name a reading or two as a slip."""
+        return self._readings.slips
+
+    @cached_property
+    def _readings(self) -> Remarks:
         if any(self.posterior.peaks):  # whose assignments say what a label may be
-            return (*constants, *self.veerings, *noise_remarks(self.board, self.log_widening))
-        return (*constants, *slip_remarks(self.posterior, self.centre))
+            return Remarks((), (*self.veerings, *noise_remarks(self.board, self.log_widening)))
+        return reading_remarks(self.posterior, self.centre)
 
     @property
     def log_widening(self) -> float:

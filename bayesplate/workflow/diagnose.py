@@ -244,6 +244,7 @@ def _case(
         known=known,
         finalists=[(one, refits[one.index].summary) for one in finals if one.index in refits],
         drawn={index: one.draws for index, one in refits.items()},
+        has_slip=bool(before.inference.problem.slips),
         notes=notes,
     )
 

@@ -14,7 +14,7 @@ from scipy import stats
 from bayesplate.cards import load_prior
 from bayesplate.plate.board import Board
 from bayesplate.posterior import slips
-from bayesplate.posterior.doubts import LARGE_NOISE, noise_remarks, slip_remarks
+from bayesplate.posterior.doubts import LARGE_NOISE, noise_remarks, reading_remarks
 from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.slips import RARITY, Slip, SlipSearch
 from bayesplate.quantities import Quantity
@@ -43,7 +43,8 @@ def posed(changed: dict | None = None, *, robust: bool = False, noise: Quantity 
 
 
 def told(problem: PosedProblem) -> str:
-    return "\n".join(slip_remarks(problem.posterior, problem.centre))
+    slips, others = reading_remarks(problem.posterior, problem.centre)
+    return "\n".join((*slips, *others))
 
 
 CASES = {

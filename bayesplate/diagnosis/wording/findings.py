@@ -78,6 +78,8 @@ class Case:
         the summary of its fit.
     drawn : dict of Draws
         Of these fits, by the index of the hypothesis.
+    has_slip : bool
+        Whether the fit without an effect names a reading or two that a slip explains.
     notes : tuple of str
     """
 
@@ -92,6 +94,7 @@ class Case:
     known: Sequence[KnownFit] = ()
     finalists: Sequence[tuple[Answer, Summary]] = ()
     drawn: Mapping[int, Draws] = field(default_factory=dict)
+    has_slip: bool = False
     notes: tuple[str, ...] = ()
 
 
@@ -262,6 +265,8 @@ def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
         told += f", and from {first:.1f} to {last:.1f} for a mode left out"
     if RELABELLING in answer.members:
         return f"{told}."
+    if case.has_slip:
+        return f"{told}. Before it is declared, look at the readings that are told below."
     every = (*case.found.ground.baseline.board.effects, *answer.members)  # what a card lists is all that it declares
     names = ", ".join(f'"{name}"' for name in every)
     return f"{told}. Declare it, effects = [{names}], and diagnose again to look for what else is lacking."

@@ -327,6 +327,9 @@ def test_what_comes_nearest_is_told_though_it_is_not_enough(members, told):
     assert verdict.fitted_again == (verdict.nearest,)
     assert "comes nearest: with it the error goes from 21.2 to 4.2 cents in the fit" in sentence
     assert sentence.endswith(told)
+    (wary,) = diagnosis_of(replace(case, after=case.before, has_slip=True)).sentences
+    assert "Declare it" not in wary
+    assert members == (RELABELLING,) or "look at the readings" in wary
     base = found.ground.baseline
     declared = replace(base, board=replace(base.board, effects=("thickness_profile",)))
     beside = replace(found, ground=replace(found.ground, baseline=declared))
