@@ -119,9 +119,11 @@ class Quantity:
         lower, upper = _number("lower", lower), _number("upper", upper)
         if not 0 < lower < upper < math.inf:
             raise InputError(Fault("bounds", "0 < lower < upper", f"{lower} and {upper}"))
-        width = math.log(upper / lower)
-        mean = (upper - lower) / width
-        return cls(mean, math.sqrt((upper**2 - lower**2) / (2.0 * width) - mean**2), "log-uniform", lower, upper)
+        width = math.log1p((upper - lower) / lower)
+        mean, half = (upper - lower) / width, 0.5 * width
+        # x coth(x) - 1, by its series where all digits would cancel
+        squares = half / math.tanh(half) - 1.0 if half > 1e-3 else half**2 / 3.0
+        return cls(mean, mean * math.sqrt(squares), "log-uniform", lower, upper)
 
     @classmethod
     def from_readings(

@@ -175,3 +175,12 @@ def test_what_a_quantity_cannot_do_is_refused(make: object, message: str) -> Non
 def test_log_normal_is_never_below_zero() -> None:
     assert np.isneginf(LOG_NORMAL.standard([0.0, -1.0])).all()
     assert float(LOG_NORMAL.value(-40.0)) > 0
+
+
+@pytest.mark.parametrize("width", [1e-9, 1e-4, 1.9e-3, 2.1e-3, 3.0])
+def test_a_range_has_the_moments_of_a_uniform_logarithm(width):
+    """However narrow it is: its standard deviation is that of a uniform density then."""
+    one = Quantity.from_range(2.0, 2.0 * (1.0 + width))
+    logs = np.log1p(width) * (np.arange(100_000) + 0.5) / 100_000
+    assert one.mean == pytest.approx(2.0 + 2.0 * np.expm1(logs).mean(), rel=1e-9)
+    assert one.sd == pytest.approx(2.0 * np.expm1(logs).std(), rel=1e-6)
