@@ -66,7 +66,7 @@ class AttachedMass(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> AttachedMass:
-        """The things of known mass; the others too if the card lists the effect, or alone if there are no others."""
+        """All things where the effect is declared, by a list or by one mass; otherwise those of known mass, or all."""
         known = [item for item in setup.attached if item.mass is not None]
         items = setup.attached if cls.name in board.effects or not known else known
         return cls(setup.owner, tuple(item_on_board(board, setup, item) for item in items))

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
-from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
+from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import KronSum
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
+from bayesplate.plate.setup import Ends, Setup
 from bayesplate.quantities import Quantity
 
-Axis = Literal["x", "y", "both"]
+Axis = Literal["both", "x", "y"]
 
 _PRIOR = Quantity.from_mean(0.0, 500.0, "normal", lower=0.0)
 _SOURCE = (
@@ -29,7 +29,7 @@ class MembraneTension(Effect):
 
     Attributes
     ----------
-    axis : "x", "y" or "both"
+    axis : "both", "x" or "y"
         Along which it acts; "both" is one tension, equal along x and y.
     """
 
@@ -42,17 +42,26 @@ class MembraneTension(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> MembraneTension:
         """Equal tension along all sides of the setup that are held at both ends."""
-        held = "".join(axis for axis, ends in (("x", setup.ends_x), ("y", setup.ends_y)) if "free" not in ends)
-        axis: Axis = "x" if held == "x" else "y" if held == "y" else "both"
-        return cls(setup.owner, axis)
+        held = _held(setup)
+        return cls(setup.owner, held[0] if len(held) == 1 else "both")
 
     @classmethod
-    def candidates(cls, board: Board, setup: Setup) -> tuple[MembraneTension, ...]:
-        """Equal tension, and tension along x or along y alone where both could be stretched."""
-        if cls.refusal(board, setup):
-            return ()
-        equal = cls.of(board, setup)
-        return (equal,) if equal.axis != "both" else (equal, cls(setup.owner, "x"), cls(setup.owner, "y"))
+    def forms(cls, board: Board) -> tuple[EffectForm, ...]:
+        """Equal tension, and tension along x or along y alone, in the setups that are held so; none of them twice."""
+        found: list[EffectForm] = []
+        for axis in get_args(Axis):
+            acting = (cls(setup.owner, axis).in_setup(board, setup) for setup in board.setups)
+            effects = tuple(one for one in acting if one is not None)
+            if effects and all(effects != one.effects for one in found):
+                is_same = len({one.detail for one in effects}) == 1
+                found.append(EffectForm(effects[0].detail if is_same else "", effects))
+        return tuple(found)
+
+    def in_setup(self, board: Board, setup: Setup) -> MembraneTension | None:
+        """Tension along the same side of another setup, or along all that is held there."""
+        if self.refusal(board, setup) or (self.axis != "both" and self.axis not in _held(setup)):
+            return None
+        return self.of(board, setup) if self.axis == "both" else replace(self, owner=setup.owner)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -79,6 +88,12 @@ class MembraneTension(Effect):
 
         sides = {"x": (0,), "y": (1,), "both": (0, 1)}[self.axis]
         return tuple(Stiffness(_SQUARED_SLOPES[side], partial(weight, side=side)) for side in sides)
+
+
+def _held(setup: Setup) -> tuple[Axis, ...]:
+    """Axes along which a setup is held at both ends."""
+    sides: tuple[tuple[Axis, Ends], ...] = (("x", setup.ends_x), ("y", setup.ends_y))
+    return tuple(axis for axis, ends in sides if "free" not in ends)
 
 
 def _along_x(x: Line, y: Line) -> KronSum:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import generator.effects
 import numpy as np
@@ -55,6 +56,22 @@ def test_acts_between_held_edges_only():
     assert "nothing can stretch" in MembraneTension.refusal(None, setup_of(FINNISH))
     assert MembraneTension.refusal(None, setup_of(FREE))
     assert MembraneTension.of(None, setup_of(between_y)).axis == "y"
-    assert [e.axis for e in MembraneTension.candidates(None, setup_of(FIEMME))] == ["both", "x", "y"]
-    assert [e.axis for e in MembraneTension.candidates(None, setup_of(between_y))] == ["y"]
-    assert MembraneTension.candidates(None, setup_of(FREE)) == ()
+
+
+@pytest.mark.parametrize(
+    ("held", "axes"),
+    [
+        (["all"], {"": ["both"], "along x": ["x"], "along y": ["y"]}),
+        (["y"], {"along y": ["y"]}),
+        (["none"], {}),
+        (["all", "y"], {"": ["both", "y"], "along x": ["x"], "along y": ["y", "y"]}),
+        (["y", "none", "all"], {"": ["y", "both"], "along x": ["x"], "along y": ["y", "y"]}),
+        (["x", "y"], {"": ["x", "y"], "along x": ["x"], "along y": ["y"]}),
+    ],
+)
+def test_setups_that_are_held_otherwise_are_stretched_along_the_same_side(held, axes):
+    edges = {"all": {}, "y": {"x1": "free"}, "x": {"y1": "free"}, "none": {"x1": "free", "y1": "free"}}
+    setups = [setup_of(replace(FIEMME, edges=FIEMME.edges | edges[one])) for one in held]
+    setups = [replace(one, name=str(i)) for i, one in enumerate(setups)]
+    forms = MembraneTension.forms(SimpleNamespace(setups=setups))
+    assert {form.detail: [effect.axis for effect in form.effects] for form in forms} == axes
