@@ -45,6 +45,9 @@ _OPEN = 1e-6
 """Sensitivity of ln f to the logarithm of a constant, in its best combination of readings, below which it is open."""
 _REACH = np.log(1000.0)
 """How far a refit may take ln of a constant: much farther than any slip, and numbers still."""
+_STEPS, _NEAR = 15, 0.01
+"""Steps of least squares, and what ln of a constant may be off by, where slips are weighed to first order and refits
+begin. Where a wrong reading is still among those that are fitted, steps may never settle."""
 _N_REFITTED = 3
 """Slips, the likeliest to first order, whose odds after a refit are compared."""
 _NOISE_SDS = np.linspace(-3.0, 14.0, 69)
@@ -237,7 +240,7 @@ class SlipSearch:
         frequencies = list(np.exp(slip.mended(self.target)))
         kept = [None if i in slip.left_out else Quantity.exact(float(one)) for i, one in enumerate(frequencies)]
         try:
-            values = weighted_least_squares(with_frequencies(self.board, kept)).values
+            values = weighted_least_squares(with_frequencies(self.board, kept), _STEPS, accepted=_NEAR).values
             models = [setup_model(system_of(self.board, setup), values) for setup in self.board.setups]
         except (ValueError, KeyError):
             return None
