@@ -36,6 +36,11 @@ def wrong_types(place: str, given: Iterable[tuple[str, object, bool, str]]) -> I
             yield Fault(f"{place} {name}", wanted, got if len(got) <= _LONGEST else f"{got[:_LONGEST]}...")
 
 
+def are(values: object, kind: type) -> bool:
+    """Whether it is a list or tuple of things of one kind."""
+    return isinstance(values, list | tuple) and all(isinstance(one, kind) for one in values)
+
+
 def is_place(value: object) -> bool:
     """Whether it is a pair of numbers, as a place on the board is."""
     try:

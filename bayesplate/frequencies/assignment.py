@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-LEAST = 1e-3
+_LEAST = 1e-3
 """Probability that a mode left no peak, at least: no ratio is beyond all numbers then."""
 _MANY = 1e30
 """A draw's sums are divided by the largest once one exceeds this: times one more ratio it is a number still."""
@@ -107,7 +107,7 @@ class Assignments:
     @cached_property
     def _missed(self) -> Floats:
         """m_j, none of them zero: (n_modes, n_draws) array."""
-        return np.maximum(self.missed, LEAST)
+        return np.maximum(self.missed, _LEAST)
 
     @cached_property
     def _ratios(self) -> tuple[Floats, ...]:

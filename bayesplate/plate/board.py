@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
-from bayesplate.cards.stated import quantity_of, wrong_types
+from bayesplate.cards.stated import are, quantity_of, wrong_types
 from bayesplate.cards.words import did_you_mean
 from bayesplate.cards.writing import write_card
 from bayesplate.errors import Fault, InputError
@@ -199,9 +199,9 @@ class Board:
         """
         faults = list(wrong_types(str(name), (
             ("name", name, isinstance(name, str), "a text"),
-            ("setups", setups, isinstance(setups, Setup) or _are(setups, Setup), "a Setup or a list of them"),
+            ("setups", setups, isinstance(setups, Setup) or are(setups, Setup), "a Setup or a list of them"),
             ("prior", prior, isinstance(prior, str | os.PathLike | PriorCard), "a name, a path or a PriorCard"),
-            ("effects", effects, _are(effects, str), "a list of names of effects"),
+            ("effects", effects, are(effects, str), "a list of names of effects"),
             ("title", title, isinstance(title, str), "a text"),
             ("source", source, isinstance(source, str), "a text"),
         )))  # fmt: skip
@@ -280,11 +280,6 @@ def _quantities(
         except InputError as error:
             faults += error.faults
     return found, faults
-
-
-def _are(values: object, kind: type) -> bool:
-    """Whether it is a list or tuple of things of one kind."""
-    return isinstance(values, list | tuple) and all(isinstance(one, kind) for one in values)
 
 
 def _unknown(place: str, name: object, known: Iterable[str]) -> Fault:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.cards import MISSED, SPURIOUS, CoefficientCard, PriorCard
-from bayesplate.cards.stated import is_place, quantity_of, wrong_types
+from bayesplate.cards.stated import are, is_place, quantity_of, wrong_types
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 from bayesplate.plate.measured import NO_OFFSET, Peak, Reading, label_text, peaks_of
@@ -198,8 +198,7 @@ class Setup:
             ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
             ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),
             ("unlabelled", unlabelled, isinstance(unlabelled, list | tuple | np.ndarray), "a list of peaks"),
-            ("attached", attached, isinstance(attached, list | tuple)
-             and all(isinstance(one, AttachedItem) for one in attached), "a list of AttachedItem"),
+            ("attached", attached, are(attached, AttachedItem), "a list of AttachedItem"),
             ("hammer", hammer, hammer is None or is_place(hammer), "a place (x, y) in m"),
             ("air", air, isinstance(air, DeclaredAir | None), "a DeclaredAir"),
             ("published_coefficients", published_coefficients,

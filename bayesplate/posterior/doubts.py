@@ -12,9 +12,8 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
-from bayesplate.posterior.slips import DECIMALS, OCTAVES, Slip, SlipSearch, with_frequencies
+from bayesplate.posterior.slips import DECIMALS, OCTAVES, Slip, SlipSearch
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 LARGE_NOISE, LARGE_NOISE_SDS = 3.0, 3.0
 """Noise that the residuals want, over the median of its prior, and in standard deviations of its logarithm, beyond
@@ -106,10 +105,7 @@ def _stray(search: SlipSearch, slip: Slip) -> str:
 
 
 def _exchange(board: Board, slip: Slip) -> str:
-    frequencies = _frequencies(board)
-    one, other = slip.readings
-    frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
-    residuals = (weighted_least_squares(each).residuals for each in (board, with_frequencies(board, frequencies)))
+    residuals = (weighted_least_squares(each).residuals for each in (board, slip.mended_board(board)))
     before, after = (cents(np.sqrt(np.mean(each**2))) for each in residuals)
     return (
         f"{_pair(board, slip)} fit far better exchanged, {after:.1f} cents rms in place of {before:.1f} "
@@ -140,13 +136,7 @@ def _pair(board: Board, slip: Slip) -> str:
 
 def _above_the_others(board: Board, reading: int) -> float:
     """How far a reading lies above what the others expect: ln measured - ln predicted, by least squares without it."""
-    frequencies: list[Quantity | None] = [*_frequencies(board)]
-    frequencies[reading] = None
-    values = weighted_least_squares(with_frequencies(board, frequencies)).values
+    values = weighted_least_squares(Slip((reading,)).mended_board(board)).values
     models = (setup_model(system_of(board, setup), values) for setup in board.setups)
     predicted = np.concatenate([model.log_frequencies(values, "linear")[0] for model in models])
     return float(log_measured(board)[reading] - predicted[reading])
-
-
-def _frequencies(board: Board) -> list[Quantity]:
-    return [reading.frequency for setup in board.setups for reading in setup.readings]

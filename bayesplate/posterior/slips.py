@@ -25,7 +25,6 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 
@@ -89,6 +88,23 @@ class Slip:
         elif self.readings:
             found[self.readings[0]] -= np.log(self.factor)
         return found
+
+    def mended_board(self, board: Board) -> Board:
+        """The board with its readings as they would have been read; without those that say nothing of the plate."""
+        frequencies = [reading.frequency for setup in board.setups for reading in setup.readings]
+        if self.is_exchange:
+            one, other = self.readings
+            frequencies[one], frequencies[other] = frequencies[other], frequencies[one]
+        elif self.readings:
+            frequencies[self.readings[0]] = frequencies[self.readings[0]].scaled(1.0 / self.factor)
+        at, setups = 0, []
+        for setup in board.setups:
+            rows = range(at, at + len(setup.readings))
+            read = [replace(one, frequency=frequencies[i]) for i, one in zip(rows, setup.readings, strict=True)]
+            kept = tuple(one for i, one in zip(rows, read, strict=True) if i not in self.left_out)
+            setups += [replace(setup, readings=kept)] if kept else []
+            at = rows.stop
+        return replace(board, setups=tuple(setups))
 
 
 AS_READ = Slip(())
@@ -237,10 +253,8 @@ class SlipSearch:
 
         None where the readings lead to no plate at all.
         """
-        frequencies = list(np.exp(slip.mended(self.target)))
-        kept = [None if i in slip.left_out else Quantity.exact(float(one)) for i, one in enumerate(frequencies)]
         try:
-            values = weighted_least_squares(with_frequencies(self.board, kept), _STEPS, accepted=_NEAR).values
+            values = weighted_least_squares(slip.mended_board(self.board), _STEPS, accepted=_NEAR).values
             models = [setup_model(system_of(self.board, setup), values) for setup in self.board.setups]
         except (ValueError, KeyError):
             return None
@@ -268,14 +282,3 @@ class SlipSearch:
         residuals = (fit.residuals + shifts)[..., kept] + inputs @ fit.inputs
         found = log_probability(residuals, fit.slopes[kept, :N_CONSTANTS], self._variances[:, kept], inputs)
         return found - 0.5 * (_NOISE_SDS**2).reshape(-1, *[1] * (found.ndim - 1))
-
-
-def with_frequencies(board: Board, frequencies: Sequence[Quantity | None]) -> Board:
-    """A board with other frequencies of its readings, in their order; without those that are None."""
-    rest = iter(frequencies)
-    setups = []
-    for setup in board.setups:
-        pairs = [(reading, next(rest)) for reading in setup.readings]
-        kept = tuple(replace(reading, frequency=one) for reading, one in pairs if one is not None)
-        setups += [replace(setup, readings=kept)] if kept else []
-    return replace(board, setups=tuple(setups))

@@ -12,6 +12,7 @@ import ritz
 from scipy import stats
 
 from bayesplate.cards import load_prior
+from bayesplate.estimates.least_squares import log_measured
 from bayesplate.plate.board import Board
 from bayesplate.posterior import slips
 from bayesplate.posterior.doubts import LARGE_NOISE, noise_remarks, reading_remarks
@@ -235,6 +236,23 @@ def test_a_slip_mends_what_was_read():
     np.testing.assert_allclose(np.exp(Slip((0, 2)).mended(target)), [40.0, 20.0, 10.0])
     np.testing.assert_allclose(np.exp(Slip((1,), 2.0).mended(target)), [10.0, 10.0, 40.0])
     assert (Slip((1,)).left_out, Slip((1,), 2.0).left_out, Slip((0, 1)).left_out) == ((1,), (), ())
+
+
+@pytest.mark.parametrize("slip", [Slip(()), Slip((9, 12)), Slip((9,), 2.0), Slip((9,)), Slip((0,), 0.1)])
+def test_a_board_is_mended_as_its_readings_are(slip):
+    """In the second of two setups: the frequencies of `mended`, without those that say nothing; labels and sds stay."""
+    free = made_boards.setup_of(
+        ritz.ALL_FREE, {label: Quantity.from_mean(hz, 0.01 * hz) for label, hz in HERTZ.items()}
+    )
+    board = made_boards.board_of(PLATE, [replace(free, name="one"), replace(free, name="two")])
+    mended = slip.mended_board(board)
+    kept = np.setdiff1d(np.arange(2 * len(HERTZ)), slip.left_out)
+    labels = [(setup.name, one.label) for setup in board.setups for one in setup.readings]
+    read = [(setup.name, one) for setup in mended.setups for one in setup.readings]
+    assert [(name, one.label) for name, one in read] == [labels[i] for i in kept]
+    found = [one.frequency for _, one in read]
+    np.testing.assert_allclose(np.log([one.mean for one in found]), slip.mended(log_measured(board))[kept], rtol=1e-12)
+    assert [one.sd / one.mean for one in found] == pytest.approx([0.01] * len(kept))
 
 
 def test_a_slip_that_leaves_a_constant_open_is_not_weighed(monkeypatch):
