@@ -50,7 +50,9 @@ def gauss_points(starts: Floats, lengths: Floats, n_points: int) -> tuple[Floats
 def _unit_element() -> tuple[Any, Any]:
     from skfem import ElementLineHermite, MappingAffine, MeshLine
 
-    return ElementLineHermite(), MappingAffine(MeshLine.init_tensor(np.array([0.0, 1.0])))
+    element, mapping = ElementLineHermite(), MappingAffine(MeshLine.init_tensor(np.array([0.0, 1.0])))
+    element.gbasis(mapping, np.zeros((1, 1)), 0)  # it finds its powers at the first call, and other threads use it too
+    return element, mapping
 
 
 def hermite_functions(t: Floats, lengths: Floats) -> Floats:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.line import Line, rigid_degrees
-from bayesplate.modes.sparse import sum_of_krons
+from bayesplate.modes.sparse import mirrored, sum_of_krons
 from bayesplate.modes.threads import in_threads
 from bayesplate.plate.setup import Ends
 
@@ -87,7 +87,7 @@ class Parity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """One symmetry class: its stiffness and mass terms on one sparsity pattern.
+    """One symmetry class: the lower triangles of its stiffness and mass terms, which are symmetric, on one pattern.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Block:
     masses : (n_masses, n_stored) array
         Stored values of each mass term; the first is the board's own.
     indices, indptr : arrays
-        The pattern they share (compressed columns; the matrices are symmetric).
+        The pattern they share (compressed columns).
     spread_x, spread_y : sparse arrays
         From the class's functions along x and y to all functions of the line; the deflection's unknowns come first.
     n_rigid : int
@@ -127,10 +127,15 @@ class Block:
         return len(self.masses) + len(self.projected)
 
     def matrix(self, stored: NDArray[np.float64]) -> Any:
-        """Sparse (n_dof, n_dof) array with the given stored values."""
+        """Sparse (n_dof, n_dof) array with the given stored values, whole."""
         from scipy.sparse import csc_array
 
-        return csc_array((stored, self.indices, self.indptr), shape=(self.n_dof, self.n_dof))
+        places, indices, indptr = self._whole
+        return csc_array((stored[places], indices, indptr), shape=(self.n_dof, self.n_dof))
+
+    @cached_property
+    def _whole(self) -> tuple[NDArray[np.intp], NDArray[np.int32], NDArray[np.int32]]:
+        return mirrored(self.indices, self.indptr)
 
     def stiffness(self, weights: Weights) -> Any:
         """Weighted sum of the stiffness terms as a sparse (n_dof, n_dof) array."""
@@ -150,11 +155,13 @@ class Block:
 
         The diagonal of `project`; all terms at once, because they share the products of unknowns at the stored places.
         """
-        columns = np.repeat(np.arange(self.n_dof), np.diff(self.indptr))
+        # Whole columns one after another, of which each nearly cancels; the triangle alone would lose a digit.
+        places, rows, starts = self._whole
+        columns = np.repeat(np.arange(self.n_dof), np.diff(starts))
         found = np.zeros((len(terms), vectors.shape[1]))
         for start in range(0, columns.size, _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            found += terms[:, part] @ (vectors[self.indices[part]] * vectors[columns[part]])
+            found += terms[:, places[part]] @ (vectors[rows[part]] * vectors[columns[part]])
         return found
 
     def project_masses(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,25 +99,29 @@ def _reduce(
     if not checks:
         raise np.linalg.LinAlgError("none of the points that were held out is a plate")
     # A second mass or a support lets elastic modes carry some rigid motion; otherwise they are orthogonal to it.
-    rigid = trained[0].rigid[:, : block.n_rigid if block.n_masses > 1 or _is_supported(block, trained[0]) else 0]
+    rigid = first.rigid[:, : block.n_rigid if block.n_masses > 1 or _is_supported(block, first) else 0]
     exact = np.stack([solution.eigenvalues[:n_modes] for solution in checks])
     is_steady = _is_steady([*training, *held_out])
-    together = Weights(*(np.stack(w) for w in zip(*held_out, strict=True)))
+    stiffness, mass = (np.stack(w) for w in zip(*held_out, training[0], strict=True))
+    seen = Weights(np.eye(len(stiffness)), mass)
     n_solved = n_first
     rounds = (n_first, 0), (len(training), 0), (len(training), len(held_out) // 2)
     for n_trained, n_joined in dict.fromkeys(rounds):
         trained += solved(training[n_solved:n_trained])[1]
         n_solved = max(n_solved, n_trained)
         elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
-        whole = _project(plate, block, rigid, elastic, trained[0], training[0], is_steady)
-        ways = []
-        for reduced in _cheapest_first(whole, training[0], n_modes):
-            ratios = reduced.eigenvalues(together)[n_joined:, :n_modes] / exact[n_joined:]
-            ways.append((reduced, 600.0 * float(np.abs(np.log2(ratios)).max())))
-            if ways[-1][1] <= accepted_cents:
-                return ways[-1]
-    # Where the basis itself is not that good, the first way that adds hardly anything to its error will do.
-    return next((way for way in ways if way[1] <= _HARDLY_MORE * ways[-1][1]), ways[-1])
+        vectors = _orthonormal(block, rigid, elastic, first, training[0], is_steady)
+        # A basis and a way to use it are judged by the stiffness at these points alone; its terms follow in the end.
+        whole = _projected(plate, block, vectors, stiffness @ block.terms, rigid.shape[1], first, is_steady)
+        checked = Weights(*(w[n_joined:-1] for w in seen))
+        ways = list(_tried(whole, seen.at(-1), checked, exact[n_joined:], accepted_cents))
+        if ways[-1].cents <= accepted_cents:
+            best = ways[-1]
+            break
+    else:
+        # Where the basis itself is not that good, the first way that adds hardly anything to its error will do.
+        best = next((way for way in ways if way.cents <= _HARDLY_MORE * ways[-1].cents), ways[-1])
+    return replace(best.block, stiffness=block.project(block.terms, vectors @ best.turn)), best.cents
 
 
 def _modes_of(block: Block, weights: Weights, n_modes: int) -> ClassModes | None:
@@ -139,18 +144,17 @@ def _is_supported(block: Block, solution: ClassModes) -> bool:
     return bool((resists > _RESISTS * bends).any())
 
 
-def _project(
-    plate: PlateMatrices,
+def _orthonormal(
     block: Block,
     rigid: NDArray[np.float64],
     elastic: NDArray[np.float64],
     centre: ClassModes,
     weights: Weights,
     is_steady: bool,
-) -> ReducedBlock:
-    """Orthonormalise in energy, dropping directions that the vectors hardly span, and project the terms.
+) -> NDArray[np.float64]:
+    """Basis of the span of some vectors, orthonormal in energy, or in the mass if that is steady: (n_dof, r) array.
 
-    What the vectors have most in common comes last.
+    Directions that the vectors hardly span are dropped; what they have most in common comes last.
     """
     vectors = np.concatenate([rigid, elastic], axis=1)
     highest = float(centre.eigenvalues[-1])
@@ -160,61 +164,92 @@ def _project(
     shares, directions = np.linalg.eigh(scale[:, None] * gram * scale)
     kept = shares > _LOWEST_SHARE * shares[-1]
     basis = (vectors * scale) @ (directions[:, kept] / np.sqrt(shares[kept]))
-    masses = block.project_masses(basis)
     if is_steady:
-        steady = np.tensordot(weights.mass, masses, axes=1)
+        steady = np.tensordot(weights.mass, block.project_masses(basis), axes=1)
         basis = basis @ np.linalg.inv(np.linalg.cholesky(steady)).T
-        masses = masses[:0]
-    stiffness = block.project(block.terms, basis)
+    return np.asarray(basis)
+
+
+def _projected(
+    plate: PlateMatrices,
+    block: Block,
+    basis: NDArray[np.float64],
+    terms: NDArray[np.float64],
+    n_rigid: int,
+    centre: ClassModes,
+    is_steady: bool,
+) -> ReducedBlock:
+    """Some stiffness terms and the masses on a basis, the latter where it is not orthonormal in them."""
+    stiffness = block.project(terms, basis)
+    size = basis.shape[1]
+    masses = np.empty((0, size, size)) if is_steady else block.project_masses(basis)
     parts = beam_parts(plate, block.spread(basis), block.parity)
-    return ReducedBlock(
-        block.parity,
-        stiffness,
-        masses,
-        np.stack(list(parts.values()), axis=1),
-        tuple(parts),
-        rigid.shape[1],
-        float(centre.eigenvalues[0]),
-    )
+    named = np.stack(list(parts.values()), axis=1)
+    first = float(centre.eigenvalues[0])
+    return ReducedBlock(block.parity, stiffness, masses, named, tuple(parts), n_rigid, first)
 
 
-def _cheapest_first(whole: ReducedBlock, centre: Weights, n_modes: int) -> Iterator[ReducedBlock]:
+class _Way(NamedTuple):
+    """A way to use a basis: the block, what turns the basis to its vectors, and its error where it was checked."""
+
+    block: ReducedBlock
+    turn: NDArray[np.float64]
+    cents: float
+
+
+def _tried(
+    whole: ReducedBlock, centre: Weights, checked: Weights, exact: NDArray[np.float64], accepted_cents: float
+) -> Iterator[_Way]:
+    """Ways to use a basis, the cheapest first, up to one that is accepted: against the eigenvalues of full solves."""
+    n_modes = exact.shape[1]
+    for block, turn in _cheapest_first(whole, centre, n_modes):
+        ratios = block.eigenvalues(checked)[:, :n_modes] / exact
+        cents = 600.0 * float(np.abs(np.log2(ratios)).max())
+        yield _Way(block, turn, cents)
+        if cents <= accepted_cents:
+            return
+
+
+def _cheapest_first(
+    whole: ReducedBlock, centre: Weights, n_modes: int
+) -> Iterator[tuple[ReducedBlock, NDArray[np.float64]]]:
     """Ways to find the modes of a draw on a basis: of a large one first from the modes at the centre; then as it is.
 
     A part of a basis that is orthonormal in the mass would not span what its vectors have in common.
     """
     size = whole.stiffness.shape[-1]
     n_condensed, n_stepped = (whole.n_rigid + n for n in (n_modes + _BEYOND, 2 * n_modes))
+    every = np.eye(size)
     if size > max(WHOLE, 2 * n_condensed):
-        yield replace(_on_modes(whole, centre), n_kept=n_condensed, is_condensed=True)
+        turned, turn = _on_modes(whole, every, centre)
+        yield replace(turned, n_kept=n_condensed, is_condensed=True), turn
     if size > (_LARGE_PENCIL if len(whole.masses) else _LARGE):
-        last = slice(size - max(round(_SHARED * size), n_condensed), None)
-        fewer = replace(
-            whole,
-            stiffness=whole.stiffness[:, last, last],
-            masses=whole.masses[:, last, last],
-            parts=whole.parts[last],
-        )
-        parts = [fewer, whole]
-        for part in parts if len(whole.masses) else [whole]:
-            kept = [n for n in sorted({n_condensed, n_stepped}) if part.stiffness.shape[-1] > 2 * n]
+        last = every[:, size - max(round(_SHARED * size), n_condensed) :]
+        for part in [last, every] if len(whole.masses) else [every]:
+            kept = [n for n in sorted({n_condensed, n_stepped}) if part.shape[1] > 2 * n]
             if kept:
-                turned = _on_modes(part, centre)
-                yield from (replace(turned, n_kept=n) for n in kept)
-            elif part is not whole:
-                yield part
-    yield whole
+                turned, turn = _on_modes(whole, part, centre)
+                yield from ((replace(turned, n_kept=n), turn) for n in kept)
+            elif part is last:
+                yield _turned(whole, part), part
+    yield whole, every
 
 
-def _on_modes(block: ReducedBlock, centre: Weights) -> ReducedBlock:
-    """The same basis turned to its modes at the centre, in the order of their frequencies."""
+def _on_modes(
+    whole: ReducedBlock, part: NDArray[np.float64], centre: Weights
+) -> tuple[ReducedBlock, NDArray[np.float64]]:
+    """A part of a basis turned to its modes at the centre, in the order of their frequencies, and what turns it."""
     from scipy.linalg import eigh
 
-    stiffness = np.tensordot(centre.stiffness, block.stiffness, axes=1)
-    mass = np.tensordot(centre.mass, block.masses, axes=1) if len(block.masses) else None
-    modes = eigh(stiffness, mass)[1]
-    turned = [modes.T @ terms @ modes for terms in (block.stiffness, block.masses)]
-    return replace(block, stiffness=turned[0], masses=turned[1], parts=modes.T @ block.parts)
+    stiffness = part.T @ np.tensordot(centre.stiffness, whole.stiffness, axes=1) @ part
+    mass = part.T @ np.tensordot(centre.mass, whole.masses, axes=1) @ part if len(whole.masses) else None
+    turn = part @ eigh(stiffness, mass)[1]
+    return _turned(whole, turn), turn
+
+
+def _turned(whole: ReducedBlock, turn: NDArray[np.float64]) -> ReducedBlock:
+    stiffness, masses = (turn.T @ terms @ turn for terms in (whole.stiffness, whole.masses))
+    return replace(whole, stiffness=stiffness, masses=masses, parts=turn.T @ whole.parts)
 
 
 def _is_steady(points: Sequence[Weights]) -> bool:

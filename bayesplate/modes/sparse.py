@@ -12,10 +12,18 @@ from numpy.typing import NDArray
 def on_one_pattern(
     matrices: list[Any],
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
-    """Stored values of several sparse matrices on the union of their patterns, so that sums are sums of values."""
-    from scipy.sparse import csc_array
+    """Lower triangles of several symmetric sparse matrices on the union of their patterns.
 
-    entries = [csc_array(matrix) for matrix in matrices]
+    Returns
+    -------
+    stored : (n_matrices, n_stored) array
+        Values; a sum of matrices is the sum of them.
+    indices, indptr : arrays
+        The pattern, in compressed columns.
+    """
+    from scipy.sparse import csc_array, tril
+
+    entries = [csc_array(tril(matrix)) for matrix in matrices]
     shape = csc_array(entries[0].shape)
     for entry in entries:
         entry.sum_duplicates()
@@ -26,6 +34,31 @@ def on_one_pattern(
     for row, entry in zip(stored, entries, strict=True):
         row[np.searchsorted(pattern, _keys(entry))] = entry.data
     return stored, shape.indices, shape.indptr
+
+
+def mirrored(indices: NDArray[np.int32], indptr: NDArray[np.int32]) -> tuple[NDArray[np.intp], Any, Any]:
+    """Whole matrices from their lower triangles.
+
+    Parameters
+    ----------
+    indices, indptr : arrays
+        The triangle's pattern, in compressed columns.
+
+    Returns
+    -------
+    places : (n_whole,) array of int
+        Where each value of the whole stands among those of the triangle.
+    indices, indptr : arrays
+        The pattern of the whole.
+    """
+    from scipy.sparse import coo_array, csc_array, tril
+
+    n = indptr.size - 1
+    numbers = np.arange(1, indices.size + 1, dtype=np.float64)
+    lower = csc_array((numbers, indices, indptr), shape=(n, n))
+    whole = csc_array(coo_array(lower) + tril(lower, -1).T)
+    whole.sort_indices()
+    return whole.data.astype(np.intp) - 1, whole.indices, whole.indptr
 
 
 def sum_of_krons(pairs: Sequence[tuple[Any, Any]], onto_x: tuple[Any, Any], onto_y: tuple[Any, Any]) -> Any:

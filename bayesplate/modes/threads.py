@@ -1,12 +1,17 @@
-"""Independent parts of one computation on all cores of a machine: the numbers are the same on any number of them."""
+"""Independent parts of one computation on all cores of a machine: the numbers are the same on any number of them.
+
+The threads are the parts' own. A library of linear algebra that takes all cores for each of a thousand small matrices
+as well makes all of them wait for one another, and rounds otherwise with each number of cores.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -15,6 +20,16 @@ from numpy.typing import NDArray
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 _local = threading.local()
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Linear algebra in one thread per call, whatever the process has set; to be put above a function, or a context."""
+    import scipy.linalg  # noqa: F401  (what is not loaded is not limited)
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, user_api="blas"):
+        yield
 
 
 def in_threads(compute: Callable[[Part], Result], parts: Sequence[Part] | NDArray[Any]) -> list[Result]:

@@ -43,7 +43,7 @@ class SamplerSettings:
         Walkers of each that go on where a surrogate is corrected. There a step costs an evaluation of the density and
         forgets nearly everything, so that few of them are worth as many draws; the warm-up, which teaches what is
         proposed, costs next to nothing and keeps them all. Twelve make 2400 effective draws at least, six times what
-        the gate asks for.
+        the gate asks for; fewer would do for that, but may not find a part of the posterior that a surrogate lacks.
     chunk_steps : int
         Steps between two checkpoints.
     max_steps : int

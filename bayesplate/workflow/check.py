@@ -12,6 +12,7 @@ from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.plate.material import MODULI, moduli
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.report.plots import CheckPlots
@@ -56,6 +57,7 @@ class CheckResult(CheckReport):
         return show_check(self).html(self.title or self.name)
 
 
+@one_thread_each()
 def check(
     card: Problem | Card | Campaign,
     *,

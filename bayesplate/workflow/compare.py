@@ -12,6 +12,7 @@ from bayesplate.effects import EFFECTS
 from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
@@ -84,6 +85,7 @@ class CompareResult(Comparison):
         return show_compare(self).html(f"{self.name}: every method side by side")
 
 
+@one_thread_each()
 def compare(
     card: Problem | Card,
     *,

@@ -27,6 +27,7 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.survivors import survivors
 from bayesplate.posterior.inference import Inference
@@ -99,6 +100,7 @@ class DiagnoseResult:
         return self.diagnosis._repr_html_()
 
 
+@one_thread_each()
 @run_of_its_own()
 def diagnose(
     card: Problem | Card | Campaign,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.frequencies.laws import LawName
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
@@ -78,6 +79,7 @@ class FitResult:
         return show_fit(self.summary).html(self.problem.board.title or self.summary.name)
 
 
+@one_thread_each()
 @run_of_its_own()
 def fit(
     card: Problem | Card | Campaign,

@@ -9,6 +9,7 @@ from pathlib import Path
 from bayesplate.cards import BoardCard, CoefficientCard, NamedCards, PriorCard
 from bayesplate.errors import Fault, NotConvergedError
 from bayesplate.frequencies.laws import LawName
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.plate.board import Board
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.summary import Summary
@@ -44,6 +45,7 @@ class FitRequest:
     tables: Mapping[str, CoefficientCard] = field(default_factory=dict)
 
 
+@one_thread_each()
 def fit_board(board: Board | BoardCard, prior: PriorCard, request: FitRequest | None = None) -> Summary:
     """Fit one board; nothing is read, written or remembered, and the same arguments give the same bytes anywhere.
 

@@ -17,6 +17,7 @@ from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
@@ -63,6 +64,7 @@ class ModesResult:
         return show_modes(self.summary).html(self.summary.title or self.summary.name)
 
 
+@one_thread_each()
 def modes(
     card: Problem | Card,
     *,

@@ -20,6 +20,7 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.planning.assembled import (
     Bench,
     benches,
@@ -80,6 +81,7 @@ class PlanResult:
         return show_plan(self.summary).html(self.summary.title or self.summary.name)
 
 
+@one_thread_each()
 def plan(
     card: Problem | Card | Campaign,
     *,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 from bayesplate.cards import NamedCards, PriorCard, card_names, load_board, load_named, load_prior, read_board_text
 from bayesplate.cards.words import shown
 from bayesplate.errors import Fault, InputError, plain
+from bayesplate.modes.threads import one_thread_each
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.folder import SUMMARY, json_text
 from bayesplate.results.summary import FORMAT
@@ -60,6 +61,7 @@ class RepeatResult:
         return f"<RepeatResult of {self.result.summary.name}: {self.sentence}>"
 
 
+@one_thread_each()
 def repeat(
     summary: str | os.PathLike[str],
     card: str | os.PathLike[str] | None = None,

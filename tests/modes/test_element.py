@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bayesplate.modes.element import (
+    _unit_element,
     assembled,
     element_products,
     function_values,
@@ -32,6 +33,18 @@ def test_functions_reproduce_a_cubic_and_its_derivatives(order, length):
 
     # The cubic is of order one, its terms on the element as large as length^-order.
     np.testing.assert_allclose(found, cubic.deriv(order)(length * t), atol=1e-14 * max(1.0, length**-order) * 40)
+
+
+def test_an_element_is_whole_before_another_thread_may_have_it():
+    """scikit-fem finds the powers of an element at its first call, in places: half of that is another element."""
+    _unit_element.cache_clear()
+    element, _ = _unit_element()
+    before = element._pbasis
+
+    hermite_functions(np.array([0.3]), 1.0)
+
+    assert element.V is not None
+    assert element._pbasis is before
 
 
 @pytest.mark.parametrize("n_points", [2, 4, 6])

@@ -1,12 +1,12 @@
-"""Sums of Kronecker products on one pattern."""
+"""Symmetric matrices on one pattern, and sums of Kronecker products."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
-from bayesplate.modes.sparse import sum_of_krons
+from bayesplate.modes.sparse import mirrored, on_one_pattern, sum_of_krons
 
 
 @pytest.mark.parametrize("held_as", [csr_array, np.asarray])
@@ -28,3 +28,14 @@ def test_a_sum_of_kronecker_products_of_rectangular_matrices(n_pairs, held_as):
     assert found.shape == (8, 15)
     assert found.toarray() == pytest.approx(expected, abs=1e-13)
     assert np.abs(expected).max() > 0.1
+
+
+def test_lower_triangles_are_whole_matrices_again():
+    rng = np.random.default_rng(5)
+    whole = [one + one.T for one in (rng.standard_normal((2, 9, 9)) * (rng.uniform(size=(2, 9, 9)) < 0.2))]
+    stored, indices, indptr = on_one_pattern([csr_array(one) for one in whole])
+    places, rows, starts = mirrored(indices, indptr)
+
+    assert stored.shape[1] < len(places)
+    for values, one in zip(stored, whole, strict=True):
+        np.testing.assert_array_equal(csc_array((values[places], rows, starts), shape=(9, 9)).toarray(), one)

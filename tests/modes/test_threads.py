@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+from importlib import import_module
 
 import numpy as np
 import pytest
+import scipy.linalg
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from bayesplate.modes import threads
 from bayesplate.modes.threads import in_threads
@@ -55,3 +58,27 @@ def test_a_worker_process_has_one_thread(method):
     worker.join(60)
     assert worker.exitcode == 0
     assert answers.get() == ["MainThread"] * 3
+
+
+def blas_threads():
+    return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+
+@pytest.mark.parametrize("name", ["fit", "diagnose", "check", "compare", "plan", "modes", "repeat"])
+def test_no_call_leaves_linear_algebra_to_several_threads(name, monkeypatch):
+    """As many threads as cores in each of the threads that take the cores already made a diagnosis twice as slow."""
+    assert scipy.linalg
+    seen = []
+
+    def looked(**_):
+        seen.append(blas_threads())
+        raise KeyError
+
+    module = import_module(f"bayesplate.workflow.{name}")
+    monkeypatch.setattr(module, "require_arguments", looked)
+    with threadpool_limits(2, user_api="blas"):
+        before = blas_threads()
+        with pytest.raises(KeyError):
+            getattr(module, name)("paper-cantilever-fe")
+        assert blas_threads() == before != {1}
+    assert seen == [{1}]
