@@ -21,7 +21,7 @@ import numpy as np
 from calibration.mutants import NARROWER, narrowed
 from calibration.records import Record
 from calibration.sbc import N_DRAWS, posterior_draws
-from calibration.table import family_p_value, is_calibrated, rows, text
+from calibration.table import family_p_value, family_words, is_calibrated, rows, text
 from calibration.truths import Design
 from numpy.typing import NDArray
 
@@ -149,6 +149,6 @@ def judge(records: Sequence[Record], fewest: int = FEWEST) -> tuple[list[str], b
         is_caught = family_p_value(wrong) < MUTANT_LEVEL
         told = "caught" if is_caught else "NOT CAUGHT"
         lines += text(name, table, len(good)).splitlines()
-        lines.append(f"  family-wise p {family_p_value(table):.3f}; {MUTANT}: p {family_p_value(wrong):.1e}, {told}")
+        lines.append(f"  {family_words(table)}; {MUTANT}: p {family_p_value(wrong):.1e}, {told}")
         well &= is_calibrated(table) and is_caught
     return lines, well

@@ -88,3 +88,10 @@ def central_coverage(ranks: NDArray[np.int_], n_draws: int, probability: float) 
     """Share of truths within the central interval of that probability."""
     tail = 0.5 * (1.0 - probability) * (n_draws + 1)
     return float(np.mean((ranks >= tail) & (ranks < n_draws + 1 - tail)))
+
+
+def coverage_p_value(ranks: NDArray[np.int_], n_draws: int, probability: float) -> float:
+    """Two-sided binomial probability that central intervals hold the truth as often or seldom as these."""
+    within = round(central_coverage(ranks, n_draws, probability) * len(ranks))
+    n_within = central_coverage(np.arange(n_draws + 1), n_draws, probability)
+    return float(stats.binomtest(within, len(ranks), n_within).pvalue)

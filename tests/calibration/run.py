@@ -28,11 +28,13 @@ from calibration.pictures import ALT, draw
 from calibration.records import Record, add_to, read_done
 from calibration.sbc import identity, simulate_one
 from calibration.table import (
+    COVERAGE_LEVEL,
     FAMILY_LEVEL,
     MUTANT_LEVEL,
     MUTANTS,
     NOT_COUNTED,
     family_p_value,
+    family_words,
     is_calibrated,
     is_caught,
     rows,
@@ -48,7 +50,8 @@ ABOUT = (
     "that of a chi-squared of their histogram; beside them the mean rank, 0.5 if the fit is right, and how often the "
     "middle 50 and 90 % of the draws hold the truth. A part is right if the smallest band p times the number of "
     f"quantities, the family-wise p, is above {FAMILY_LEVEL:g}: of many quantities some leave their own 95 % band by "
-    f"chance. A mutant is caught if it is below {MUTANT_LEVEL:g}; what is wrong in it by construction is not counted."
+    f"chance; the same of how often the middle holds the truth is to be above {COVERAGE_LEVEL:g}. A mutant is caught "
+    f"if the first is below {MUTANT_LEVEL:g}; what is wrong in it by construction is not counted."
 )
 SECTIONS = {
     "ranks": (
@@ -222,13 +225,13 @@ def judge(records: list[dict[str, Any]], wanted: Mapping[str, int] = MUTANTS) ->
     well = is_calibrated(table) and not failed
     paragraphs.append(text("production", table, len(good)))
     paragraphs.append(
-        f"  family-wise p {family_p_value(table):.3f}; relabelled at a veering: {sum(r['relabelled'] for r in good)}; "
+        f"  {family_words(table)}; relabelled at a veering: {sum(r['relabelled'] for r in good)}; "
         f"started anew: {sum(r['attempts'] > 1 for r in good)}; linear law: {sum(r['law'] == 'linear' for r in good)}; "
         f"median {sorted(r['seconds'] for r in good)[len(good) // 2]:.1f} s"
     )
     same = [r["ranks"]["production"] for r in good if not r["relabelled"]]
     if same and len(same) < len(good):
-        paragraphs.append(f"  of those not relabelled, {len(same)}, family-wise p {family_p_value(rows(same)):.3f}")
+        paragraphs.append(f"  of those not relabelled, {len(same)}, {family_words(rows(same))}")
     for mutant, fewest in wanted.items():
         ranks = [r["ranks"][mutant] for r in good if mutant in r["ranks"]]
         if len(ranks) < fewest:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from calibration.bands import band_p_value, central_coverage, chi2_p_value
+from calibration.bands import band_p_value, central_coverage, chi2_p_value, coverage_p_value
 from calibration.sbc import N_DRAWS
 
 FAMILY_LEVEL = 0.05
@@ -14,6 +14,10 @@ FAMILY_LEVEL = 0.05
 
 Ten bands of 95 % would reject a correct code four times in ten.
 """
+
+COVERAGE_LEVEL = 0.01
+"""The same for how often the middle 50 and 90 % of the draws hold the truth, of all quantities together."""
+MIDDLES = (0.5, 0.9)
 
 MUTANT_LEVEL = 1e-3
 
@@ -33,14 +37,27 @@ NOT_COUNTED = {"noise fixed at half": ("noise",), "sign of the Poisson ratio fli
 
 @dataclass(frozen=True)
 class Row:
-    """Verdict on one quantity: chance of leaving the band so far, chi-squared, mean rank, coverage of intervals."""
+    """Verdict on one quantity.
+
+    Attributes
+    ----------
+    name : str
+    band, chi2 : float
+        Chance that ranks of a fit that is right leave the flat line so far, and that of chi-squared.
+    mean_rank : float
+        0.5 if the fit is right.
+    within : tuple of float
+        How often the middle 50 and 90 % of the draws hold the truth.
+    coverage : float
+        The smaller chance of the two that they do it so often or so seldom.
+    """
 
     name: str
     band: float
     chi2: float
     mean_rank: float
-    within_50: float
-    within_90: float
+    within: tuple[float, ...]
+    coverage: float
 
 
 def rows(ranks: Sequence[Mapping[str, int]]) -> list[Row]:
@@ -54,8 +71,8 @@ def rows(ranks: Sequence[Mapping[str, int]]) -> list[Row]:
                 band_p_value(values, N_DRAWS),
                 chi2_p_value(values, N_DRAWS),
                 float(values.mean() / N_DRAWS),
-                central_coverage(values, N_DRAWS, 0.5),
-                central_coverage(values, N_DRAWS, 0.9),
+                tuple(central_coverage(values, N_DRAWS, middle) for middle in MIDDLES),
+                min(coverage_p_value(values, N_DRAWS, middle) for middle in MIDDLES),
             )
         )
     return found
@@ -67,9 +84,19 @@ def family_p_value(table: Sequence[Row], leave_out: Sequence[str] = ()) -> float
     return min(1.0, min(counted) * len(counted))
 
 
+def coverage_family_p_value(table: Sequence[Row]) -> float:
+    """Bonferroni: the smallest chance of a coverage times the number of coverages."""
+    return min(1.0, min(row.coverage for row in table) * len(MIDDLES) * len(table))
+
+
 def is_calibrated(table: Sequence[Row]) -> bool:
-    """Whether every quantity stays within its band."""
-    return family_p_value(table) > FAMILY_LEVEL
+    """Whether every quantity stays within its band, and intervals hold the truth as often as they say."""
+    return family_p_value(table) > FAMILY_LEVEL and coverage_family_p_value(table) > COVERAGE_LEVEL
+
+
+def family_words(table: Sequence[Row]) -> str:
+    """Both as they are printed."""
+    return f"family-wise p {family_p_value(table):.3f}, of coverage {coverage_family_p_value(table):.3f}"
 
 
 def is_caught(mutant: str, table: Sequence[Row]) -> bool:
@@ -84,7 +111,7 @@ def text(title: str, table: Sequence[Row], n: int) -> str:
     for row in table:
         mark = "" if row.band > 0.05 else "  outside its own 95 % band"
         lines.append(
-            f"  {row.name:{width}} {row.band:6.4f}  {row.chi2:6.4f}  {row.mean_rank:9.3f}  {100 * row.within_50:7.1f}"
-            f"  {100 * row.within_90:7.1f}{mark}"
+            f"  {row.name:{width}} {row.band:6.4f}  {row.chi2:6.4f}  {row.mean_rank:9.3f}  "
+            f"{'  '.join(f'{100 * share:7.1f}' for share in row.within)}{mark}"
         )
     return "\n".join(lines)

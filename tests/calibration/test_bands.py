@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibration.bands import N_SIMULATED, band, band_p_value, central_coverage, chi2_p_value
-from calibration.table import MUTANT_LEVEL
+from calibration.bands import (
+    N_SIMULATED,
+    band,
+    band_p_value,
+    central_coverage,
+    chi2_p_value,
+    coverage_p_value,
+)
+from calibration.table import MUTANT_LEVEL, Row, is_calibrated
 from scipy import stats
 
 N_DRAWS = 99
@@ -74,3 +81,21 @@ def test_central_coverage_counts_whole_ranks():
     everything = np.arange(N_DRAWS + 1)
     assert central_coverage(everything, N_DRAWS, 0.9) == pytest.approx(0.9)
     assert central_coverage(everything, N_DRAWS, 0.5) == pytest.approx(0.5)
+
+
+def test_intervals_that_hold_the_truth_too_often_are_found_out():
+    """The 99 % limits of 1000 simulations: the middle half holds between 45.9 and 54.1 % of them."""
+    values = np.arange(N_DRAWS + 1)
+    held = (values >= 25) & (values < 75)
+    for share, is_right in ((0.541, True), (0.542, False), (0.459, True), (0.458, False)):
+        n_within = round(1000 * share)
+        ranks = np.concatenate([np.resize(values[held], n_within), np.resize(values[~held], 1000 - n_within)])
+        assert (coverage_p_value(ranks, N_DRAWS, 0.5) > 0.01) == is_right
+
+
+@pytest.mark.parametrize(("coverage", "is_right"), [(0.0018, True), (0.0016, False)])
+def test_a_part_is_right_if_its_intervals_are(coverage, is_right):
+    """Three quantities, two intervals each: six chances that something leaves a limit of 0.01."""
+    table = [Row(name, 0.5, 0.5, 0.5, (0.5, 0.9), p) for name, p in (("a", 0.5), ("b", coverage), ("c", 0.9))]
+    assert is_calibrated(table) is is_right
+    assert not is_calibrated([*table, Row("d", 0.001, 0.5, 0.5, (0.5, 0.9), 0.5)])
