@@ -54,6 +54,7 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
     names = list(CONSTANTS)
     table = arviz.summary(data, var_names=names, round_to=8)
     loo = left_out(data)
+    by_reading = loo.elpd_i if hasattr(loo, "elpd_i") else loo.loo_i  # ArviZ 1.x and 0.23
     own = result.summary.sampler
     labels, modes = result.problem.labels, result.summary.modes
     numbers = {
@@ -62,7 +63,7 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
         "own": {"rhat_max": own.rhat_max, "ess_min": own.ess_min},
         "pareto_k": dict(zip(labels, (float(k) for k in loo.pareto_k), strict=True)),
         "leverage": {label: mode.leverage for label, mode in zip(labels, modes, strict=True)},
-        "weighed": dict(zip(labels, (float(one) for one in loo.loo_i), strict=True)),
+        "weighed": dict(zip(labels, (float(one) for one in by_reading), strict=True)),
         "refitted": {label: refitted(result.problem, i, seed) for i, label in enumerate(labels)},
         "left_out_cents": {label: mode.left_out_cents for label, mode in zip(labels, modes, strict=True)},
         "effective_parameters": float(getattr(loo, "p_loo", None) or loo.p),
@@ -98,7 +99,7 @@ def sensitivity(data: Any, factor: str) -> dict[str, float]:
     """How far the distribution of each constant changes with a power of the likelihood, or of a factor of the prior."""
     names = list(CONSTANTS)
     component, factors = ("likelihood", None) if factor == "likelihood" else ("prior", [factor])
-    if hasattr(arviz, "InferenceData"):
+    if "InferenceData" in vars(arviz):
         found = arviz.psens(data, component=component, component_var_names=factors, var_names=names)
         return {name: float(found[name]) for name in names}
     table = arviz.psense_summary(data, var_names=names, prior_var_names=factors)  # ArviZ 1.x
