@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import generator.effects
+import made_boards
 import numpy as np
 import pytest
 import ritz
@@ -17,7 +18,7 @@ from made_boards import board_of
 from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.outline_profile import OutlineProfile
 from bayesplate.effects.thickness_profile import ThicknessProfile
-from bayesplate.plate.board import density
+from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.random_field import Surface
 from bayesplate.posterior.laplace import worst_cents
@@ -222,3 +223,17 @@ def test_components_of_the_thickness_leave_nothing_negative_outside_the_outline(
     assert len(components) == 3
     away, there = (hertz(FREE, effects, values, 6) for values in (components, dict.fromkeys(components, 0.0)))
     assert 1200 * np.log2(away / there) == pytest.approx(0.0, abs=200.0)
+
+
+def test_a_clamp_along_the_straight_edge_covers_as_much_everywhere():
+    """What is left beside it narrows by as many millimetres as the board."""
+    setup = made_boards.setup_of(ritz.ALL_FREE | {"y0": "clamped"}, {(2, 2): 1.0}, clamped={"y0": Quantity.exact(0.06)})
+    readings = Quantity.from_readings([0.217, 0.211, 0.195], 0.001, [0.0, 0.3, 0.58])
+    board = board_of(ritz.FREE_SPRUCE, [setup], length_y=readings)
+    effect, at = OutlineProfile.of(board, setup), np.linspace(0.0, 1.0, 41)
+    values = effect.adjusted(board.nominal())
+    low, high = effect.limits(at)
+
+    width = board.inputs["length_y"].mean * (1.0 + effect.profile.expected(at, np.full_like(at, 0.5)))
+    assert high * vibrating_lengths(values, setup)[1] == pytest.approx(width - 0.06, rel=1e-3)
+    assert low == pytest.approx(0.0)
