@@ -146,6 +146,13 @@ class OutlineProfile(Effect):
         """Where a component widens the board, 1, and where it narrows it, -1."""
         return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
+    def placed(self, x: float, y: float) -> tuple[float, float]:
+        """The corner of x0 and y0 is that of the outline."""
+        if self.profile is None:
+            return x, y
+        (corner, low), (_, high) = self.limits(np.array([-self.part_x.start / self.part_x.share, x]))
+        return x, float(np.clip(corner + y * self.part_y.share / self._widest_part, low, high))
+
     @property
     def _strip_steps(self) -> float:
         """Width of a strip in steps of its component: where all strips overlap, all at their end leave some weight."""

@@ -9,18 +9,22 @@ import made_boards
 import numpy as np
 import pytest
 import ritz
-from effect_plates import hertz, hertz_apart, posed, setup_of, values_of
+from effect_plates import MADE, hertz, hertz_apart, modes_of, posed, setup_of, values_of
 from generator.known_boards import FIEMME, FINNISH, FREE
 from generator.plate import FINE_SHEAR
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
+from bayesplate.effects.attached_items import Item
+from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.field_components import FieldProfile
 from bayesplate.effects.outline_profile import OutlineProfile
 from bayesplate.effects.thickness_profile import ThicknessProfile
+from bayesplate.frequencies.residues import residues_of
 from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.random_field import Surface
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -237,3 +241,50 @@ def test_a_clamp_along_the_straight_edge_covers_as_much_everywhere():
     width = board.inputs["length_y"].mean * (1.0 + effect.profile.expected(at, np.full_like(at, 0.5)))
     assert high * vibrating_lengths(values, setup)[1] == pytest.approx(width - 0.06, rel=1e-3)
     assert low == pytest.approx(0.0)
+
+
+LEVEL = ((0.0, 0.5, 1.0), (1.02, 1.0, 0.84))
+PLACES = [(0.97, 0.93), (0.97, 0.02), (0.5, 0.6)]
+"""As fractions of the nominal sides; the second is off the board, where it narrows."""
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_thing_stands_where_it_was_measured_from_the_corner(place):
+    """And never beside the board, on what is left of the rectangle: there it would have a mode of its own."""
+    mass, item = 3e-3, Item(Quantity.exact(3e-3), "", (place,))
+    effect, planted = outline(FREE, *LEVEL), independent(FREE, *LEVEL)
+    widths = np.array(planted.widths)
+    widest, at = widths.max(), np.interp(place[0] * FREE.L_x, planted.stations, widths)
+    y = np.clip(0.5 * (widest - widths[0]) + place[1] * FREE.L_y, 0.5 * (widest - at), 0.5 * (widest + at))
+    heavy = generator.effects.AttachedMass(mass, ((place[0] * FREE.L_x, y),))
+    few, many = (solve_generator(FREE, (planted, heavy), 9, (n, n)).frequencies[3:] for n in (16, 22))
+
+    found = hertz(FREE, [effect, AttachedMass(MADE, (item,))], {"attached_mass.mass": mass}, 6)
+    assert 1200 * np.log2(found / (many + (many - few) / ((22 / 16) ** 2 - 1))) == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_thing_beside_the_board_tilts_with_its_rim():
+    """With a base as wide as what is missing there."""
+    narrow, mass = outline(FREE, *LEVEL), {"attached_mass.mass": 3e-3}
+    wide = [AttachedMass(MADE, (Item(Quantity.exact(3e-3), "", ((0.97, 0.02),), radius),)) for radius in
+            ((0.0, 0.0), (0.01, 0.08))]  # fmt: skip
+    point, tilting = (hertz(FREE, [narrow, one], mass, 6) for one in wide)
+    assert np.all(np.abs(1200 * np.log2(tilting / point)) < 10.0)
+
+
+def test_residues_are_those_of_the_places_on_the_outline():
+    """Over the largest deflection on the board, not on what is left of the rectangle around it."""
+    sensor = AttachedItem("accelerometer", ((0.97 * FREE.L_x, 0.9 * FREE.L_y),))
+    setup = replace(setup_of(FREE), hammer=(0.03 * FREE.L_x, 0.1 * FREE.L_y), attached=(sensor,))
+    effect, planted = outline(FREE, *LEVEL), independent(FREE, *LEVEL)
+    found = residues_of(setup, modes_of(FREE, [effect], {}, 6), values_of(FREE, {}), effect)
+
+    modes = solve_generator(FREE, (planted,), 9)
+    widest = max(planted.widths)
+    x, share = (one.ravel() for one in np.meshgrid(np.linspace(0.0, FREE.L_x, 41), np.linspace(-0.5, 0.5, 41)))
+    everywhere = modes.basis.deflection(x, 0.5 * widest + share * np.interp(x, planted.stations, planted.widths))
+    corner = 0.5 * (widest - planted.widths[0])
+    y = corner + np.array([0.1, 0.9]) * FREE.L_y
+    both = modes.basis.deflection(np.array([0.03, 0.97]) * FREE.L_x, y) @ modes.vectors
+    expected = both[0] * both[1] / np.abs(everywhere @ modes.vectors).max(axis=0) ** 2
+    assert found == pytest.approx(expected[3:], abs=0.01)
