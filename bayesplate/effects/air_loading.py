@@ -10,6 +10,7 @@ import numpy as np
 
 from bayesplate.effects.base import Contribution, Effect, Floats, ProjectedMass, Scope
 from bayesplate.modes.air import air_mass
+from bayesplate.modes.fields import Outline
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -37,11 +38,14 @@ class AirLoading(Effect):
     density : Quantity, kg m^-3
     baffle : Quantity
         0 in the open, 1 in a wall.
+    edge : Outline or None
+        Where the plate ends; None: the whole rectangle.
     """
 
     aspect_ratio: float = 1.0
     density: Quantity = DEFAULT_DENSITY
     baffle: Quantity = UNKNOWN_BAFFLE
+    edge: Outline | None = None
 
     name: ClassVar[str] = "air_loading"
     scope: ClassVar[Scope] = "setup"
@@ -78,6 +82,10 @@ class AirLoading(Effect):
             self.parameter("baffle", self.baffle, "1", 0.0, of_baffle),
         )
 
+    def within(self, shaped: Effect) -> AirLoading:
+        """The same that ends with the plate."""
+        return replace(self, edge=shaped.outline())
+
     def contributions(self) -> tuple[Contribution, ...]:
         """The air of a plate in the open and of one in a wall, each with its share; one of them where that is known.
 
@@ -94,7 +102,7 @@ class AirLoading(Effect):
         cases = (bool(self.baffle.mean),) if known else (False, True)
         return tuple(
             ProjectedMass(
-                partial(air_mass, aspect_ratio=self.aspect_ratio, is_baffled=is_baffled),
+                partial(air_mass, aspect_ratio=self.aspect_ratio, is_baffled=is_baffled, outline=self.edge),
                 partial(weight, is_baffled=is_baffled),
             )
             for is_baffled in cases

@@ -47,6 +47,8 @@ class Item:
         Of its base, over the two sides; 0 if it does not turn with the board, as on a stinger.
     base : float, m
         Radius of its base.
+    reach : tuple of (float, float)
+        Where the plate begins and ends along y at each place; empty where it is the whole rectangle.
     """
 
     mass: Quantity
@@ -54,6 +56,7 @@ class Item:
     places: Fractions
     radius: tuple[float, float] = (0.0, 0.0)
     base: float = 0.0
+    reach: tuple[tuple[float, float], ...] = ()
 
 
 def base_diameter(mass: Floats | float) -> Floats:

@@ -111,6 +111,10 @@ class AttachedMass(Effect):
         )
         return replace(self, owner=setup.owner, items=items)
 
+    def within(self, shaped: Effect) -> AttachedMass:
+        """The same things on the true outline."""
+        return replace(self, items=tuple(_within(item, shaped) for item in self.items))
+
     def _places_on(self, board: Board) -> list[Places]:
         """Where the things are on the whole board, m."""
         own = board.setup(self.owner.name)
@@ -187,15 +191,24 @@ def heaviest_roving(board: Board, setup: Setup) -> float:
     return max(roved, default=0.0) / board_mass(board)
 
 
+def _within(item: Item, shaped: Effect) -> Item:
+    """A thing on the plate whose outline an effect gives."""
+    outline = shaped.outline()
+    assert outline is not None
+    places = tuple(shaped.placed(*place) for place in item.places)
+    low, high = outline(np.array([x for x, _ in places]))
+    return replace(item, places=places, reach=tuple(zip(low.tolist(), high.tolist(), strict=True)))
+
+
 def _mirrors(places: Fractions, axis: int) -> bool:
     there = Counter((round(x, 6), round(y, 6)) for x, y in places)
     mirrored = [(1.0 - x, y) if axis == 0 else (x, 1.0 - y) for x, y in places]
     return there == Counter((round(x, 6), round(y, 6)) for x, y in mirrored)
 
 
-def _tilts(along: Line, at: Floats, radius: float) -> Any:
+def _tilts(along: Line, at: Floats, radius: float, reach: tuple[Floats, Floats] | tuple[float, float]) -> Any:
     """Tilt of a base that touches the board at its rim: (n_places, n_dof) sparse array."""
-    low, high = np.maximum(at - radius, 0.0), np.minimum(at + radius, 1.0)
+    low, high = np.maximum(at - radius, reach[0]), np.minimum(at + radius, reach[1])
     return (along.shapes(high) - along.shapes(low)).multiply(1.0 / (high - low)[:, None]).tocsr()
 
 
@@ -203,7 +216,8 @@ def _mean_squares(x: Line, y: Line, item: Item, tilt: int | None = None) -> Kron
     """The mean over an item's places of the square of the deflection, or of the tilt along x (0) or y (1)."""
     rows = []
     for axis, (line, at) in enumerate(zip((x, y), np.array(item.places).T, strict=True)):
-        rows.append(_tilts(line, at, item.radius[axis]) if axis == tilt else line.shapes(at))
+        reach = tuple(np.array(item.reach).T) if axis == 1 and item.reach else (0.0, 1.0)
+        rows.append(_tilts(line, at, item.radius[axis], reach) if axis == tilt else line.shapes(at))
     n = len(item.places)
     by_place = [(rows[0][[i]], rows[1][[i]]) for i in range(n)]
     return tuple((row_x.T @ row_x / n, row_y.T @ row_y) for row_x, row_y in by_place)

@@ -234,6 +234,17 @@ class Effect(ABC):
         """The plate's outline where it is not the whole rectangle."""
         return None
 
+    def placed(self, x: float, y: float) -> tuple[float, float]:
+        """Where on the plate's rectangle a place lies, given and returned as fractions of the vibrating sides.
+
+        Given are fractions of the nominal sides from the corner of x0 and y0; what lies off the plate is at its rim.
+        """
+        return x, y
+
+    def within(self, shaped: Effect) -> Effect:
+        """The effect on a plate whose outline another effect gives: its places lie on that, its own terms end there."""
+        return self
+
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
         """Fields that the plate's own terms follow instead of being uniform, by group of terms.
 

@@ -7,8 +7,8 @@ from functools import partial
 from typing import ClassVar, Literal, get_args
 
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
-from bayesplate.modes.line import Line
-from bayesplate.modes.plate import KronSum
+from bayesplate.modes.fields import Outline
+from bayesplate.modes.thin import within_outline
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Ends, Setup
@@ -31,9 +31,12 @@ class MembraneTension(Effect):
     ----------
     axis : "both", "x" or "y"
         Along which it acts; "both" is one tension, equal along x and y.
+    edge : Outline or None
+        Where the plate ends; None: the whole rectangle.
     """
 
     axis: Axis = "both"
+    edge: Outline | None = None
 
     name: ClassVar[str] = "membrane_tension"
     scope: ClassVar[Scope] = "setup"
@@ -79,6 +82,10 @@ class MembraneTension(Effect):
         """The tension."""
         return (self.parameter("N", _PRIOR, "N/m", 0.0, _SOURCE, words="tension"),)
 
+    def within(self, shaped: Effect) -> MembraneTension:
+        """The same that ends with the plate."""
+        return replace(self, edge=shaped.outline())
+
     def contributions(self) -> tuple[Contribution, ...]:
         """The squared slope along each side that is stretched, with N over rho h and the square of the side."""
 
@@ -87,21 +94,16 @@ class MembraneTension(Effect):
             return self.value(values, "N") / (areal * vibrating_lengths(values, setup)[side] ** 2)
 
         sides = {"x": (0,), "y": (1,), "both": (0, 1)}[self.axis]
-        return tuple(Stiffness(_SQUARED_SLOPES[side], partial(weight, side=side)) for side in sides)
+        slopes = ((1, 0), (0, 1))
+        return tuple(
+            Stiffness(
+                partial(within_outline, a=slopes[side], b=slopes[side], outline=self.edge), partial(weight, side=side)
+            )
+            for side in sides
+        )
 
 
 def _held(setup: Setup) -> tuple[Axis, ...]:
     """Axes along which a setup is held at both ends."""
     sides: tuple[tuple[Axis, Ends], ...] = (("x", setup.ends_x), ("y", setup.ends_y))
     return tuple(axis for axis, ends in sides if "free" not in ends)
-
-
-def _along_x(x: Line, y: Line) -> KronSum:
-    return ((x.slope, y.mass),)
-
-
-def _along_y(x: Line, y: Line) -> KronSum:
-    return ((x.mass, y.slope),)
-
-
-_SQUARED_SLOPES = (_along_x, _along_y)

@@ -44,14 +44,15 @@ class OutlineProfile(Effect):
     ----------
     ends_y : tuple of str
         Conditions at y0 and y1.
-    part_x : Part
-        What vibrates of the board along x.
+    part_x, part_y : Part
+        What vibrates of the board; along y, of its mean width.
     profile : FieldProfile or None
         Of the width, along x; None: a rectangle.
     """
 
     ends_y: Ends = ("free", "free")
     part_x: Part = WHOLE
+    part_y: Part = WHOLE
     profile: FieldProfile | None = None
 
     name: ClassVar[str] = "outline_profile"
@@ -63,7 +64,8 @@ class OutlineProfile(Effect):
         """The effect with the board's readings of its width."""
         profile = _profile(board)
         is_rectangle = profile is None or profile.is_uniform
-        return cls(BOARD, setup.ends_y, vibrating_part(board, setup, "x"), None if is_rectangle else profile)
+        parts = vibrating_part(board, setup, "x"), vibrating_part(board, setup, "y")
+        return cls(BOARD, setup.ends_y, *parts, None if is_rectangle else profile)
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
@@ -144,6 +146,13 @@ class OutlineProfile(Effect):
         """Where a component widens the board, 1, and where it narrows it, -1."""
         return np.sign(self._step(self.part_x.on_whole(x), k)) + 0.0 * y
 
+    def placed(self, x: float, y: float) -> tuple[float, float]:
+        """The corner of x0 and y0 is that of the outline."""
+        if self.profile is None:
+            return x, y
+        (corner, low), (_, high) = self.limits(np.array([-self.part_x.start / self.part_x.share, x]))
+        return x, float(np.clip(corner + y * self.part_y.share / self._widest_part, low, high))
+
     @property
     def _strip_steps(self) -> float:
         """Width of a strip in steps of its component: where all strips overlap, all at their end leave some weight."""
@@ -155,11 +164,16 @@ class OutlineProfile(Effect):
         """Widest place over the mean width."""
         return float(self._widths(np.linspace(0.0, 1.0, _N_POINTS + 1)).max())
 
+    @property
+    def _widest_part(self) -> float:
+        """What vibrates of the widest place over the mean width: what a clamp covers is as wide everywhere."""
+        return self._widest - 1.0 + self.part_y.share
+
     def limits(self, x: Floats, inside: int | None = None) -> tuple[Floats, Floats]:
         """The outline, or the one within by the strip of a component."""
         at = self.part_x.on_whole(x)
         strip = 0.0 if inside is None else self._strip_steps * np.abs(self._step(at, inside))
-        missing = 1.0 - (np.minimum(self._widths(at), self._widest) - strip) / self._widest
+        missing = (self._widest - np.minimum(self._widths(at), self._widest) + strip) / self._widest_part
         low, high = {
             ("free", True): (0.5 * missing, 1.0 - 0.5 * missing),
             ("free", False): (missing, np.ones_like(missing)),

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from bayesplate.effects.base import Contribution, Effect, Floats, ProjectedMass, Scope
+from bayesplate.modes.fields import Outline
 from bayesplate.modes.line import Line
+from bayesplate.modes.thin import mean_deflections
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -16,6 +19,7 @@ from bayesplate.quantities import Quantity
 
 _PRIOR = Quantity.from_median(8.0, 3.0)
 _SOURCE = "log-normal: frames of wood or steel for boards of this size weigh 3-25 kg"
+_N_POINTS = 400
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,17 @@ class SupportMass(Effect):
 
     The momentum of frame and board together stays zero, which takes (int rho h w)^2 / (M_f + m) from the mass, M_f the
     frame's and m the vibrating one. Things attached to the board are not counted in this momentum: they weigh grams.
+
+    Attributes
+    ----------
+    edge : Outline or None
+        Where the plate ends; None: the whole rectangle.
+    share : float
+        Of the rectangle that the plate is.
     """
+
+    edge: Outline | None = None
+    share: float = 1.0
 
     name: ClassVar[str] = "support_mass"
     scope: ClassVar[Scope] = "setup"
@@ -47,17 +61,24 @@ class SupportMass(Effect):
         """The frame's mass; one of a thousand tons stands still."""
         return (self.parameter("mass", _PRIOR, "kg", 1e6, _SOURCE),)
 
+    def within(self, shaped: Effect) -> SupportMass:
+        """The same that ends with the plate."""
+        edge = shaped.outline()
+        assert edge is not None
+        low, high = edge((np.arange(_N_POINTS) + 0.5) / _N_POINTS)
+        return replace(self, edge=edge, share=float(np.mean(high - low)))
+
     def contributions(self) -> tuple[Contribution, ...]:
         """Less the product of the mean deflections, with the share of the vibrating mass in frame and board."""
 
         def weight(values: Values, setup: Setup) -> Floats:
             length_x, length_y = vibrating_lengths(values, setup)
             vibrating = density(values) * values["thickness"] * length_x * length_y
-            return vibrating / (self.value(values, "mass") + vibrating)
+            return vibrating / (self.value(values, "mass") + self.share * vibrating)
 
-        return (ProjectedMass(_mean_products, weight),)
+        return (ProjectedMass(partial(_mean_products, outline=self.edge), weight),)
 
 
-def _mean_products(x: Line, y: Line, deflections: Floats) -> Floats:
-    means = np.einsum("i,kij,j->k", x.integrals, deflections, y.integrals)
+def _mean_products(x: Line, y: Line, deflections: Floats, outline: Outline | None) -> Floats:
+    means = mean_deflections(x, y, deflections, outline)
     return -np.outer(means, means)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
-from bayesplate.modes.line import Line
-from bayesplate.modes.plate import KronSum
+from bayesplate.modes.fields import Outline
+from bayesplate.modes.thin import within_outline
 from bayesplate.plate.board import Board, Values, density
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -22,7 +23,14 @@ class SupportStiffness(Effect):
     """A uniform elastic foundation: it adds k / (rho h) to omega^2 of every mode of a thin plate.
 
     A free board's rigid motions then bounce at that frequency, below all others; they stay left out.
+
+    Attributes
+    ----------
+    edge : Outline or None
+        Where the plate ends; None: the whole rectangle.
     """
+
+    edge: Outline | None = None
 
     name: ClassVar[str] = "support_stiffness"
     scope: ClassVar[Scope] = "setup"
@@ -45,14 +53,14 @@ class SupportStiffness(Effect):
         """Stiffness per area."""
         return (self.parameter("stiffness", _PRIOR, "N/m^3", 0.0, _SOURCE),)
 
+    def within(self, shaped: Effect) -> SupportStiffness:
+        """The same that ends with the plate."""
+        return replace(self, edge=shaped.outline())
+
     def contributions(self) -> tuple[Contribution, ...]:
         """The squared deflection over the board, with the weight k over rho h."""
 
         def weight(values: Values, setup: Setup) -> Floats:
             return self.value(values, "stiffness") / (density(values) * values["thickness"])
 
-        return (Stiffness(_squared_deflection, weight),)
-
-
-def _squared_deflection(x: Line, y: Line) -> KronSum:
-    return ((x.mass, y.mass),)
+        return (Stiffness(partial(within_outline, a=(0, 0), b=(0, 0), outline=self.edge), weight),)

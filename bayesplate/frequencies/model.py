@@ -249,7 +249,7 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
         np.concatenate([model.linear.stiffness[:n], modes.coefficients[rest]]),
         np.concatenate([model.linear.mass[:n], modes.mass_coefficients[rest]]),
     )
-    by_mode = residues_of(setup, modes, values)
+    by_mode = residues_of(setup, modes, values, model.system.shaped)
     residues = None
     if by_mode is not None:
         residues = np.array([np.nan if i is None else by_mode[i] for i in [*labelled, *rest]])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.effects.base import Effect
 from bayesplate.modes.solve import Modes
 from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.plate.setup import Setup
@@ -25,7 +26,7 @@ _SURE = 1e-3
 _GRID = np.linspace(0.0, 1.0, 21)
 
 
-def residues_of(setup: Setup, modes: Modes, values: Values) -> NDArray[np.float64] | None:
+def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | None = None) -> NDArray[np.float64] | None:
     """Residue of each mode over the square of its largest deflection: (n_modes,) array, -1 to 1.
 
     Parameters
@@ -34,6 +35,8 @@ def residues_of(setup: Setup, modes: Modes, values: Values) -> NDArray[np.float6
     modes : Modes
     values : dict of float
         The board's sizes.
+    shaped : Effect, optional
+        The effect that gives the plate its outline, where that is not the whole rectangle.
 
     Returns
     -------
@@ -44,8 +47,20 @@ def residues_of(setup: Setup, modes: Modes, values: Values) -> NDArray[np.float6
     if setup.hammer is None or len(sensors) != 1:
         return None
     hammer, sensor = (_fraction(setup, place, values) for place in (setup.hammer, sensors[0].places[0]))
+    if shaped is not None:
+        hammer, sensor = shaped.placed(*hammer), shaped.placed(*sensor)
     at = [modes.displacement(np.array([x]), np.array([y]))[:, 0, 0] for x, y in (hammer, sensor)]
-    return np.asarray(at[0] * at[1] / np.max(np.abs(modes.displacement(_GRID, _GRID)), axis=(1, 2)) ** 2)
+    return np.asarray(at[0] * at[1] / _largest(modes, shaped) ** 2)
+
+
+def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:
+    """The largest deflection of each mode on the plate: (n_modes,) array."""
+    outline = None if shaped is None else shaped.outline()
+    if outline is None:
+        return np.asarray(np.max(np.abs(modes.displacement(_GRID, _GRID)), axis=(1, 2)))
+    limits = zip(_GRID, *outline(_GRID), strict=True)
+    across = [modes.displacement(np.array([x]), low + (high - low) * _GRID) for x, low, high in limits]
+    return np.asarray(np.max(np.abs(np.concatenate(across, axis=1)), axis=(1, 2)))
 
 
 def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:

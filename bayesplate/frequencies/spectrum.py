@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesplate.effects.base import Effect
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.residues import NODAL_LINE, residues_of
 from bayesplate.frequencies.system import System
@@ -107,7 +108,9 @@ def doubtful_labels(models: Sequence[SetupModel]) -> tuple[str, ...]:
     )
 
 
-def sign_conflicts(setup: Setup, modes: Modes, named: tuple[NamedMode, ...], values: Values) -> tuple[str, ...]:
+def sign_conflicts(
+    setup: Setup, modes: Modes, named: tuple[NamedMode, ...], values: Values, shaped: Effect | None = None
+) -> tuple[str, ...]:
     """Labels whose measured sign of the residue differs from that of the shape.
 
     Only where the setup states signs and the places are known, and where neither stands near a nodal line: there the
@@ -119,7 +122,7 @@ def sign_conflicts(setup: Setup, modes: Modes, named: tuple[NamedMode, ...], val
         One sentence a conflict.
     """
     stated = {reading.label: reading.sign for reading in setup.readings if reading.sign}
-    residues = residues_of(setup, modes, values) if stated else None
+    residues = residues_of(setup, modes, values, shaped) if stated else None
     if residues is None:
         return ()
     sentences = []

@@ -8,6 +8,9 @@ of sources, twice whose kinetic energy at unit density is
 In the open the plate is a sheet of dipoles, whose strength m is the jump of the velocity potential across it: the
 normal velocity that m induces on the plate, (k / 2) m in terms of the wavenumber k, is w there, and the energy is
 int w m dA.
+
+Within an outline the air is that of a rectangle of the mean width, whose deflection follows the outline and goes with
+the width there over the mean: right for a long strip, of which each length carries air with the square of its width.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.fields import Outline
 from bayesplate.modes.line import Line
 
 Floats = NDArray[np.float64]
@@ -29,7 +33,9 @@ _MOST_ELONGATED = 4.0
 _EDGE_SHARE = 0.25
 
 
-def air_mass(x: Line, y: Line, deflections: Floats, aspect_ratio: float, is_baffled: bool) -> Floats:
+def air_mass(
+    x: Line, y: Line, deflections: Floats, aspect_ratio: float, is_baffled: bool, outline: Outline | None = None
+) -> Floats:
     """Mass of the air on given deflections, both faces wet.
 
     Both methods are of second order in the panels, so two lattices are extrapolated to none.
@@ -39,35 +45,46 @@ def air_mass(x: Line, y: Line, deflections: Floats, aspect_ratio: float, is_baff
     x, y : Line
     deflections : (n_vectors, n_dof_x, n_dof_y) array
     aspect_ratio : float
-        L_x / L_y.
+        L_x / L_y, of the mean width.
     is_baffled : bool
         In a rigid wall, or in the open.
+    outline : Outline, optional
+        Where the plate ends, if not with the rectangle.
 
     Returns
     -------
     (n_vectors, n_vectors) array
-        For a plate of unit area in air of unit density; it goes with the area to the power 3/2.
+        For a rectangle of unit area in air of unit density; it goes with the area to the power 3/2.
 
     References
     ----------
     Korotkin, Added Masses of Ship Structures, 6.3, for the kernel 1/R; the limit of a strip of width b in the open is
     pi rho b^2 / 4 per length.
     """
-    coarse, fine = (_on_lattice(x, y, deflections, aspect_ratio, is_baffled, n) for n in (1.0, _REFINED))
+    coarse, fine = (_on_lattice(x, y, deflections, aspect_ratio, is_baffled, outline, n) for n in (1.0, _REFINED))
     mass = fine + (fine - coarse) / (_REFINED**2 - 1.0)
     return 0.5 * (mass + mass.T)
 
 
 def _on_lattice(
-    x: Line, y: Line, deflections: Floats, aspect_ratio: float, is_baffled: bool, refinement: float
+    x: Line,
+    y: Line,
+    deflections: Floats,
+    aspect_ratio: float,
+    is_baffled: bool,
+    outline: Outline | None,
+    refinement: float,
 ) -> Floats:
     shape = _lattice(aspect_ratio, refinement)
     sides = np.sqrt(aspect_ratio), 1.0 / np.sqrt(aspect_ratio)
     # A lattice of dipoles ends a quarter of a panel short of the edges, where the jump falls with a square root.
     margin = 0.0 if is_baffled else _EDGE_SHARE
     steps = tuple(side / (n + 2.0 * margin) for side, n in zip(sides, shape, strict=True))
-    along_x, along_y = (_at_middles(side, n, margin) for side, n in zip((x, y), shape, strict=True))
-    moved = np.stack([(along_y @ (along_x @ w).T).T.ravel() for w in deflections], axis=1)
+    if outline is None:
+        along_x, along_y = (_at_middles(side, n, margin) for side, n in zip((x, y), shape, strict=True))
+        moved = np.stack([(along_y @ (along_x @ w).T).T.ravel() for w in deflections], axis=1)
+    else:
+        moved = _following(x, y, deflections, shape, margin, outline)
     if is_baffled:
         return moved.T @ (_sources(shape, steps) @ moved) / np.pi
     # Whitened by the triangular factor of the induced velocities: w' H^-1 w.
@@ -80,7 +97,26 @@ def _on_lattice(
 @lru_cache(maxsize=32)
 def _at_middles(side: Line, n: int, margin: float) -> Any:
     """Values of a line's functions at the middles of n panels that end so many panels short of both ends."""
-    return side.shapes(np.asarray((np.arange(n) + 0.5 + margin) / (n + 2.0 * margin), dtype=np.float64))
+    return side.shapes(_middles(n, margin))
+
+
+def _middles(n: int, margin: float) -> Floats:
+    return np.asarray((np.arange(n) + 0.5 + margin) / (n + 2.0 * margin), dtype=np.float64)
+
+
+def _following(
+    x: Line, y: Line, deflections: Floats, shape: tuple[int, int], margin: float, outline: Outline
+) -> Floats:
+    """Deflections at the middles of panels that follow an outline, for the rectangle of its mean width."""
+    at_x, share = (_middles(n, margin) for n in shape)
+    low, high = outline(at_x)
+    width = high - low
+    mean = float(width.mean())
+    across = y.shapes((low[:, None] + width[:, None] * share).ravel()).toarray().reshape(*shape, -1)
+    along_x = x.shapes(at_x)
+    moved = np.stack([np.einsum("xyj,xj->xy", across, along_x @ w) * (width / mean)[:, None] for w in deflections])
+    # Of the unit area of the whole rectangle the mean width leaves its share, and air goes with the area to 3/2.
+    return np.asarray(mean**0.75 * moved.reshape(len(deflections), -1).T)
 
 
 def _lattice(aspect_ratio: float, refinement: float) -> tuple[int, int]:

@@ -91,6 +91,10 @@ class Fabric:
         made = {each: self._measure(*each, x, y) for each in {each for pairs in taken.values() for each in pairs}}
         return {group: [made[each] for each in pairs] for group, pairs in taken.items()}
 
+    def inside(self, x: Line, y: Line) -> Measure:
+        """The uniform measure of the plate itself, with nothing outside its outline."""
+        return self._measure(None, 0.0, x, y)
+
     def _measure(self, factor: Field | EdgeStrip | None, ghost: float, x: Line, y: Line) -> Measure:
         nodes = tuple(x.nodes), tuple(y.nodes)
         if isinstance(factor, EdgeStrip):

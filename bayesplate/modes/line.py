@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.element import function_values
+from bayesplate.modes.element import Products, function_values
 from bayesplate.modes.hermite import (
     Holds,
     end_products,
@@ -118,9 +118,13 @@ class Line:
     @cached_property
     def integrals(self) -> NDArray[np.float64]:
         """Integral of each function over [0, 1], the load vector of a uniform load: (n_dof,) array."""
+        return self.load(products(tuple(self.nodes)))
+
+    def load(self, weighted: Products) -> NDArray[np.float64]:
+        """Integral of each function with the weight that the integrals of their products have: (n_dof,) array."""
         # The constant 1 is itself a function of the free line: unit values, no slopes.
         one = np.tile([1.0, 0.0], self.nodes.size)
-        return np.asarray(products(tuple(self.nodes))[0, 0][self.kept] @ one)
+        return np.asarray(weighted[0, 0][self.kept] @ one)
 
     def at_ends(self, at: tuple[bool, bool], order: int) -> NDArray[np.float64]:
         """Products of values (order 0) or slopes (1), summed over the ends asked for: (n_dof, n_dof) array."""

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
+from bayesplate.modes.fields import UNIFORM, Fabric, Floats, Group, Measure, Outline, layout
 from bayesplate.modes.line import Line, line
 from bayesplate.modes.plate import (
     Beams,
@@ -109,6 +109,17 @@ def _integral(measure: Measure, x: Line, y: Line, a: Beams, b: Beams, factor: fl
     """Integral of one derivative of the deflection (orders along x and y; rows) times another (columns)."""
     kept_x, kept_y = (np.ix_(side.kept, side.kept) for side in (x, y))
     return tuple((factor * along_x[a[0], b[0]][kept_x], along_y[a[1], b[1]][kept_y]) for along_x, along_y in measure)
+
+
+def within_outline(x: Line, y: Line, a: Beams, b: Beams, outline: Outline | None) -> KronSum:
+    """Integral of two derivatives of the deflection, orders along x and y, within an outline; None: everywhere."""
+    return _integral(Fabric(outline=outline).inside(x, y), x, y, a, b)
+
+
+def mean_deflections(x: Line, y: Line, deflections: Floats, outline: Outline | None) -> Floats:
+    """Integrals over the unit square, or what an outline leaves of it, of (n, n_dof_x, n_dof_y) deflections: (n,)."""
+    measure = Fabric(outline=outline).inside(x, y)
+    return np.asarray(sum(np.einsum("i,kij,j->k", x.load(a), deflections, y.load(b)) for a, b in measure))
 
 
 def assemble(x: Line, y: Line, stiffness: Sequence[Term], masses: Sequence[KronSum]) -> PlateMatrices:

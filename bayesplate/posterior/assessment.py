@@ -82,8 +82,12 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     found = spectra(models, values)
     errors = linearisation(inference, draws) if linear_errors is None else linear_errors
     scales = reading_sd(problem.board.setups, median_noise(draws))
-    signed = (model.setup for model in models if model.setup.hammer is not None)
-    conflicts = (sentence for setup in signed for sentence in sign_conflicts(setup, *found[setup.name], values))
+    conflicts = (
+        sentence
+        for model in models
+        if model.setup.hammer is not None
+        for sentence in sign_conflicts(model.setup, *found[model.setup.name], values, model.system.shaped)
+    )
     return Assessment(
         left_out=mode_errors(inference, draws).left_out,
         leverages=identifiability(problem.estimate.sensitivities, scales).leverages,

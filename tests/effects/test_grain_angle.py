@@ -7,14 +7,19 @@ from dataclasses import replace
 import generator.effects
 import numpy as np
 import pytest
-from effect_plates import SHEAR, hertz_apart, modes_of, posed, setup_of, shifts, values_of
+from effect_plates import MADE, SHEAR, hertz, hertz_apart, modes_of, posed, setup_of, shifts, values_of
 from generator.known_boards import BEAMS, FINNISH, FREE
+from made_boards import board_of
 
+from bayesplate.effects.attached_items import Item
+from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import worst_cents
+from bayesplate.quantities import Quantity
 
 ANGLE = "grain_angle.angle"
 EXACT = [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]
@@ -84,3 +89,34 @@ def test_a_material_alike_both_ways_has_no_grain():
 )
 def test_reduced_order_model_is_exact(card, effects):
     assert worst_cents(posed(card, effects).posterior.models) < 0.5
+
+
+CORNER, MIRRORED, MIDDLE = (0.97, 0.91), (0.97, 0.09), (0.97, 0.5)
+
+
+def test_a_thing_at_a_corner_tells_the_sign():
+    """The other sign is the same board with the thing at the mirrored corner."""
+    at = {place: AttachedMass(MADE, (Item(Quantity.exact(3e-3), "", (place,)),)) for place in (CORNER, MIRRORED)}
+    turned, other, mirrored = (
+        hertz(FREE, [GrainAngle(), at[place]], {ANGLE: np.radians(degrees), "attached_mass.mass": 3e-3}, 8)
+        for place, degrees in ((CORNER, 3.0), (CORNER, -3.0), (MIRRORED, 3.0))
+    )
+    assert np.abs(1200 * np.log2(turned / other)).max() > 30.0
+    assert other == pytest.approx(mirrored, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("place", "effects", "edges", "is_told"),
+    [
+        (CORNER, ("grain_angle", "attached_mass"), {}, True),
+        (MIDDLE, ("grain_angle", "attached_mass"), {}, False),
+        (CORNER, ("grain_angle",), {}, False),
+        (CORNER, ("attached_mass",), {}, False),
+        (MIDDLE, ("grain_angle", "attached_mass"), {"x0": "clamped", "y0": "clamped"}, True),
+    ],
+)
+def test_it_is_said_where_the_sign_counts(place, effects, edges, is_told):
+    item = AttachedItem("weight", ((place[0] * FREE.L_x, place[1] * FREE.L_y),), Quantity.exact(3e-3))
+    setup = replace(setup_of(replace(FREE, edges=FREE.edges | edges)), attached=(item,))
+    board = replace(board_of(FREE, [setup]), effects=effects)
+    assert any("sign of the grain angle" in one for one in GrainAngle.notes(board)) is is_told

@@ -5,21 +5,30 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import generator.effects
+import made_boards
 import numpy as np
 import pytest
 import ritz
-from effect_plates import hertz, hertz_apart, posed, setup_of, values_of
+from effect_plates import MADE, hertz, hertz_apart, modes_of, posed, setup_of, values_of
 from generator.known_boards import FIEMME, FINNISH, FREE
 from generator.plate import FINE_SHEAR
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
+from bayesplate.effects.air_loading import AirLoading
+from bayesplate.effects.attached_items import Item
+from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.field_components import FieldProfile
+from bayesplate.effects.membrane_tension import MembraneTension
 from bayesplate.effects.outline_profile import OutlineProfile
+from bayesplate.effects.support_mass import SupportMass
+from bayesplate.effects.support_stiffness import SupportStiffness
 from bayesplate.effects.thickness_profile import ThicknessProfile
-from bayesplate.plate.board import density
+from bayesplate.frequencies.residues import residues_of
+from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.random_field import Surface
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -103,6 +112,39 @@ def test_a_narrower_board_is_the_smaller_rectangle(plate, factor):
     """No rest of the ghost outside, and no mode of it."""
     cents = 1200 * np.log2(hertz(plate, [InAWiderRectangle(factor=factor)], {}, 8) / hertz(plate, [], {}, 8))
     assert cents == pytest.approx(0.0, abs=0.1)
+
+
+BRIDGE = replace(FREE, edges=FREE.edges | {"x0": "clamped", "x1": "clamped"})
+TERMS = {
+    "foundation": (FREE, SupportStiffness(MADE), {"support_stiffness.stiffness": 2e4}),
+    "tension": (BRIDGE, MembraneTension(MADE, "x"), {"membrane_tension.N": 500.0}),
+    "frame": (BRIDGE, SupportMass(MADE), {"support_mass.mass": 1.0}),
+    "open air": (FREE, AirLoading(MADE, FREE.L_x / FREE.L_y), {"air_loading.density": 1.2, "air_loading.baffle": 0.0}),
+    "wall": (FREE, AirLoading(MADE, FREE.L_x / FREE.L_y), {"air_loading.density": 1.2, "air_loading.baffle": 1.0}),
+}
+
+
+@pytest.mark.parametrize(("plate", "effect", "values"), TERMS.values(), ids=TERMS)
+def test_what_other_effects_add_ends_with_the_board(plate, effect, values):
+    """A rectangle cut out of a wider one has the foundation, the tension, the frame and the air of its own width."""
+    cut = hertz(plate, [InAWiderRectangle(factor=1.3), effect], values, 8)
+    cents = 1200 * np.log2(cut / hertz(plate, [effect], values, 8))
+    assert cents == pytest.approx(0.0, abs=0.1)
+
+
+AIR = {0.0: (-27.0, -40.8, -24.4, -26.3, -22.7, -38.6, -24.3, -20.9), 1.0: (-40.0, -56.3, -34.3, -30.0, -29.2, -44.1)}
+"""Cents by the baffle's share, once computed: polynomials on panels whose middles lie within the outline, 30 across,
+extrapolated from those and 18 to panels without end, which leaves half a cent."""
+
+
+def test_air_of_a_board_that_narrows():
+    """By a quarter of its width."""
+    narrow = outline(FREE, (0.0, 0.2 / 0.58, 0.75, 1.0), (1.0, 0.99, 0.9, 0.74))
+    air = AirLoading(MADE, FREE.L_x / FREE.L_y)
+    for baffle, expected in AIR.items():
+        values = {"air_loading.density": 1.2, "air_loading.baffle": baffle}
+        wet, dry = (hertz(FREE, effects, values, len(expected)) for effects in ([narrow, air], [narrow]))
+        assert 1200 * np.log2(wet / dry) == pytest.approx(np.array(expected), abs=1.0)
 
 
 def test_the_free_edge_recedes_where_the_other_is_held():
@@ -222,3 +264,64 @@ def test_components_of_the_thickness_leave_nothing_negative_outside_the_outline(
     assert len(components) == 3
     away, there = (hertz(FREE, effects, values, 6) for values in (components, dict.fromkeys(components, 0.0)))
     assert 1200 * np.log2(away / there) == pytest.approx(0.0, abs=200.0)
+
+
+def test_a_clamp_along_the_straight_edge_covers_as_much_everywhere():
+    """What is left beside it narrows by as many millimetres as the board."""
+    setup = made_boards.setup_of(ritz.ALL_FREE | {"y0": "clamped"}, {(2, 2): 1.0}, clamped={"y0": Quantity.exact(0.06)})
+    readings = Quantity.from_readings([0.217, 0.211, 0.195], 0.001, [0.0, 0.3, 0.58])
+    board = board_of(ritz.FREE_SPRUCE, [setup], length_y=readings)
+    effect, at = OutlineProfile.of(board, setup), np.linspace(0.0, 1.0, 41)
+    values = effect.adjusted(board.nominal())
+    low, high = effect.limits(at)
+
+    width = board.inputs["length_y"].mean * (1.0 + effect.profile.expected(at, np.full_like(at, 0.5)))
+    assert high * vibrating_lengths(values, setup)[1] == pytest.approx(width - 0.06, rel=1e-3)
+    assert low == pytest.approx(0.0)
+
+
+LEVEL = ((0.0, 0.5, 1.0), (1.02, 1.0, 0.84))
+PLACES = [(0.97, 0.93), (0.97, 0.02), (0.5, 0.6)]
+"""As fractions of the nominal sides; the second is off the board, where it narrows."""
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_thing_stands_where_it_was_measured_from_the_corner(place):
+    """And never beside the board, on what is left of the rectangle: there it would have a mode of its own."""
+    mass, item = 3e-3, Item(Quantity.exact(3e-3), "", (place,))
+    effect, planted = outline(FREE, *LEVEL), independent(FREE, *LEVEL)
+    widths = np.array(planted.widths)
+    widest, at = widths.max(), np.interp(place[0] * FREE.L_x, planted.stations, widths)
+    y = np.clip(0.5 * (widest - widths[0]) + place[1] * FREE.L_y, 0.5 * (widest - at), 0.5 * (widest + at))
+    heavy = generator.effects.AttachedMass(mass, ((place[0] * FREE.L_x, y),))
+    few, many = (solve_generator(FREE, (planted, heavy), 9, (n, n)).frequencies[3:] for n in (16, 22))
+
+    found = hertz(FREE, [effect, AttachedMass(MADE, (item,))], {"attached_mass.mass": mass}, 6)
+    assert 1200 * np.log2(found / (many + (many - few) / ((22 / 16) ** 2 - 1))) == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_thing_beside_the_board_tilts_with_its_rim():
+    """With a base as wide as what is missing there."""
+    narrow, mass = outline(FREE, *LEVEL), {"attached_mass.mass": 3e-3}
+    wide = [AttachedMass(MADE, (Item(Quantity.exact(3e-3), "", ((0.97, 0.02),), radius),)) for radius in
+            ((0.0, 0.0), (0.01, 0.08))]  # fmt: skip
+    point, tilting = (hertz(FREE, [narrow, one], mass, 6) for one in wide)
+    assert np.all(np.abs(1200 * np.log2(tilting / point)) < 10.0)
+
+
+def test_residues_are_those_of_the_places_on_the_outline():
+    """Over the largest deflection on the board, not on what is left of the rectangle around it."""
+    sensor = AttachedItem("accelerometer", ((0.97 * FREE.L_x, 0.9 * FREE.L_y),))
+    setup = replace(setup_of(FREE), hammer=(0.03 * FREE.L_x, 0.1 * FREE.L_y), attached=(sensor,))
+    effect, planted = outline(FREE, *LEVEL), independent(FREE, *LEVEL)
+    found = residues_of(setup, modes_of(FREE, [effect], {}, 6), values_of(FREE, {}), effect)
+
+    modes = solve_generator(FREE, (planted,), 9)
+    widest = max(planted.widths)
+    x, share = (one.ravel() for one in np.meshgrid(np.linspace(0.0, FREE.L_x, 41), np.linspace(-0.5, 0.5, 41)))
+    everywhere = modes.basis.deflection(x, 0.5 * widest + share * np.interp(x, planted.stations, planted.widths))
+    corner = 0.5 * (widest - planted.widths[0])
+    y = corner + np.array([0.1, 0.9]) * FREE.L_y
+    both = modes.basis.deflection(np.array([0.03, 0.97]) * FREE.L_x, y) @ modes.vectors
+    expected = both[0] * both[1] / np.abs(everywhere @ modes.vectors).max(axis=0) ** 2
+    assert found == pytest.approx(expected[3:], abs=0.01)
