@@ -15,7 +15,7 @@ from bayesplate.planning.looks import members_of
 from bayesplate.planning.shifts import EffectShift, Nodes, form_shift
 from bayesplate.planning.stations import BareLaw, Station
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import shared_share
+from bayesplate.plate.sessions import shared_share, unknown_discrepancies
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
@@ -92,7 +92,7 @@ def station_readings(
     shift = tuple(one[0] for one in parts)
     slopes = tuple(one[1] for one in parts)
     is_followed = np.all([np.isfinite(one).all(axis=0) for one in shift], axis=0)
-    own = ReadingErrors.of(station.setup).own_variance
+    own = ReadingErrors.of(station.setup).own_variance + unknown_discrepancies(beliefs.board, station.setup)
     kept = [] if station.is_new else [_kept(beliefs, one, station) ** 2 for one in beliefs.explanations]
     new = [levels(station.setup.noise, one.n_terms, rng) ** 2 for one in beliefs.explanations]
 

@@ -11,10 +11,13 @@ from generator.naming import frequencies
 from generator.plate import Plate
 from made_boards import setup_of
 
+from bayesplate.cards import load_prior
+from bayesplate.planning.before import prior_beliefs
+from bayesplate.planning.modes_read import station_readings
 from bayesplate.planning.stations import bare_law, known_mass, stations
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
-from bayesplate.plate.sessions import with_discrepancies
+from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies
 from bayesplate.quantities import Quantity
 
 FREE, CLAMPED = (dict.fromkeys(("x0", "x1", "y0", "y1"), word) for word in ("free", "clamped"))
@@ -56,6 +59,38 @@ def test_of_several_sessions_only_the_last_goes_on():
 
     assert [one.setup.name for one in stations(held, values()) if one.goes_on(held)] == ["sunday", "clamped"]
     assert all(one.goes_on(made) for one in stations(made, values()))
+
+
+def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read_does():
+    """Its discrepancy is no parameter yet, and its variance is what it will be as one."""
+    made = board(FREE)
+    days = tuple(replace(made.setups[0], name=name) for name in ("monday", "friday"))
+    held = with_discrepancies(replace(made, setups=days))
+    station = stations(held, values())[0]
+    new = station.setup.readings[station.n_old]
+    read = with_discrepancies(replace(held, setups=tuple(replace(d, readings=(*d.readings, new)) for d in days)))
+    at = read.nominal() | values()
+    slopes = bare_law(read, next(one for one in stations(read, at) if one.goes_on(read)), at).slopes
+    column = 3 + [one.key for one in read.uncertain].index(f"discrepancy {new.label}")
+
+    unknown = unknown_discrepancies(held, station.setup)
+    assert unknown[: station.n_old + 1] == pytest.approx([0.0] * station.n_old + [slopes[station.n_old, column] ** 2])
+    assert unknown[-1] > 0.003**2
+    assert not unknown_discrepancies(made, made.setups[0]).any()
+
+
+def test_planned_readings_carry_it():
+    made = board(FREE)
+    days = tuple(replace(made.setups[0], name=name) for name in ("monday", "friday"))
+    held = with_discrepancies(replace(made, setups=days))
+    believed, at = prior_beliefs(held, load_prior("spruce"), np.random.default_rng(1))
+    last = next(one for one in stations(held, at) if one.goes_on(held))
+    further = station_readings(believed, bare_law(held, last, at), np.random.default_rng(1)).further
+    noise = believed.explanations[0].noise[:, 1] ** 2
+
+    assert further.variance[0] - noise[:, None] == pytest.approx(
+        np.tile(unknown_discrepancies(held, last.setup)[last.n_old :], (noise.size, 1))
+    )
 
 
 def test_modes_that_were_read_come_first_and_none_twice(free):
