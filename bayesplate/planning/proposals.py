@@ -198,7 +198,7 @@ def _of_station(
     beliefs: Beliefs, law: BareLaw, every: StationReadings, costs: Costs, goal: str | None, rng: np.random.Generator
 ) -> list[Proposal]:
     """What could be measured with the board held in one way."""
-    station, old = law.station, tuple(range(law.station.n_old))
+    station, old = law.station, every.old
     told = _Sentences(beliefs.board, station)
     made: list[tuple[str, str, float, Readings, tuple[int, ...]]] = []
     if station.is_new and every.rows:
