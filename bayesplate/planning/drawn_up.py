@@ -42,6 +42,8 @@ class DrawnUp:
     first : str
         The first line; empty where nothing would help.
     notes : tuple of str
+    is_from_prior : bool
+        Whether the readings, if there are any, were left aside.
     """
 
     beliefs: Beliefs
@@ -50,6 +52,7 @@ class DrawnUp:
     together: tuple[tuple[tuple[Proposal, ...], Gain], ...]
     first: str
     notes: tuple[str, ...] = ()
+    is_from_prior: bool = False
 
 
 def drawn_up(
@@ -123,4 +126,4 @@ def begun(board: Board, prior: PriorCard, seed: int, *, goal: str | None = None,
     beliefs, values = prior_beliefs(board, prior, rng)
     listed = prior_proposals(beliefs, prior, values, costs or Costs(), goal, rng)
     joined = sequences(beliefs, listed, goal, rng)
-    return DrawnUp(beliefs, values, listed, joined, first_of(listed, beliefs, goal))
+    return DrawnUp(beliefs, values, listed, joined, first_of(listed, beliefs, goal), is_from_prior=True)
