@@ -40,12 +40,16 @@ def residues_of(setup: Setup, modes: Modes, values: Values) -> NDArray[np.float6
     array or None
         None where the card does not state the hammer's place and that of one accelerometer.
     """
-    sensors = [item for item in setup.attached if item.kind == "accelerometer" and len(item.places) == 1]
-    if setup.hammer is None or len(sensors) != 1:
+    if setup.hammer is None or setup.sensor is None:
         return None
-    hammer, sensor = (_fraction(setup, place, values) for place in (setup.hammer, sensors[0].places[0]))
-    at = [modes.displacement(np.array([x]), np.array([y]))[:, 0, 0] for x, y in (hammer, sensor)]
-    return np.asarray(at[0] * at[1] / np.max(np.abs(modes.displacement(_GRID, _GRID)), axis=(1, 2)) ** 2)
+    return deflections(setup, modes, values, setup.hammer) * deflections(setup, modes, values, setup.sensor)
+
+
+def deflections(setup: Setup, modes: Modes, values: Values, place: tuple[float, float]) -> NDArray[np.float64]:
+    """Deflection of each mode at a place (m from the board's corner) over its largest: (n_modes,) array, -1 to 1."""
+    x, y = _fraction(setup, place, values)
+    at = modes.displacement(np.array([x]), np.array([y]))[:, 0, 0]
+    return np.asarray(at / np.max(np.abs(modes.displacement(_GRID, _GRID)), axis=(1, 2)))
 
 
 def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ from bayesplate.effects.base import Effect
 from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.residues import NODAL_LINE, deflections
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
@@ -32,7 +33,8 @@ FURTHER = 8
 """Modes beyond those that were read from which the best are chosen."""
 ELSEWHERE = 6
 """Lowest modes that are read where the board is held another way."""
-_SEARCHED = 24
+SEARCHED = 24
+"""Lowest modes of a way to hold the board among which those that are read are looked for."""
 _SHARE = 0.02
 """Of the board's mass that a known mass has, about: it shifts a mode by up to some per cent."""
 _HANDY = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3)
@@ -189,10 +191,17 @@ def known_mass(board: Board) -> float:
 def _next_modes(
     board: Board, station: Station, values: Values, n: int, taken: Collection[Label]
 ) -> tuple[Reading, ...]:
-    """The lowest modes with a clear name that were not read, each where the model expects it."""
+    """The lowest modes with a clear name that were not read, each where the model expects it.
+
+    None on whose nodal line the sensor stands, which stays where it is in a session that goes on.
+    """
     system, first = station.system(board), station.setup.first_label
-    _, named = spectrum(system, station.values(system, values), _SEARCHED)
-    new = [one for one in named if one.label is not None and one.label not in taken]
+    there = station.values(system, values)
+    modes, named = spectrum(system, there, SEARCHED)
+    sensor = None if station.is_new else station.base.sensor
+    at = np.ones(len(named)) if sensor is None else np.abs(deflections(station.base, modes, there, sensor))
+    seen = [one for one, share in zip(named, at, strict=True) if share >= NODAL_LINE]
+    new = [one for one in seen if one.label is not None and one.label not in taken]
     return tuple(
         Reading(one.label, (one.label.m - first.m, one.label.n - first.n), Quantity.exact(one.frequency))
         for one in new[:n]
@@ -218,7 +227,7 @@ def solved(station: Station, board: Board, values: Values) -> Floats:
     """
     system = station.system(board)
     there = station.values(system, values)
-    modes, named = spectrum(system, there, _SEARCHED)
+    modes, named = spectrum(system, there, SEARCHED)
     at = {one.label: i for i, one in enumerate(named)}
     rows = [at.get(label, -1) for label in station.setup.labels]
     log_frequency = np.array([np.log(named[i].frequency) if i >= 0 else np.nan for i in rows])

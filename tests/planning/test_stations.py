@@ -12,12 +12,14 @@ from generator.plate import Plate
 from made_boards import setup_of
 
 from bayesplate.cards import load_prior
+from bayesplate.planning.assembled import bench_of
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.modes_read import station_readings
 from bayesplate.planning.stations import bare_law, known_mass, stations
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.quantities import Quantity
 
 FREE, CLAMPED = (dict.fromkeys(("x0", "x1", "y0", "y1"), word) for word in ("free", "clamped"))
@@ -116,3 +118,35 @@ def test_a_known_mass_shifts_modes_as_the_generator_has_it(free):
     assert np.abs(wanted).max() > 0.02
     assert np.all(np.abs(added - wanted) < 0.01 * np.abs(wanted) + 2.0 * np.log(2.0) / 1200.0)
     assert law.middle[: len(READ)] == pytest.approx([np.log(bare[b]) for b in READ], abs=1e-3)
+
+
+def test_a_mode_on_whose_nodal_line_the_sensor_stands_is_not_looked_for():
+    """In the middle of the width it sees none with an odd number of lines across; a weight there sees nothing."""
+    made = board(FREE)
+
+    def labels(kind, elsewhere=False):
+        item = AttachedItem(kind, ((0.1, 0.5 * SIZES["length_y"]),), Quantity.exact(1e-6))
+        found = stations(replace(made, setups=(replace(made.setups[0], attached=(item,)),)), values())
+        return [one.label for one in found[elsewhere].setup.readings[0 if elsewhere else len(READ) :]]
+
+    assert all(one.n % 2 == 0 for one in labels("accelerometer"))
+    assert any(one.n % 2 for one in labels("weight"))
+    assert any(one.n % 2 for one in labels("accelerometer", elsewhere=True))  # it is put where it sees them
+
+
+def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_one(free):
+    """Also the highest that are looked at, where a board was read up to the twentieth."""
+    beams = [(one.label.m, one.label.n) for one in free[0].setup.readings]
+    beams = [(one.label.m, one.label.n) for one in stations(board(FREE, beams), values())[0].setup.readings]
+    weight = AttachedItem("weight", ((0.29, 0.1),), Quantity.exact(1e-6))
+    read = board(FREE, beams)
+    read = replace(read, setups=(replace(read.setups[0], attached=(weight,)),))
+    station = stations(read, values())[0]
+    rows = range(station.n_old, len(station.setup.readings))
+    law = bare_law(read, station, values())
+    ends = law.solved[0, list(rows), None] + np.array([-0.01, 0.0, 0.01])
+    bench = bench_of(read, law, rows, ends, values(), "", goes_on=True).entry
+
+    assert len(beams) == 20
+    assert {one.label for one in bench.modes} == {str(station.setup.labels[i]) for i in rows}
+    assert bench.sensor_mm != (290, 100)
