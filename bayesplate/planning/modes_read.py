@@ -24,8 +24,6 @@ Effects = Mapping[str, EffectShift]
 
 REPEATED = 2e-4
 """Relative scatter of a frequency that is read once more in one session: what five hits on a free board leave open."""
-_PLACED = 0.03
-"""Of what a known mass adds, the part that a few millimetres off its place change."""
 
 
 def effect_shifts(found: Found, nodes: Mapping[str, tuple[Nodes, ...]], law: BareLaw) -> dict[str, EffectShift]:
@@ -125,7 +123,10 @@ def station_readings(
         tuple(rows),
         tuple(old),
         once_more(new, other_day) if old else None,
-        tuple(_with_mass(once_more(kept, same_day), readings(old, kept, spot)) for spot in whole),
+        tuple(
+            _with_mass(once_more(kept, same_day), readings(old, kept, spot), law.off_place[spot - 1, old])
+            for spot in whole
+        ),
         tuple(spot - 1 for spot in whole),
     )
 
@@ -164,13 +165,12 @@ def _given_first(
     return Readings(tuple(shift), tuple(slopes), tuple(variance))
 
 
-def _with_mass(readings: Readings, added: Readings) -> Readings:
+def _with_mass(readings: Readings, added: Readings, off_place: Floats) -> Readings:
     """Readings with what a known mass adds to them, somewhat uncertain for it may stand a little off its place."""
-    both = zip(readings.variance, added.shift, strict=True)
     return replace(
         readings,
         shift=tuple(a + b for a, b in zip(readings.shift, added.shift, strict=True)),
-        variance=tuple(variance + (_PLACED * shift) ** 2 for variance, shift in both),
+        variance=tuple(variance + off_place**2 for variance in readings.variance),
     )
 
 

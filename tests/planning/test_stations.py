@@ -15,7 +15,7 @@ from bayesplate.cards import load_prior
 from bayesplate.planning.assembled import bench_of
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.modes_read import station_readings
-from bayesplate.planning.stations import bare_law, known_mass, stations
+from bayesplate.planning.stations import PLACED, bare_law, known_mass, stations
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies
@@ -118,6 +118,24 @@ def test_a_known_mass_shifts_modes_as_the_generator_has_it(free):
     assert np.abs(wanted).max() > 0.02
     assert np.all(np.abs(added - wanted) < 0.01 * np.abs(wanted) + 2.0 * np.log(2.0) / 1200.0)
     assert law.middle[: len(READ)] == pytest.approx([np.log(bare[b]) for b in READ], abs=1e-3)
+
+
+def test_a_known_mass_off_its_place_adds_as_much_more_or_less_as_the_independent_solver_says(free):
+    """Near a nodal line a millimetre changes much of a small shift, in a belly hardly any of a large one."""
+    law, station = bare_law(board(FREE), free[0], values()), free[0]
+    plate = Plate(**MODULI, nu_xy=0.4, rho=430.0, h=4.7e-3, L_x=0.58, L_y=0.217, edges=FREE)
+    x, y = station.places(board(FREE))[-1]
+
+    def loaded(x, y):
+        found, _ = frequencies(plate, [AttachedMass(known_mass(board(FREE)), ((x, y),))], READ)
+        return np.log([found[b] for b in READ])
+
+    wide = 3.0 * PLACED
+    along, across = (loaded(x + dx, y + dy) - loaded(x - dx, y - dy) for dx, dy in ((wide, 0.0), (0.0, wide)))
+    wanted = np.hypot(along, across) / 6.0
+    assert law.off_place[-1, : len(READ)] == pytest.approx(wanted, rel=0.1)
+    relative = law.off_place[-1, : len(READ)] / np.abs(law.solved[len(station.spots), : len(READ)])
+    assert relative.max() > 2.0 * relative.min()
 
 
 def test_a_mode_on_whose_nodal_line_the_sensor_stands_is_not_looked_for():
