@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,6 +151,7 @@ def sheet(
     basis: str,
     bands: Mapping[str, tuple[float, float]] | None = None,
     precision: Precision | None = None,
+    numbers: Sequence[int] = NUMBERS_OF_MODES,
 ) -> Sheet:
     """Solve a setup and gather what its sheet shows.
 
@@ -166,6 +167,8 @@ def sheet(
         Factors on a frequency between which the prior expects it, by label.
     precision : Precision, optional
         Of the estimate at which the modes are computed; it gives the bands of the modes that were not measured.
+    numbers : sequence of int
+        Of modes, rising: the first that holds every measured label is solved, or the last.
 
     Returns
     -------
@@ -173,7 +176,7 @@ def sheet(
     """
     setup = system.setup
     measured = {str(reading.label): reading.frequency.mean for reading in setup.readings}
-    for n_modes in NUMBERS_OF_MODES:
+    for n_modes in numbers:
         modes, named = spectrum(system, values, n_modes)
         if set(measured) <= {mode.name for mode in named}:
             break

@@ -43,14 +43,21 @@ def residues_of(setup: Setup, modes: Modes, values: Values, shaped: Effect | Non
     array or None
         None where the card does not state the hammer's place and that of one accelerometer.
     """
-    sensors = [item for item in setup.attached if item.kind == "accelerometer" and len(item.places) == 1]
-    if setup.hammer is None or len(sensors) != 1:
+    if setup.hammer is None or setup.sensor is None:
         return None
-    hammer, sensor = (_fraction(setup, place, values) for place in (setup.hammer, sensors[0].places[0]))
+    hammer, sensor = (deflections(setup, modes, values, place, shaped) for place in (setup.hammer, setup.sensor))
+    return hammer * sensor
+
+
+def deflections(
+    setup: Setup, modes: Modes, values: Values, place: tuple[float, float], shaped: Effect | None = None
+) -> NDArray[np.float64]:
+    """Deflection of each mode at a place (m from the board's corner) over its largest: (n_modes,) array, -1 to 1."""
+    x, y = _fraction(setup, place, values)
     if shaped is not None:
-        hammer, sensor = shaped.placed(*hammer), shaped.placed(*sensor)
-    at = [modes.displacement(np.array([x]), np.array([y]))[:, 0, 0] for x, y in (hammer, sensor)]
-    return np.asarray(at[0] * at[1] / _largest(modes, shaped) ** 2)
+        x, y = shaped.placed(x, y)
+    at = modes.displacement(np.array([x]), np.array([y]))[:, 0, 0]
+    return np.asarray(at / _largest(modes, shaped))
 
 
 def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:

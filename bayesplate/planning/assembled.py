@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.effects.attached_items import places_on
-from bayesplate.estimates.sheet import Sheet, points, sheet
+from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, points, sheet
 from bayesplate.frequencies.prior_bands import WITHIN
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Gain
@@ -24,7 +24,7 @@ from bayesplate.planning.plan import (
     SequenceEntry,
 )
 from bayesplate.planning.proposals import Proposal, score
-from bayesplate.planning.stations import BareLaw, Station
+from bayesplate.planning.stations import SEARCHED, BareLaw, Station
 from bayesplate.plate.board import Board, Values
 
 Floats = NDArray[np.float64]
@@ -129,7 +129,8 @@ def bench_of(
     """
     station = law.station
     system = station.system(board)
-    drawn = sheet(board, system, station.values(system, values), "where they are expected")
+    numbers = (*NUMBERS_OF_MODES, SEARCHED)
+    drawn = sheet(board, system, station.values(system, values), "where they are expected", numbers=numbers)
     by_name = {mode.name: mode for mode in drawn.modes}
     wanted = [str(station.setup.labels[i]) for i in rows]
     there = [(by_name[name], end) for name, end in zip(wanted, np.exp(ends), strict=True) if name in by_name]
@@ -153,10 +154,9 @@ def bench_of(
 
 def _sensor(board: Board, station: Station) -> tuple[float, float] | None:
     """Where the one sensor stands, as fractions of what vibrates; None where there is none, or there are several."""
-    fixed = [item for item in station.base.attached if len(item.places) == 1]
-    if len(fixed) != 1:
+    if station.base.sensor is None:
         return None
-    ((x, y),) = fixed[0].places
+    x, y = station.base.sensor
     start = places_on(board, station.setup, ((0.0, 0.0),))[0]
     end = places_on(board, station.setup, ((1.0, 1.0),))[0]
     return (x - start[0]) / (end[0] - start[0]), (y - start[1]) / (end[1] - start[1])

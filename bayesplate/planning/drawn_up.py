@@ -15,7 +15,7 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.beliefs import Beliefs, believed
 from bayesplate.planning.gains import Gain
-from bayesplate.planning.proposals import Costs, Proposal, prior_proposals, proposals, score, sequences
+from bayesplate.planning.proposals import Costs, Proposal, prior_proposals, proposals, sequences
 from bayesplate.planning.survivors import survivors
 from bayesplate.planning.words import first_line
 from bayesplate.plate.board import Board, Values
@@ -42,6 +42,8 @@ class DrawnUp:
     first : str
         The first line; empty where nothing would help.
     notes : tuple of str
+    is_from_prior : bool
+        Whether the readings, if there are any, were left aside.
     """
 
     beliefs: Beliefs
@@ -50,6 +52,7 @@ class DrawnUp:
     together: tuple[tuple[tuple[Proposal, ...], Gain], ...]
     first: str
     notes: tuple[str, ...] = ()
+    is_from_prior: bool = False
 
 
 def drawn_up(
@@ -94,11 +97,9 @@ def drawn_up(
 
 
 def first_of(listed: Sequence[Proposal], beliefs: Beliefs, goal: str | None) -> str:
-    """The first line of a plan: its best proposal in words; empty where it would not help."""
-    if not listed:
-        return ""
-    best = listed[0]
-    return first_line(best.sentence, best.gain, beliefs, score(best.gain, goal))
+    """The first line of a plan: the best proposal that would help, in words; empty where none would."""
+    lines = (first_line(one.sentence, one.gain, beliefs, goal) for one in listed)
+    return next((line for line in lines if line), "")
 
 
 def is_unexplained(found: Found) -> bool:
@@ -123,4 +124,4 @@ def begun(board: Board, prior: PriorCard, seed: int, *, goal: str | None = None,
     beliefs, values = prior_beliefs(board, prior, rng)
     listed = prior_proposals(beliefs, prior, values, costs or Costs(), goal, rng)
     joined = sequences(beliefs, listed, goal, rng)
-    return DrawnUp(beliefs, values, listed, joined, first_of(listed, beliefs, goal))
+    return DrawnUp(beliefs, values, listed, joined, first_of(listed, beliefs, goal), is_from_prior=True)

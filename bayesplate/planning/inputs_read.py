@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Readings
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.random_field import conditioned, thickness_readings, width_readings
+from bayesplate.plate.random_field import conditioned, sd_after, thickness_readings, width_readings
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
@@ -105,33 +106,16 @@ def _fresh(prior: Quantity, resolution: float) -> float:
 def _placed(board: Board, parameter: Parameter) -> Iterator[tuple[float, int, str]]:
     """Standard deviation of the mean of a field after readings at a grid of places more, and how many they are."""
     prior, length_x, length_y = parameter.prior, board.inputs["length_x"], board.inputs["length_y"]
-    if parameter.name == "thickness" and thickness_readings(prior, length_x, length_y) is not None:
-        places = [(s * length_x.mean, t * length_y.mean) for s in GRID[0] for t in GRID[1]]
-        more = _with_places(prior, places)
-        read = thickness_readings(more, length_x, length_y)
-        where = f"({len(GRID[0])} along the board, {len(GRID[1])} across)"
-    elif parameter.name == "length_y" and width_readings(prior, length_x) is not None:
-        places = [(s * length_x.mean, 0.0) for s in GRID[0]]
-        more = _with_places(prior, places)
-        read, where = width_readings(more, length_x), "along the board"
+    if parameter.name == "thickness":
+        read = thickness_readings(prior, length_x, length_y)
+        places, where = list(product(*GRID)), f"({len(GRID[0])} along the board, {len(GRID[1])} across)"
+    elif parameter.name == "length_y":
+        read, places, where = width_readings(prior, length_x), [(s, 0.5) for s in GRID[0]], "along the board"
     else:
         return
     if read is not None:
-        yield conditioned(read).sd * prior.sd / max(_sd_now(prior, board, parameter.name), 1e-300), len(places), where
-
-
-def _with_places(prior: Quantity, places: Sequence[tuple[float, float]]) -> Quantity:
-    """A quantity with further readings, each what the mean of those at hand is."""
-    at_x = prior.at_x + tuple(x for x, _ in places)
-    at_y = prior.at_y + tuple(y for _, y in places) if prior.at_y else ()
-    return replace(prior, readings=prior.readings + (prior.mean,) * len(places), at_x=at_x, at_y=at_y)
-
-
-def _sd_now(prior: Quantity, board: Board, name: str) -> float:
-    """Standard deviation of the mean of the field as it was read."""
-    length_x, length_y = board.inputs["length_x"], board.inputs["length_y"]
-    read = thickness_readings(prior, length_x, length_y) if name == "thickness" else width_readings(prior, length_x)
-    return prior.sd if read is None else conditioned(read).sd
+        x, y = np.array(places).T
+        yield sd_after(read, x, y) * prior.sd / max(conditioned(read).sd, 1e-300), len(places), where
 
 
 def input_readings(beliefs: Beliefs, one: Measured) -> Readings:

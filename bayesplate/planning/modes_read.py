@@ -15,7 +15,7 @@ from bayesplate.planning.looks import members_of
 from bayesplate.planning.shifts import EffectShift, Nodes, form_shift
 from bayesplate.planning.stations import BareLaw, Station
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import shared_share
+from bayesplate.plate.sessions import shared_share, unknown_discrepancies
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
@@ -24,8 +24,6 @@ Effects = Mapping[str, EffectShift]
 
 REPEATED = 2e-4
 """Relative scatter of a frequency that is read once more in one session: what five hits on a free board leave open."""
-_PLACED = 0.03
-"""Of what a known mass adds, the part that a few millimetres off its place change."""
 
 
 def effect_shifts(found: Found, nodes: Mapping[str, tuple[Nodes, ...]], law: BareLaw) -> dict[str, EffectShift]:
@@ -55,8 +53,10 @@ class StationReadings:
         Modes that were not read yet, in the session that goes on, or in a new one where the board is held anew.
     rows : tuple of int
         Which of the station's modes they are.
+    old : tuple of int
+        Which of the readings at hand can be taken once more: every explanation knows what is read then.
     again : Readings or None
-        The modes that were read, in another session; None where there are none.
+        These in another session; None where there are none.
     with_mass : tuple of Readings
         The same with a known mass at each spot, in the session that goes on.
     spots : tuple of int
@@ -65,6 +65,7 @@ class StationReadings:
 
     further: Readings
     rows: tuple[int, ...]
+    old: tuple[int, ...]
     again: Readings | None
     with_mass: tuple[Readings, ...]
     spots: tuple[int, ...]
@@ -88,11 +89,13 @@ def station_readings(
     """
     station = law.station
     n, n_old = len(station.setup.readings), station.n_old
-    parts = [_of_explanation(one, law, found, effects or {}) for one in beliefs.explanations]
+    parts = [
+        _as_read(one, law, found, *_of_explanation(one, law, found, effects or {})) for one in beliefs.explanations
+    ]
     shift = tuple(one[0] for one in parts)
     slopes = tuple(one[1] for one in parts)
     is_followed = np.all([np.isfinite(one).all(axis=0) for one in shift], axis=0)
-    own = ReadingErrors.of(station.setup).own_variance
+    own = ReadingErrors.of(station.setup).own_variance + unknown_discrepancies(beliefs.board, station.setup)
     kept = [] if station.is_new else [_kept(beliefs, one, station) ** 2 for one in beliefs.explanations]
     new = [levels(station.setup.noise, one.n_terms, rng) ** 2 for one in beliefs.explanations]
 
@@ -105,34 +108,41 @@ def station_readings(
         )
 
     rows = [i for i in range(n_old, n) if is_followed[i]]
-    old = list(range(n_old))
+    old = [i for i in range(n_old) if is_followed[i]]
 
     def once_more(noise: Sequence[Floats], shares: Sequence[Floats]) -> Readings:
-        return _given_first(beliefs, station, readings(old, noise), kept, shares)
+        return _given_first(beliefs, station, old, readings(old, noise), kept, shares)
 
     of_board = shared_share(beliefs.board.setup(station.base.name))
     other_day = [np.full(len(one), of_board) for one in kept]
     same_day = [np.maximum(1.0 - REPEATED**2 / one, 0.0) for one in kept]
-    spots = range(1, 1 + len(station.spots)) if n_old else ()
-    whole = [spot for spot in spots if is_followed[[*old, *(spot * n + i for i in old)]].all()]
+    spots = range(1, 1 + len(station.spots)) if old else ()
+    whole = [spot for spot in spots if is_followed[[spot * n + i for i in old]].all()]
     return StationReadings(
         readings(rows, kept or new),
         tuple(rows),
-        once_more(new, other_day) if n_old and is_followed[old].all() else None,
-        tuple(_with_mass(once_more(kept, same_day), readings(old, kept, spot)) for spot in whole),
+        tuple(old),
+        once_more(new, other_day) if old else None,
+        tuple(
+            _with_mass(once_more(kept, same_day), readings(old, kept, spot), law.off_place[spot - 1, old])
+            for spot in whole
+        ),
         tuple(spot - 1 for spot in whole),
     )
 
 
 def _given_first(
-    beliefs: Beliefs, station: Station, readings: Readings, kept: Sequence[Floats], shares: Sequence[Floats]
-) -> Readings:
-    """The modes that were read once more, given the first reading, with which they share a part of what it is off by.
+    beliefs: Beliefs, station: Station, old: Sequence[int], readings: Readings, kept: Sequence[Floats],
+    shares: Sequence[Floats],
+) -> Readings:  # fmt: skip
+    """Readings at hand taken once more, given the first reading, with which they share a part of what it is off by.
 
     Parameters
     ----------
     beliefs : Beliefs
     station : Station
+    old : sequence of int
+        Which of the station's readings.
     readings : Readings
         As if they shared nothing.
     kept : sequence of (n_terms,) array
@@ -141,8 +151,9 @@ def _given_first(
         The part of it that is found again.
     """
     setup = beliefs.board.setup(station.base.name)
-    first, own = np.log(setup.measured), ReadingErrors.of(setup).own_variance
-    new = ReadingErrors.of(station.setup).own_variance[: station.n_old]
+    rows = list(old)
+    first, own = np.log(setup.measured)[rows], ReadingErrors.of(setup).own_variance[rows]
+    new = ReadingErrors.of(station.setup).own_variance[rows]
     shift, slopes, variance = [], [], []
     for k, (each, part) in enumerate(zip(kept, shares, strict=True)):
         share = part[:, None]
@@ -154,13 +165,12 @@ def _given_first(
     return Readings(tuple(shift), tuple(slopes), tuple(variance))
 
 
-def _with_mass(readings: Readings, added: Readings) -> Readings:
+def _with_mass(readings: Readings, added: Readings, off_place: Floats) -> Readings:
     """Readings with what a known mass adds to them, somewhat uncertain for it may stand a little off its place."""
-    both = zip(readings.variance, added.shift, strict=True)
     return replace(
         readings,
         shift=tuple(a + b for a, b in zip(readings.shift, added.shift, strict=True)),
-        variance=tuple(variance + (_PLACED * shift) ** 2 for variance, shift in both),
+        variance=tuple(variance + off_place**2 for variance in readings.variance),
     )
 
 
@@ -218,6 +228,38 @@ def _put_known(one: Explanation, law: BareLaw, found: Found, shift: Floats, slop
     first = one.mean.shape[1] - table.slopes.shape[2]
     shift[:, : rows.size] = law.middle[: rows.size] + table.shift[one.cells][:, rows]
     slopes[:, : rows.size, first:] = table.slopes[one.cells][:, rows]
+
+
+def _as_read(
+    one: Explanation, law: BareLaw, found: Found | None, shift: Floats, slopes: Floats
+) -> tuple[Floats, Floats]:
+    """The same arrays with the readings at hand as the modes that an explanation takes them for.
+
+    Whoever measures again finds the same peaks, whatever they are called. Not a number where it takes a reading for no
+    mode, or for one that was not read: what is found there then, it does not say.
+    """
+    taken = np.arange(len(law.station.setup.readings))
+    if found is None or not law.station.n_old:
+        return shift, slopes
+    taken[: law.station.n_old] = _modes_taken(one, law.station, found)
+    n_blocks = shift.shape[1] // taken.size
+    columns = np.concatenate([block * taken.size + taken for block in range(n_blocks)])
+    read = shift[:, columns]
+    read[:, np.tile(taken < 0, n_blocks)] = np.nan
+    return read, slopes[:, taken]
+
+
+def _modes_taken(one: Explanation, station: Station, found: Found) -> NDArray[np.intp]:
+    """Which of a station's modes an explanation takes each reading at hand for: (n_old,) array, -1 for another one."""
+    baseline, hypothesis = found.ground.baseline, found.ground.hypotheses[one.hypothesis]
+    setup = [each.name for each in baseline.board.setups].index(station.base.name)
+    here = np.flatnonzero(baseline.setup_index == setup)
+    own = baseline.rows.copy() if hypothesis.own is None else hypothesis.own.rows
+    if hypothesis.swap is not None:
+        pair = [hypothesis.swap.first, hypothesis.swap.second]
+        own[pair] = own[pair[::-1]]
+    same = (own[here, None] == baseline.rows[here]) & (own[here, None] >= 0)
+    return np.asarray(np.where(same.any(axis=1), same.argmax(axis=1), -1))
 
 
 def bands(beliefs: Beliefs, readings: Readings, rng: np.random.Generator, within: tuple[float, ...]) -> Floats:

@@ -52,7 +52,7 @@ def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placin
     """Sensor and hammer for some modes.
 
     The sensor stands where the smallest residue at the driving point is largest, the hammer where the smallest residue
-    between the two is.
+    between the two is, of the modes that the sensor can see.
 
     Parameters
     ----------
@@ -79,7 +79,9 @@ def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placin
         first = int(np.argmin([np.hypot(x - sensor[0], y - sensor[1]) for x, y in places]))
     apart = np.array([max(abs(x - places[first][0]), abs(y - places[first][1])) >= _APART for x, y in places])
     residues = np.abs(flat * flat[:, [first]])
-    second = int(np.argmax(np.where(apart, residues.min(axis=0), -1.0)))
+    can_be_seen = np.abs(flat[:, first]) >= NODAL_LINE
+    weakest = residues[can_be_seen if can_be_seen.any() else slice(None)].min(axis=0)
+    second = int(np.argmax(np.where(apart, weakest, -1.0)))
     taps = tuple(places[i] for i in effective_independence(flat.T, len(shapes)))
     seen = tuple(float(one) for one in residues[:, second])
     return Placing(places[first], places[second], seen, taps)

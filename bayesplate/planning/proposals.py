@@ -95,6 +95,11 @@ class Proposal:
     further: Readings | None = None
     every_row: tuple[int, ...] = ()
 
+    @property
+    def ends_session(self) -> bool:
+        """Whether the board leaves the place where it was measured, so that nothing goes on there."""
+        return self.what in ("edges", "again")
+
     def excludes(self, other: Proposal) -> bool:
         """Whether another proposal reads modes of the same way to hold the board, or looks at the same thing."""
         return (self.law is not None and self.law is other.law) or (self.about != "" and self.about == other.about)
@@ -198,7 +203,7 @@ def _of_station(
     beliefs: Beliefs, law: BareLaw, every: StationReadings, costs: Costs, goal: str | None, rng: np.random.Generator
 ) -> list[Proposal]:
     """What could be measured with the board held in one way."""
-    station, old = law.station, tuple(range(law.station.n_old))
+    station, old = law.station, every.old
     told = _Sentences(beliefs.board, station)
     made: list[tuple[str, str, float, Readings, tuple[int, ...]]] = []
     if station.is_new and every.rows:
@@ -306,6 +311,8 @@ def sequences(
 ) -> tuple[tuple[tuple[Proposal, ...], Gain], ...]:
     """The best two and the best three together, found one by one: each goes with those found before it.
 
+    They stand in the order in which they can be done: what goes on in a session before the board is taken out.
+
     Parameters
     ----------
     beliefs : Beliefs
@@ -335,5 +342,5 @@ def sequences(
         }
         best = max(gains, key=lambda i: score(gains[i], goal))
         chosen.append(left[best])
-        result.append((tuple(chosen), gains[best]))
+        result.append((tuple(sorted(chosen, key=lambda one: one.ends_session)), gains[best]))
     return tuple(result)

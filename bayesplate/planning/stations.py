@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from bayesplate.effects.base import Effect
 from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.residues import NODAL_LINE, deflections
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
@@ -32,11 +33,14 @@ FURTHER = 8
 """Modes beyond those that were read from which the best are chosen."""
 ELSEWHERE = 6
 """Lowest modes that are read where the board is held another way."""
-_SEARCHED = 24
+SEARCHED = 24
+"""Lowest modes of a way to hold the board among which those that are read are looked for."""
 _SHARE = 0.02
 """Of the board's mass that a known mass has, about: it shifts a mode by up to some per cent."""
 _HANDY = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3)
 """Masses that come in a set of weights, kg."""
+PLACED = 1e-3
+"""Standard deviation along each side of where a known mass stands, m: it is put on a pencil mark by hand."""
 _NEAR_FREE, _NEAR_HELD = 0.94, 0.7
 """Where a known mass stands besides the middle, as fractions of a side whose end is free or held."""
 
@@ -189,10 +193,17 @@ def known_mass(board: Board) -> float:
 def _next_modes(
     board: Board, station: Station, values: Values, n: int, taken: Collection[Label]
 ) -> tuple[Reading, ...]:
-    """The lowest modes with a clear name that were not read, each where the model expects it."""
+    """The lowest modes with a clear name that were not read, each where the model expects it.
+
+    None on whose nodal line the sensor stands, which stays where it is in a session that goes on.
+    """
     system, first = station.system(board), station.setup.first_label
-    _, named = spectrum(system, station.values(system, values), _SEARCHED)
-    new = [one for one in named if one.label is not None and one.label not in taken]
+    there = station.values(system, values)
+    modes, named = spectrum(system, there, SEARCHED)
+    sensor = None if station.is_new else station.base.sensor
+    at = np.ones(len(named)) if sensor is None else np.abs(deflections(station.base, modes, there, sensor, system.shaped))
+    seen = [one for one, share in zip(named, at, strict=True) if share >= NODAL_LINE]
+    new = [one for one in seen if one.label is not None and one.label not in taken]
     return tuple(
         Reading(one.label, (one.label.m - first.m, one.label.n - first.n), Quantity.exact(one.frequency))
         for one in new[:n]
@@ -218,23 +229,54 @@ def solved(station: Station, board: Board, values: Values) -> Floats:
     """
     system = station.system(board)
     there = station.values(system, values)
-    modes, named = spectrum(system, there, _SEARCHED)
+    modes, named = spectrum(system, there, SEARCHED)
     at = {one.label: i for i, one in enumerate(named)}
     rows = [at.get(label, -1) for label in station.setup.labels]
     log_frequency = np.array([np.log(named[i].frequency) if i >= 0 else np.nan for i in rows])
-    return np.concatenate([log_frequency[None, :], _added(station, board, modes, there)[:, rows]])
+    return np.concatenate([log_frequency[None, :], _added(station, board, modes, there, station.spots)[:, rows]])
 
 
-def _added(station: Station, board: Board, modes: Modes, values: Values) -> Floats:
-    """What a known mass adds to ln f of each mode: (n_spots, n_modes) array.
+def off_place(station: Station, board: Board, values: Values) -> Floats:
+    """Standard deviation of what a known mass at each spot adds to ln f, for it is not put quite there.
+
+    Parameters
+    ----------
+    station, board, values
+        As of `solved`.
+
+    Returns
+    -------
+    (n_spots, n_modes) array
+    """
+    if not station.spots:
+        return np.zeros((0, len(station.setup.labels)))
+    system = station.system(board)
+    there = station.values(system, values)
+    modes, named = spectrum(system, there, SEARCHED)
+    at = {one.label: i for i, one in enumerate(named)}
+    variance = np.zeros((len(station.spots), len(modes.eigenvalues)))
+    for axis, side in enumerate(vibrating_lengths(there, station.setup)):
+        step = np.eye(2)[axis] * PLACED / float(np.ravel(side)[0])
+        far, near = (
+            _added(station, board, modes, there, [(s + sign * step[0], t + sign * step[1]) for s, t in station.spots])
+            for sign in (1.0, -1.0)
+        )
+        variance += (0.5 * (far - near)) ** 2
+    return np.sqrt(variance[:, [at.get(label, -1) for label in station.setup.labels]])
+
+
+def _added(
+    station: Station, board: Board, modes: Modes, values: Values, spots: Sequence[tuple[float, float]]
+) -> Floats:
+    """What a known mass at each of some spots adds to ln f of each mode: (n_spots, n_modes) array.
 
     Solved among the modes at hand, and the rigid motions of a free board, whose shapes it mixes.
     """
     length_x, length_y = vibrating_lengths(values, station.setup)
     vibrating = density(values) * values["thickness"] * length_x * length_y
     share = known_mass(board) / float(np.ravel(vibrating)[0])
-    added = np.empty((len(station.spots), len(modes.eigenvalues)))
-    for row, (s, t) in zip(added, station.spots, strict=True):
+    added = np.empty((len(spots), len(modes.eigenvalues)))
+    for row, (s, t) in zip(added, spots, strict=True):
         moved = modes.displacement(np.array([s]), np.array([t]))[:, 0, 0]
         rigid = [1.0, np.sqrt(12.0) * (s - 0.5), np.sqrt(12.0) * (t - 0.5)] if station.setup.is_free else []
         row[:] = with_point_mass(modes.eigenvalues, moved, np.array(rigid), share)
@@ -279,12 +321,15 @@ class BareLaw:
         ln f (Hz) with the inputs at the middle of their priors.
     slopes : (n_modes, 3 + n_inputs) array
         By ln D_x, ln D_y, ln D_s and the inputs' standard coordinates.
+    off_place : (n_spots, n_modes) array
+        See `off_place`, at the estimate.
     """
 
     station: Station
     solved: Floats
     middle: Floats
     slopes: Floats
+    off_place: Floats
 
 
 def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> BareLaw:
@@ -318,4 +363,4 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
     there = found[0] + model.discrepancies(at(start[None, :]))[0]
     of_inputs, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], start[N_RIGIDITIES:])
     every = np.concatenate([slopes[:, :N_RIGIDITIES], of_inputs], axis=1)
-    return BareLaw(station, found, there - of_inputs @ inputs, every)
+    return BareLaw(station, found, there - of_inputs @ inputs, every, off_place(station, board, values))

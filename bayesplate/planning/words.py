@@ -9,26 +9,21 @@ from bayesplate.effects.words import joined
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Gain
 from bayesplate.planning.plan import ProposalEntry
+from bayesplate.planning.proposals import CONSTANTS, EXPLANATIONS
 from bayesplate.plate.material import MODULI
 
 WORTH = 0.05
 """A gain below this, nats, is no reason to measure: an interval would shrink by less than a twentieth."""
 _CLEAR = 2.0
-"""Standard errors that a drop of the entropy must stand above zero."""
+"""Standard errors that a gain must stand above zero."""
 
 
-def is_worth(gain: Gain, score: float) -> bool:
-    """Whether a gain is a reason to measure."""
-    errors = _CLEAR * float(gain.explanations_error + gain.constants_error)
-    return score >= WORTH and score > errors
-
-
-def first_line(sentence: str, gain: Gain, beliefs: Beliefs, score: float) -> str:
-    """What to do next, and what it is expected to give; empty where it would not help."""
-    if not is_worth(gain, score):
-        return ""
-    told = [_of_doubt(gain, beliefs), _of_constants(gain)]
-    return f"{sentence}: {joined([one for one in told if one])}."
+def first_line(sentence: str, gain: Gain, beliefs: Beliefs, goal: str | None) -> str:
+    """What to do next, and what it is expected to give; empty where it would not help with what was asked for."""
+    doubt, constants = _of_doubt(gain, beliefs), _of_constants(gain)
+    by_goal = {None: doubt or constants, EXPLANATIONS: doubt, CONSTANTS: constants}
+    helps = by_goal[goal] if goal in by_goal else goal in _shrunk(gain)
+    return f"{sentence}: {joined([one for one in (doubt, constants) if one])}." if helps else ""
 
 
 def _of_doubt(gain: Gain, beliefs: Beliefs) -> str:
@@ -45,13 +40,19 @@ def _of_doubt(gain: Gain, beliefs: Beliefs) -> str:
 
 def _of_constants(gain: Gain) -> str:
     """What becomes of the intervals that shrink at all."""
-    told = {name: getattr(gain, name) for name in MODULI if gain.shrinkage(name) >= WORTH}
+    told = _shrunk(gain)
     if not told:
         return ""
     verb = "interval" if len(told) == 1 else "intervals"
     sizes = joined([f"{value:.2f}" for value in told.values()])
     now = "it is" if len(told) == 1 else "they are"
     return f"the {verb} of {joined(list(told))} would shrink to {sizes} of what {now}"
+
+
+def _shrunk(gain: Gain) -> dict[str, float]:
+    """What is left of each interval that shrinks by as much as is worth telling, and for sure."""
+    least = max(WORTH, _CLEAR * gain.constants_error)
+    return {name: getattr(gain, name) for name in MODULI if gain.shrinkage(name) >= least}
 
 
 def shared_words(name: str) -> str:
@@ -61,15 +62,15 @@ def shared_words(name: str) -> str:
     return key if "/" in key else words if words.endswith(key) else f"{key} of {words}"
 
 
-def campaign_line(proposals: Sequence[ProposalEntry]) -> str:
-    """The first line of a campaign's plan; empty where nothing would help."""
-    if not proposals or proposals[0].gain.score < WORTH:
+def campaign_line(proposals: Sequence[ProposalEntry], goal: str | None) -> str:
+    """The first line of a campaign's plan; empty where nothing would help with what was asked for."""
+    if not proposals:
         return ""
     best = proposals[0].gain
-    shared = {shared_words(name): value for name, value in best.shared.items()}
-    told = shared or {name: getattr(best, name) for name in MODULI}
+    told = {shared_words(name): value for name, value in best.shared.items()} if goal is None else {}
+    told = told or {name: getattr(best, name) for name in ([goal] if goal in MODULI else MODULI)}
     shrunk = {name: value for name, value in told.items() if -math.log(value) >= WORTH}
     if not shrunk:
-        return f"{proposals[0].sentence}."
+        return ""
     sizes = joined([f"{name} to {value:.2g}" for name, value in shrunk.items()])
     return f"{proposals[0].sentence}: the interval would shrink, of {sizes} of what it is."

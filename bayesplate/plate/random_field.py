@@ -189,6 +189,33 @@ def conditioned(read: PlacedReadings) -> ConditionedField:
     )
 
 
+def sd_after(read: PlacedReadings, x: Floats, y: Floats) -> float:
+    """Standard deviation of the field's mean that is expected after readings at further places, in their unit.
+
+    What will be read there scatters as the readings at hand do, so that amplitudes and scatters keep the probabilities
+    that they have now.
+
+    Parameters
+    ----------
+    read : PlacedReadings
+    x, y : (n,) array
+        The further places, fractions of the sides.
+    """
+    scale = statistics.mean(read.values)
+    known = conditioned(read)
+    degrees = _degrees(read.is_along_x_only)
+    at = np.concatenate([read.x, x]), np.concatenate([read.y, y])
+    slope = known.shape * known.mean / scale
+    own = np.full(len(at[0]), (read.resolution / scale) ** 2 / 12.0)
+    for sd, order in zip(read.place_sd, ((1, 0), (0, 1)), strict=True):
+        own += (sd * (_design(degrees, *at, order)[:, 1:] @ slope)) ** 2
+    design, relative, n = _design(degrees, *at) @ _smooth(degrees), np.array(read.values) / scale, len(read.values)
+    log_weights = _regressed(relative, design[:n], own[:n], read.usual)[0]
+    weights = np.exp(log_weights - log_weights.max())
+    after = _regressed(np.ones(len(design)), design, own, read.usual)[2][..., 0, 0]
+    return float(scale * np.sqrt(np.average(after, weights=weights)))
+
+
 def _averaged(
     readings: Floats, at_places: Floats, own: Floats, degrees: Degrees, usual: UsualSizes
 ) -> tuple[Floats, Floats]:

@@ -127,6 +127,20 @@ def discrepancy_names(setup: Setup, label: Label) -> tuple[str, str] | None:
     return shown_name(DISCREPANCY, setup.group), shown_name(_key(label), setup.group)
 
 
+def unknown_discrepancies(board: Board, setup: Setup) -> Floats:
+    """Variance of what modes of a setup depart from the plate by where no session has read them: (n_modes,) array.
+
+    Zero of those whose discrepancy is a parameter of the board, and where sessions share nothing and the noise has it.
+    """
+    variance = np.zeros(len(setup.labels))
+    for i, label in enumerate(setup.labels):
+        names = discrepancy_names(setup, label)
+        if names is not None and names[1] not in board.inputs:
+            scale = board.inputs[names[0]]
+            variance[i] = scale.mean**2 + scale.sd**2
+    return variance
+
+
 def under_prior_scales(board: Board, values: Values, slopes: Floats, inputs: Floats) -> tuple[Floats, Floats]:
     """Slopes and places of the inputs where discrepancies have the size that is expected beforehand.
 

@@ -288,6 +288,12 @@ class Setup:
         return Owner("setup", self.name)
 
     @property
+    def sensor(self) -> tuple[float, float] | None:
+        """Where the one accelerometer stands, m; None where there is none, there are several, or it roved."""
+        fixed = [item for item in self.attached if item.kind == "accelerometer" and len(item.places) == 1]
+        return fixed[0].places[0] if len(fixed) == 1 else None
+
+    @property
     def is_free(self) -> bool:
         """Whether no edge is held."""
         return {*self.ends_x, *self.ends_y} == {"free"}

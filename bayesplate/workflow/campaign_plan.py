@@ -61,7 +61,7 @@ def plan_campaign(
         costs=asdict(costs),
         explanations=(),
         entropy=0.0,
-        first=campaign_line(proposals),
+        first=campaign_line(proposals, goal),
         proposals=proposals,
         sequences=tuple(joined_entry(joint, one, campaign.shared, goal) for one in together),
         bench=tuple(one.entry for one in drawn),

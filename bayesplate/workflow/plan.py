@@ -30,7 +30,7 @@ from bayesplate.planning.assembled import (
 )
 from bayesplate.planning.drawn_up import DrawnUp, begun, drawn_up
 from bayesplate.planning.plan import FORMAT, Plan
-from bayesplate.planning.proposals import Costs
+from bayesplate.planning.proposals import EXPLANATIONS, Costs
 from bayesplate.planning.survivors import asked, surviving
 from bayesplate.plate.board import Board
 from bayesplate.posterior.sampling import Progress
@@ -129,6 +129,8 @@ def plan(
     ------
     InputError
         If the card, an argument or the folder cannot be used; then nothing is written.
+    NotIdentifiableError
+        If explanations are to be told apart on a board whose frequencies do not even tell the constants.
     """
     require_arguments(
         card=card, goal=goal, costs=costs, between=between, out=out, effects=effects, seed=seed, force=force,
@@ -140,6 +142,8 @@ def plan(
     if isinstance(given, Campaign):
         from bayesplate.workflow.campaign_plan import plan_campaign
 
+        if between is not None:
+            raise InputError(_untold("between", "a campaign"))
         made, drawn = plan_campaign(given, goal, classes, seed, progress)
     else:
         found = _drawn_up(given, goal, classes, between, seed, out, progress)
@@ -180,11 +184,16 @@ def _drawn_up(
     stages = Stages(progress, _POSE + _SEARCH + _PLAN)
     stages.begin("estimate", _POSE)
     problem = Problem(prepared)
+    asks_of_effects = between is not None or goal == EXPLANATIONS
     if not any(setup.readings or setup.peaks for setup in prepared.board.setups):
+        if asks_of_effects:
+            raise InputError(_untold("between" if between else "goal", "a board without any"))
         return begun(prepared.board, prepared.prior, seed, goal=goal, costs=costs)
     try:
         baseline = baseline_of(problem.posed)
     except NotIdentifiableError as error:
+        if asks_of_effects:
+            raise
         found = begun(prepared.board, prepared.prior, seed, goal=goal, costs=costs)
         return replace(found, notes=(f"planned from the prior alone: {error}",))
     finished = None if out is None or between else _finished(Path(out), prepared)
@@ -194,6 +203,11 @@ def _drawn_up(
     among = _among(searched, between, finished)
     stages.begin("gains of further readings", _PLAN)
     return drawn_up(searched, prepared.prior, seed, goal=goal, costs=costs, among=among)
+
+
+def _untold(place: str, got: str) -> Fault:
+    """Why explanations cannot be told apart."""
+    return Fault(place, "the frequencies of a board, by which effects are told apart", got)
 
 
 def _require_possible(board: Board, between: Sequence[str]) -> None:
@@ -250,14 +264,13 @@ def _plan_of(
     beliefs, board = found.beliefs, prepared.board
     steps = found.together[-1][0] if found.together else found.proposals[:1]
     drawn = benches(beliefs, steps or found.proposals, found.values, np.random.default_rng([seed, 18]))
-    is_measured = any(setup.readings for setup in board.setups)
     made = Plan(
         format=FORMAT,
         name=board.name,
         title=board.title,
         seed=seed,
         card_sha256=prepared.card.sha256,
-        basis="readings" if is_measured else "prior",
+        basis="prior" if found.is_from_prior else "readings",
         goal=goal,
         costs=asdict(costs),
         explanations=explanation_entries(beliefs),

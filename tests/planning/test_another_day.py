@@ -10,8 +10,9 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
+from bayesplate.diagnosis.evidence.hypotheses import Swap
 from bayesplate.planning.gains import Readings
-from bayesplate.planning.modes_read import REPEATED, _given_first
+from bayesplate.planning.modes_read import REPEATED, _as_read, _given_first
 from bayesplate.plate.parameter import Owner
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share
@@ -33,7 +34,9 @@ def once_more(setup, share, noise=SECOND):
     station = SimpleNamespace(base=setup, setup=setup, n_old=N)
     own = ReadingErrors.of(setup).own_variance
     alone = Readings((SHIFT[None],), (SLOPES[None],), ((noise**2 + own)[None],))
-    return _given_first(SimpleNamespace(board=board), station, alone, [np.array([FIRST**2])], [np.array([share])])
+    return _given_first(
+        SimpleNamespace(board=board), station, range(N), alone, [np.array([FIRST**2])], [np.array([share])]
+    )
 
 
 def test_both_days_tell_what_their_joint_covariance_says():
@@ -84,3 +87,34 @@ def test_the_same_day_once_more_tells_of_the_constants_no_more_than_better_readi
 
     assert (np.diagonal(before) < np.diagonal(after)).all()
     assert (np.diagonal(after) < 1.001 * np.diagonal(of_mean)).all()
+
+
+def read_as(hypothesis):
+    """Shift and slopes of the readings at hand as an explanation takes them; one further mode, one known mass."""
+    baseline = SimpleNamespace(
+        board=SimpleNamespace(setups=(SimpleNamespace(name="other"), SETUP)), rows=np.arange(2, 4 + N),
+        setup_index=np.r_[0, 0, np.ones(N, dtype=int)],
+    )  # fmt: skip
+    found = SimpleNamespace(ground=SimpleNamespace(baseline=baseline, hypotheses=(hypothesis,)))
+    law = SimpleNamespace(station=SimpleNamespace(base=SETUP, n_old=N, setup=SimpleNamespace(readings=range(N + 1))))
+    shift, slopes = np.arange(2.0 * (N + 1))[None], np.arange(N + 1.0)[None, :, None]
+    return _as_read(SimpleNamespace(hypothesis=0), law, found, shift, slopes)
+
+
+def test_where_labels_are_exchanged_each_peak_is_found_again_as_the_other_mode():
+    """With and without a known mass; of the further mode nothing changes."""
+    shift, slopes = read_as(SimpleNamespace(swap=Swap(3, 5), own=None))  # two readings of another setup come first
+
+    taken = np.array([0, 3, 2, 1, 4, 5, 6])
+    assert shift[0] == pytest.approx(np.r_[taken, taken + N + 1])
+    assert slopes[0, :, 0] == pytest.approx(taken)
+
+
+def test_a_reading_that_is_no_mode_or_an_unread_one_says_nothing_of_another_day():
+    own = SimpleNamespace(rows=np.array([2, 3, 5, 4, 30, -1, 8, 9]))
+    shift, _ = read_as(SimpleNamespace(swap=None, own=own))
+
+    taken = np.array([1, 0, np.nan, np.nan, 4, 5, 6])
+    assert shift[0] == pytest.approx(np.r_[taken, taken + N + 1], nan_ok=True)
+    plain, _ = read_as(SimpleNamespace(swap=None, own=None))
+    assert plain[0] == pytest.approx(np.arange(2.0 * (N + 1)))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_boards import setup_of
 
-from bayesplate.planning.inputs_read import MORE, measurements
+from bayesplate.planning.inputs_read import GRID, MORE, measurements
 from bayesplate.plate.board import made_board
+from bayesplate.plate.random_field import THICKNESS, PlacedReadings, Surface, conditioned, sd_after
 from bayesplate.quantities import Quantity
 
 FREE = dict.fromkeys(("x0", "x1", "y0", "y1"), "free")
@@ -60,3 +63,29 @@ def test_more_places_narrow_the_mean_of_a_field():
 
     assert [each.n for each in found] == [12]
     assert found[0].sd < 0.8 * one.inputs["thickness"].sd
+
+
+def test_more_places_narrow_the_mean_as_much_as_readings_that_scatter_like_those_at_hand():
+    """Fields drawn from what the readings leave are read at the further places; all alike would promise more."""
+    x, y = np.array((0.0, 0.25, 0.5, 0.75, 1.0) * 2), np.array((0.0,) * 5 + (1.0,) * 5)
+    values = (4.7e-3, 4.5e-3, 4.8e-3, 4.8e-3, 4.6e-3, 4.5e-3, 4.5e-3, 4.9e-3, 4.9e-3, 4.7e-3)
+    read = PlacedReadings(values, tuple(x), tuple(y), 1e-4, (0.0, 0.0), THICKNESS)
+    new_x, new_y = (one.ravel() for one in np.meshgrid(*GRID, indexing="ij"))
+    known, rng = conditioned(read), np.random.default_rng(2)
+    scatter = np.std(values, ddof=1) / known.mean
+
+    def after(seen):
+        every = (np.concatenate(pair) for pair in ((values, seen), (x, new_x), (y, new_y)))
+        return conditioned(replace(read, **dict(zip(("values", "x", "y"), map(tuple, every), strict=True)))).sd
+
+    variances = []
+    for shape in rng.multivariate_normal(known.shape, known.covariance, 24):
+        field = known.mean * (1.0 + Surface(known.degrees, tuple(shape))(new_x, new_y))
+        rest = np.sqrt(max(scatter**2 - float(shape @ shape), 0.0)) * known.mean
+        seen = field + rest * rng.standard_normal(new_x.size)
+        variances.append(after(np.round(seen, 4)) ** 2)
+    error = np.std(variances) / np.sqrt(len(variances))
+    expected = sd_after(read, new_x, new_y) ** 2
+
+    assert abs(np.mean(variances) - expected) < 3.0 * error
+    assert after(np.full(new_x.size, known.mean)) ** 2 < expected - 6.0 * error

@@ -11,10 +11,15 @@ from generator.naming import frequencies
 from generator.plate import Plate
 from made_boards import setup_of
 
-from bayesplate.planning.stations import bare_law, known_mass, stations
+from bayesplate.cards import load_prior
+from bayesplate.planning.assembled import bench_of
+from bayesplate.planning.before import prior_beliefs
+from bayesplate.planning.modes_read import station_readings
+from bayesplate.planning.stations import PLACED, bare_law, known_mass, stations
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
-from bayesplate.plate.sessions import with_discrepancies
+from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.quantities import Quantity
 
 FREE, CLAMPED = (dict.fromkeys(("x0", "x1", "y0", "y1"), word) for word in ("free", "clamped"))
@@ -58,6 +63,38 @@ def test_of_several_sessions_only_the_last_goes_on():
     assert all(one.goes_on(made) for one in stations(made, values()))
 
 
+def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read_does():
+    """Its discrepancy is no parameter yet, and its variance is what it will be as one."""
+    made = board(FREE)
+    days = tuple(replace(made.setups[0], name=name) for name in ("monday", "friday"))
+    held = with_discrepancies(replace(made, setups=days))
+    station = stations(held, values())[0]
+    new = station.setup.readings[station.n_old]
+    read = with_discrepancies(replace(held, setups=tuple(replace(d, readings=(*d.readings, new)) for d in days)))
+    at = read.nominal() | values()
+    slopes = bare_law(read, next(one for one in stations(read, at) if one.goes_on(read)), at).slopes
+    column = 3 + [one.key for one in read.uncertain].index(f"discrepancy {new.label}")
+
+    unknown = unknown_discrepancies(held, station.setup)
+    assert unknown[: station.n_old + 1] == pytest.approx([0.0] * station.n_old + [slopes[station.n_old, column] ** 2])
+    assert unknown[-1] > 0.003**2
+    assert not unknown_discrepancies(made, made.setups[0]).any()
+
+
+def test_planned_readings_carry_it():
+    made = board(FREE)
+    days = tuple(replace(made.setups[0], name=name) for name in ("monday", "friday"))
+    held = with_discrepancies(replace(made, setups=days))
+    believed, at = prior_beliefs(held, load_prior("spruce"), np.random.default_rng(1))
+    last = next(one for one in stations(held, at) if one.goes_on(held))
+    further = station_readings(believed, bare_law(held, last, at), np.random.default_rng(1)).further
+    noise = believed.explanations[0].noise[:, 1] ** 2
+
+    assert further.variance[0] - noise[:, None] == pytest.approx(
+        np.tile(unknown_discrepancies(held, last.setup)[last.n_old :], (noise.size, 1))
+    )
+
+
 def test_modes_that_were_read_come_first_and_none_twice(free):
     labels = [(label.m, label.n) for label in free[0].setup.labels]
 
@@ -81,3 +118,53 @@ def test_a_known_mass_shifts_modes_as_the_generator_has_it(free):
     assert np.abs(wanted).max() > 0.02
     assert np.all(np.abs(added - wanted) < 0.01 * np.abs(wanted) + 2.0 * np.log(2.0) / 1200.0)
     assert law.middle[: len(READ)] == pytest.approx([np.log(bare[b]) for b in READ], abs=1e-3)
+
+
+def test_a_known_mass_off_its_place_adds_as_much_more_or_less_as_the_independent_solver_says(free):
+    """Near a nodal line a millimetre changes much of a small shift, in a belly hardly any of a large one."""
+    law, station = bare_law(board(FREE), free[0], values()), free[0]
+    plate = Plate(**MODULI, nu_xy=0.4, rho=430.0, h=4.7e-3, L_x=0.58, L_y=0.217, edges=FREE)
+    x, y = station.places(board(FREE))[-1]
+
+    def loaded(x, y):
+        found, _ = frequencies(plate, [AttachedMass(known_mass(board(FREE)), ((x, y),))], READ)
+        return np.log([found[b] for b in READ])
+
+    wide = 3.0 * PLACED
+    along, across = (loaded(x + dx, y + dy) - loaded(x - dx, y - dy) for dx, dy in ((wide, 0.0), (0.0, wide)))
+    wanted = np.hypot(along, across) / 6.0
+    assert law.off_place[-1, : len(READ)] == pytest.approx(wanted, rel=0.1)
+    relative = law.off_place[-1, : len(READ)] / np.abs(law.solved[len(station.spots), : len(READ)])
+    assert relative.max() > 2.0 * relative.min()
+
+
+def test_a_mode_on_whose_nodal_line_the_sensor_stands_is_not_looked_for():
+    """In the middle of the width it sees none with an odd number of lines across; a weight there sees nothing."""
+    made = board(FREE)
+
+    def labels(kind, elsewhere=False):
+        item = AttachedItem(kind, ((0.1, 0.5 * SIZES["length_y"]),), Quantity.exact(1e-6))
+        found = stations(replace(made, setups=(replace(made.setups[0], attached=(item,)),)), values())
+        return [one.label for one in found[elsewhere].setup.readings[0 if elsewhere else len(READ) :]]
+
+    assert all(one.n % 2 == 0 for one in labels("accelerometer"))
+    assert any(one.n % 2 for one in labels("weight"))
+    assert any(one.n % 2 for one in labels("accelerometer", elsewhere=True))  # it is put where it sees them
+
+
+def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_one(free):
+    """Also the highest that are looked at, where a board was read up to the twentieth."""
+    beams = [(one.label.m, one.label.n) for one in free[0].setup.readings]
+    beams = [(one.label.m, one.label.n) for one in stations(board(FREE, beams), values())[0].setup.readings]
+    weight = AttachedItem("weight", ((0.29, 0.1),), Quantity.exact(1e-6))
+    read = board(FREE, beams)
+    read = replace(read, setups=(replace(read.setups[0], attached=(weight,)),))
+    station = stations(read, values())[0]
+    rows = range(station.n_old, len(station.setup.readings))
+    law = bare_law(read, station, values())
+    ends = law.solved[0, list(rows), None] + np.array([-0.01, 0.0, 0.01])
+    bench = bench_of(read, law, rows, ends, values(), "", goes_on=True).entry
+
+    assert len(beams) == 20
+    assert {one.label for one in bench.modes} == {str(station.setup.labels[i]) for i in rows}
+    assert bench.sensor_mm != (290, 100)

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 import bayesplate
 from bayesplate.cli import main
-from bayesplate.errors import InputError
+from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.workflow import plan as home
 from bayesplate.workflow.prepare import prepare
 
@@ -120,6 +120,12 @@ def test_a_plan_is_no_run_and_fit_says_what_it_lacks(planned):
         (["--between", "clamp_rotation"], 3, "between: wanted a board on which clamp_rotation can act, got no edge is"),
         (["--between", "none"], 3, "between: wanted one name of an effect or more, or None, got an empty list"),
         (["--between", "air_loading", "--effects", "air_loading"], 3, "between: wanted effects that are not declared"),
+        (
+            ["--between", "air_loading"],
+            3,
+            "between: wanted the frequencies of a board, by which effects are told apart",
+        ),
+        (["--for", "explanations"], 3, "goal: wanted the frequencies of a board, by which effects are told apart"),
     ],
 )
 def test_what_cannot_be_asked_is_refused_and_leaves_nothing(arguments, code, said, tmp_path):
@@ -141,6 +147,28 @@ def test_every_bad_argument_is_told_at_once():
 def test_a_campaign_does_not_tell_explanations_apart():
     with pytest.raises(InputError, match="plan one of its boards"):
         bayesplate.plan("spruce-half-tops", goal="explanations")
+    with pytest.raises(InputError, match=r"between: wanted the frequencies of a board.*got a campaign"):
+        bayesplate.plan("spruce-half-tops", between=["air_loading"])
+
+
+class TestTooFewReadings:
+    """One mode does not tell three constants."""
+
+    @pytest.fixture
+    def board(self):
+        held = bayesplate.Setup.from_frequencies({"(1,1)": 125.0}, edges="free")
+        sizes = {"length_x": 0.253, "length_y": 0.114, "thickness": 3e-3, "mass": 0.041}
+        return bayesplate.Board.from_numbers("one", **sizes, setups=held)
+
+    def test_the_plan_says_that_it_is_from_the_prior(self, board):
+        found = bayesplate.plan(board).summary
+        assert found.basis == "prior"
+        assert found.notes[0].startswith("planned from the prior alone")
+
+    @pytest.mark.parametrize("asked", [{"between": ["air_loading"]}, {"goal": "explanations"}])
+    def test_effects_are_not_told_apart(self, board, asked):
+        with pytest.raises(NotIdentifiableError):
+            bayesplate.plan(board, **asked)
 
 
 class TestFinishedDiagnosis:
