@@ -159,14 +159,15 @@ def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
 def _published(board_name: str, model: SetupModel, values: Values, compared: bool) -> CoefficientRows:
     setup = model.setup
     card = named_table(board_name, setup)
-    rows = np.array([card.table[label] for label in setup.labels])
+    there = {label: _label_in_table(card, setup, label) for label in setup.labels}
+    rows = np.array([card.table[one] for one in there.values()])
     distances = _distances(card, setup, rows, _thickness_ratio(values, setup)) if compared else {}
     theory = min(distances.items(), key=lambda item: item[1])[0] if distances else "not stated"
     sentence = f"printed table {card.name}: {card.title}"
     if distances:
         told = " and ".join(f"{rms:.1f} cents from {name} plates" for name, rms in distances.items())
         sentence += f"; at its own material it lies {told} solved here, so it holds for the {theory} plate"
-    r_squared = {label: r for label, r in card.r_squared.items() if label in setup.labels}
+    r_squared = {label: card.r_squared[one] for label, one in there.items() if one in card.r_squared}
     return CoefficientRows("published", rows, np.zeros(len(rows)), card.aspect_ratio, theory, sentence, r_squared)
 
 
@@ -235,11 +236,17 @@ def _misfits(card: CoefficientCard, setup: Setup, board: Board, place: str) -> l
     if is_board and abs(card.aspect_ratio * length_y / length_x - 1.0) > SAME_ASPECT:
         wanted = f"a table of aspect ratio {length_x / length_y:.4g}"
         faults.append(Fault(place, wanted, f"{card.name}, made for {card.aspect_ratio:.4g}"))
-    missing = [str(label) for label in setup.labels if label not in card.table]
+    missing = [str(label) for label in setup.labels if _label_in_table(card, setup, label) not in card.table]
     if missing:
-        known = ", ".join(str(label) for label in card.table)
+        m, n = setup.first_label.m - card.first_label.m, setup.first_label.n - card.first_label.n
+        known = ", ".join(f"({label.m + m},{label.n + n})" for label in card.table)
         faults.append(Fault(place, f"a table with the labels {', '.join(missing)}", f"{card.name} with {known}"))
     return faults
+
+
+def _label_in_table(card: CoefficientCard, setup: Setup, label: Label) -> Label:
+    """What a table calls the mode of a setup's label: each counts from a first label of its own."""
+    return Label(label.m - setup.first_label.m + card.first_label.m, label.n - setup.first_label.n + card.first_label.n)
 
 
 def _distances(

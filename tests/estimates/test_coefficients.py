@@ -120,3 +120,19 @@ def test_a_board_without_a_table_has_no_published_coefficients(estimates):
     assert paper_system(without, bare).origins[0].source == "sensitivity"
     with pytest.raises(InputError, match=r"wanted the name of a table, got nothing \(take --coefficients sensitivity"):
         paper_system(without, bare, "published")
+
+
+def test_a_table_is_read_in_its_own_names_of_the_modes(estimates):
+    """A laboratory that counts a cantilever's modes from (0,0) has the coefficients of one that begins with (1,0)."""
+    board, estimate = estimates[FINNISH, ()]
+    (setup,) = board.setups
+    readings = tuple(replace(one, label=Label(one.label.m - 1, one.label.n)) for one in setup.readings)
+    other = replace(board, setups=(replace(setup, first_label=Label(0, 0), readings=readings),))
+    models = (replace(m, system=replace(m.system, setup=other.setups[0])) for m in estimate.models)
+    here = paper_system(other, replace(estimate, models=tuple(models)), "published", compared=False)
+    there = paper_system(board, estimate, "published", compared=False)
+
+    assert coefficient_faults(other) == []
+    np.testing.assert_array_equal(here.coefficients, there.coefficients)
+    assert list(here.origins[0].r_squared.values()) == list(there.origins[0].r_squared.values())
+    assert list(here.origins[0].r_squared) == list(other.setups[0].labels)
