@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import CoefficientCard
 from bayesplate.cards.words import setup_places
+from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
@@ -24,6 +25,10 @@ from bayesplate.plate.setup import Setup
 CoefficientSource = Literal["sensitivity", "training", "published"]
 SAME_ASPECT = 0.01
 """Relative difference up to which a table counts as made for the aspect ratio of a board."""
+SAME_POISSON = 0.01
+"""Difference up to which a table counts as made for the Poisson ratio of a board; it moves E_y by 0.1 %."""
+_OF_TRAINING = ("transverse_shear", "poisson_ratio")
+"""Effects that the plates of a training have where the board has them."""
 _GPA = 1e9
 
 
@@ -124,27 +129,32 @@ def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
         f"non-negative planes through {min(counts)} to {max(counts)} of {len(FACTORS) ** 2} computed plates, {theory}, "
         f"ratio {ratio:.4g}, around E_x {centre.E_x / _GPA:.3g}, E_y {centre.E_y / _GPA:.3g}, "
         f"G_xy {centre.G_xy / _GPA:.3g} GPa ({origin})"
+        f"{_without(model)}"
     )
     r_squared = {reading.label: trained[reading.beams].r_squared for reading in setup.readings}
     return CoefficientRows("training", rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
 
 
 def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingConstants, str]:
-    """Plate in the middle of the training: that of the named table, else the estimate itself."""
-    setup = model.setup
-    if setup.published_coefficients is not None:
-        printed = _constants_of(setup.published_coefficients)
-        if printed is not None and (not _has_shear(model) or (printed.G_xz and printed.G_yz)):
-            return printed, f"those of {setup.published_coefficients.name}"
-    E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    """Plate in the middle of the training: that of the named table, else the estimate itself.
+
+    Its Poisson ratio and shear moduli are the board's own: the coefficients go with them, and so do the moduli.
+    """
     there = model.system.adjusted(values)
-    shear = {name: float(there[name]) for name in ("G_xz", "G_yz") if _has_shear(model)}
+    shear = {name: float(there[name]) for name in ("G_xz", "G_yz") if model.system.theory == "shear-flexible"}
+    E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     own = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
-    return own, "the weighted least-squares estimate"
+    table = model.setup.published_coefficients
+    printed = None if table is None else _constants_of(table)
+    if table is None or printed is None:
+        return own, "the weighted least-squares estimate"
+    return replace(own, E_x=printed.E_x, E_y=printed.E_y, G_xy=printed.G_xy), f"those of {table.name}"
 
 
-def _has_shear(model: SetupModel) -> bool:
-    return model.system.theory == "shear-flexible"
+def _without(model: SetupModel) -> str:
+    """What the plates of a training and of a printed table lack: the board's effects but shear, which they may have."""
+    lacking = [one.name for one in model.system.effects if one.name not in _OF_TRAINING]
+    return f"; its plates have no {effect_names(lacking, 'or')}, which the board has" if lacking else ""
 
 
 def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
@@ -167,6 +177,10 @@ def _published(board_name: str, model: SetupModel, values: Values, compared: boo
     if distances:
         told = " and ".join(f"{rms:.1f} cents from {name} plates" for name, rms in distances.items())
         sentence += f"; at its own material it lies {told} solved here, so it holds for the {theory} plate"
+    nu_xy = float(values["poisson_xy"])
+    if card.training.nu_xy is not None and abs(card.training.nu_xy - nu_xy) > SAME_POISSON:
+        sentence += f"; its nu_xy is {card.training.nu_xy:.3g}, the board's {nu_xy:.3g}"
+    sentence += _without(model)
     r_squared = {label: card.r_squared[one] for label, one in there.items() if one in card.r_squared}
     return CoefficientRows("published", rows, np.zeros(len(rows)), card.aspect_ratio, theory, sentence, r_squared)
 

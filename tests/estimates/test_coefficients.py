@@ -14,7 +14,9 @@ from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import paper_system
 from bayesplate.labels import Label
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.inference import pose
+from bayesplate.quantities import Quantity
 from bayesplate.results.references import references
 from bayesplate.workflow.prepare import prepare
 
@@ -136,3 +138,30 @@ def test_a_table_is_read_in_its_own_names_of_the_modes(estimates):
     np.testing.assert_array_equal(here.coefficients, there.coefficients)
     assert list(here.origins[0].r_squared.values()) == list(there.origins[0].r_squared.values())
     assert list(here.origins[0].r_squared) == list(other.setups[0].labels)
+
+
+def test_a_training_has_the_poisson_ratio_of_the_board(estimates):
+    """Its plates had that of the named table: 1 to 2 % in the moduli, where the board's own is 0.3."""
+    board, _ = estimates[FINNISH, ()]
+    other = board.with_priors({"poisson_xy": 0.3})
+    estimate = weighted_least_squares(other)
+    systems = [paper_system(other, estimate, source) for source in ("sensitivity", "training", "published")]
+    one_solve, trained, _ = (np.array(system.moduli(system.solve())) for system in systems)
+
+    np.testing.assert_allclose(trained, one_solve, rtol=0.005)
+    assert "its nu_xy is 0.51, the board's 0.3" in systems[2].origins[0].sentence
+    assert "nu_xy" not in paper_system(board, estimates[FINNISH, ()][1]).origins[0].sentence
+
+
+def test_a_table_says_which_effects_of_the_board_its_plates_lack(estimates):
+    board, _ = estimates[FINNISH, ()]
+    (setup,) = board.setups
+    sensor = AttachedItem("accelerometer", ((0.24, 0.02),), Quantity.exact(0.003))
+    loaded = prepare(replace(board, setups=(replace(setup, attached=(sensor,)),))).board
+    estimate = weighted_least_squares(loaded)
+
+    for source, told in (("published", True), ("training", True), ("sensitivity", False)):
+        (origin,) = paper_system(loaded, estimate, source, compared=False).origins
+        assert ("its plates have no attached mass" in origin.sentence) == told
+    sheared, estimate = estimates[FINNISH, ("transverse_shear",)]
+    assert "have no" not in paper_system(sheared, estimate, compared=False).origins[0].sentence
