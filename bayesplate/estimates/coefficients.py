@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -17,9 +17,10 @@ from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
 from bayesplate.modes.naming import find
+from bayesplate.modes.plate import Beams
 from bayesplate.modes.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
 from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.material import moduli
+from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.setup import Setup
 
 CoefficientSource = Literal["sensitivity", "training", "published"]
@@ -39,6 +40,9 @@ class CoefficientRows:
     Attributes
     ----------
     source : "sensitivity", "training" or "published"
+    readings : (n_modes,) array of int
+        Which readings of the setup they are of: all of them, but for peaks without a sure label that are modes which a
+        printed table lacks.
     coefficients : (n_modes, 3) array
         Columns a, b, c.
     rest : (n_modes,) array, N m
@@ -55,6 +59,7 @@ class CoefficientRows:
     """
 
     source: CoefficientSource
+    readings: NDArray[np.intp]
     coefficients: NDArray[np.float64]
     rest: NDArray[np.float64]
     aspect_ratio: float
@@ -114,7 +119,8 @@ def _by_sensitivity(model: SetupModel, values: Values) -> CoefficientRows:
     sentence = f"energy shares of one solve at the weighted least-squares estimate, {theory} plate, ratio {ratio:.4g}"
     if found.rest.any():
         sentence += "; what the effects give is taken off first"
-    return CoefficientRows("sensitivity", found.coefficients, found.rest, ratio, theory, sentence, {})
+    every = np.arange(len(model.setup.readings))
+    return CoefficientRows("sensitivity", every, found.coefficients, found.rest, ratio, theory, sentence, {})
 
 
 def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
@@ -132,7 +138,8 @@ def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
         f"{_without(model)}"
     )
     r_squared = {reading.label: trained[reading.beams].r_squared for reading in setup.readings}
-    return CoefficientRows("training", rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
+    every = np.arange(len(beams))
+    return CoefficientRows("training", every, rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
 
 
 def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingConstants, str]:
@@ -169,9 +176,12 @@ def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
 def _published(board_name: str, model: SetupModel, values: Values, compared: bool) -> CoefficientRows:
     setup = model.setup
     card = named_table(board_name, setup)
-    there = {label: _label_in_table(card, setup, label) for label in setup.labels}
-    rows = np.array([card.table[one] for one in there.values()])
-    distances = _distances(card, setup, rows, _thickness_ratio(values, setup)) if compared else {}
+    own = [_label_in_table(card, setup, label) for label in setup.labels]
+    known = np.array([i for i, label in enumerate(own) if label in card.table], dtype=np.intp)
+    there = {setup.labels[i]: own[i] for i in known}
+    rows = np.array([card.table[one] for one in there.values()]).reshape(-1, len(RIGIDITIES))
+    beams = [setup.readings[i].beams for i in known]
+    distances = _distances(card, setup, beams, rows, _thickness_ratio(values, setup)) if compared and beams else {}
     theory = min(distances.items(), key=lambda item: item[1])[0] if distances else "not stated"
     sentence = f"printed table {card.name}: {card.title}"
     if distances:
@@ -182,7 +192,8 @@ def _published(board_name: str, model: SetupModel, values: Values, compared: boo
         sentence += f"; its nu_xy is {card.training.nu_xy:.3g}, the board's {nu_xy:.3g}"
     sentence += _without(model)
     r_squared = {label: card.r_squared[one] for label, one in there.items() if one in card.r_squared}
-    return CoefficientRows("published", rows, np.zeros(len(rows)), card.aspect_ratio, theory, sentence, r_squared)
+    rest = np.zeros(len(rows))
+    return CoefficientRows("published", known, rows, rest, card.aspect_ratio, theory, sentence, r_squared)
 
 
 def named_table(board_name: str, setup: Setup) -> CoefficientCard:
@@ -264,7 +275,11 @@ def _label_in_table(card: CoefficientCard, setup: Setup, label: Label) -> Label:
 
 
 def _distances(
-    card: CoefficientCard, setup: Setup, rows: NDArray[np.float64], thickness_ratio: float
+    card: CoefficientCard,
+    setup: Setup,
+    beams: Sequence[Beams],
+    rows: NDArray[np.float64],
+    thickness_ratio: float,
 ) -> dict[Theory, float]:
     """How far a table's frequencies lie from plates of each theory in the middle of its training: rms, cents."""
     constants = _constants_of(card)
@@ -274,7 +289,6 @@ def _distances(
     if own.thickness_mm is not None and own.length_x_mm is not None:
         thickness_ratio = own.thickness_mm / own.length_x_mm
     theories: tuple[Theory, ...] = ("thin",) if constants.G_xz is None or constants.G_yz is None else get_args(Theory)
-    beams = [reading.beams for reading in setup.readings]
     distances: dict[Theory, float] = {}
     for theory in theories:
         weights = training_weights(card.aspect_ratio, thickness_ratio, constants, theory)

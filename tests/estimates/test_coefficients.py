@@ -13,7 +13,9 @@ from bayesplate.errors import InputError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import paper_system
+from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.labels import Label
+from bayesplate.plate.measured import Peak
 from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.inference import pose
 from bayesplate.quantities import Quantity
@@ -165,3 +167,27 @@ def test_a_table_says_which_effects_of_the_board_its_plates_lack(estimates):
         assert ("its plates have no attached mass" in origin.sentence) == told
     sheared, estimate = estimates[FINNISH, ("transverse_shear",)]
     assert "have no" not in paper_system(sheared, estimate, compared=False).origins[0].sentence
+
+
+def test_a_peak_of_a_mode_that_the_table_lacks_is_left_out(estimates):
+    """(3,0) of the paper's board at 898 Hz: the fit proposes that label, and the printed table ends at (2,2)."""
+    board, _ = estimates[FINNISH, ()]
+    (setup,) = board.setups
+    peak = Peak(Quantity.exact(898.0))
+    with_peak = prepare(replace(board, setups=(replace(setup, peaks=(peak,)),))).board
+    problem = pose(with_peak, load_prior("weakly-informative"))
+    system = paper_system(problem.board, problem.estimate)
+    alone = paper_system(board, estimates[FINNISH, ()][1])
+
+    assert problem.board.setups[0].labels == (*setup.labels, Label(3, 0))
+    np.testing.assert_array_equal(system.coefficients, alone.coefficients)
+    np.testing.assert_array_equal(system.psi, alone.psi)
+    assert system.origins[0].sentence == alone.origins[0].sentence
+    assert paper_system(problem.board, problem.estimate, "sensitivity").psi.size == len(setup.labels) + 1
+
+
+def test_fewer_modes_than_constants_have_no_percentiles(estimates):
+    board, estimate = estimates[FINNISH, ()]
+    system = paper_system(board, estimate, compared=False)
+
+    assert percentile_estimate(replace(system, psi=system.psi[:2], coefficients=system.coefficients[:2])) is None
