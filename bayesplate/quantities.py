@@ -373,8 +373,13 @@ class Quantity:
         -------
         array of the same shape, no unit
         """
-        low, high = (float(ndtr(bound)) for bound in self.standard_bounds)
-        return np.asarray(ndtri(low + (high - low) * np.asarray(probability, dtype=np.float64)))[()]
+        share = np.asarray(probability, dtype=np.float64)
+        low, high = self.standard_bounds
+        if low > 0:  # probabilities next to 1 have lost their digits: the same from the other end
+            above, beyond = float(ndtr(-low)), float(ndtr(-high))
+            return np.asarray(-ndtri(beyond + (above - beyond) * (1.0 - share)))[()]
+        below, within = float(ndtr(low)), float(ndtr(high))
+        return np.asarray(ndtri(below + (within - below) * share))[()]
 
     def quantile(self, probability: ArrayLike) -> Floats:
         """The value below which the quantity lies with a given probability.

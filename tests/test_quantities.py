@@ -114,6 +114,18 @@ def test_truncation_far_out_in_a_tail(sign: float) -> None:
     assert float(np.exp(tail.log_prior(sign * 40.0))) == pytest.approx(40 + 1 / 40, rel=1e-5)
 
 
+@pytest.mark.parametrize("bound", [2.0, 9.0, 30.0])
+def test_quantiles_far_out_in_a_tail_are_alike_on_both_sides(bound: float) -> None:
+    probability = np.array([0.0, 0.05, 0.5, 0.95, 1.0])
+    above = Quantity.from_mean(0.0, 1.0, "normal", lower=bound, upper=bound + 5.0)
+    below = Quantity.from_mean(0.0, 1.0, "normal", lower=-bound - 5.0, upper=-bound)
+    found = above.quantile(probability)
+
+    assert found == pytest.approx(-below.quantile(probability[::-1]), rel=1e-12)
+    assert found[[0, -1]] == pytest.approx([bound, bound + 5.0], rel=1e-6)
+    assert np.all(np.diff(found) > 0)
+
+
 def test_scaled_changes_the_unit_of_all_but_the_places() -> None:
     millimetres = Quantity.from_readings([2.9, 3.1], 0.1, at_x=[0, 100], at_y=[5, 5])
     metres = millimetres.scaled(1e-3)

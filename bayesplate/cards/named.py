@@ -52,7 +52,8 @@ def _prior_numbers(prior: PriorCard) -> list[str]:
 
 
 def _table_numbers(table: CoefficientCard) -> list[str]:
-    return [f"{table.aspect_ratio!r} {table.edges!r}", *(f"{label} {row!r}" for label, row in table.table.items())]
+    first = f"{table.aspect_ratio!r} {table.edges!r} {table.first_label}"
+    return [first, *(f"{label} {row!r}" for label, row in table.table.items())]
 
 
 def load_named(

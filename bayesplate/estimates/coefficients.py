@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,19 +11,25 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import CoefficientCard
 from bayesplate.cards.words import setup_places
+from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
 from bayesplate.modes.naming import find
+from bayesplate.modes.plate import Beams
 from bayesplate.modes.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
 from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.material import moduli
+from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.setup import Setup
 
 CoefficientSource = Literal["sensitivity", "training", "published"]
 SAME_ASPECT = 0.01
 """Relative difference up to which a table counts as made for the aspect ratio of a board."""
+SAME_POISSON = 0.01
+"""Difference up to which a table counts as made for the Poisson ratio of a board; it moves E_y by 0.1 %."""
+_OF_TRAINING = ("transverse_shear", "poisson_ratio")
+"""Effects that the plates of a training have where the board has them."""
 _GPA = 1e9
 
 
@@ -34,6 +40,9 @@ class CoefficientRows:
     Attributes
     ----------
     source : "sensitivity", "training" or "published"
+    readings : (n_modes,) array of int
+        Which readings of the setup they are of: all of them, but for peaks without a sure label that are modes which a
+        printed table lacks.
     coefficients : (n_modes, 3) array
         Columns a, b, c.
     rest : (n_modes,) array, N m
@@ -50,6 +59,7 @@ class CoefficientRows:
     """
 
     source: CoefficientSource
+    readings: NDArray[np.intp]
     coefficients: NDArray[np.float64]
     rest: NDArray[np.float64]
     aspect_ratio: float
@@ -109,7 +119,8 @@ def _by_sensitivity(model: SetupModel, values: Values) -> CoefficientRows:
     sentence = f"energy shares of one solve at the weighted least-squares estimate, {theory} plate, ratio {ratio:.4g}"
     if found.rest.any():
         sentence += "; what the effects give is taken off first"
-    return CoefficientRows("sensitivity", found.coefficients, found.rest, ratio, theory, sentence, {})
+    every = np.arange(len(model.setup.readings))
+    return CoefficientRows("sensitivity", every, found.coefficients, found.rest, ratio, theory, sentence, {})
 
 
 def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
@@ -124,27 +135,33 @@ def _by_training(model: SetupModel, values: Values) -> CoefficientRows:
         f"non-negative planes through {min(counts)} to {max(counts)} of {len(FACTORS) ** 2} computed plates, {theory}, "
         f"ratio {ratio:.4g}, around E_x {centre.E_x / _GPA:.3g}, E_y {centre.E_y / _GPA:.3g}, "
         f"G_xy {centre.G_xy / _GPA:.3g} GPa ({origin})"
+        f"{_without(model)}"
     )
     r_squared = {reading.label: trained[reading.beams].r_squared for reading in setup.readings}
-    return CoefficientRows("training", rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
+    every = np.arange(len(beams))
+    return CoefficientRows("training", every, rows, np.zeros(len(beams)), ratio, theory, sentence, r_squared)
 
 
 def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingConstants, str]:
-    """Plate in the middle of the training: that of the named table, else the estimate itself."""
-    setup = model.setup
-    if setup.published_coefficients is not None:
-        printed = _constants_of(setup.published_coefficients)
-        if printed is not None and (not _has_shear(model) or (printed.G_xz and printed.G_yz)):
-            return printed, f"those of {setup.published_coefficients.name}"
-    E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
+    """Plate in the middle of the training: that of the named table, else the estimate itself.
+
+    Its Poisson ratio and shear moduli are the board's own: the coefficients go with them, and so do the moduli.
+    """
     there = model.system.adjusted(values)
-    shear = {name: float(there[name]) for name in ("G_xz", "G_yz") if _has_shear(model)}
+    shear = {name: float(there[name]) for name in ("G_xz", "G_yz") if model.system.theory == "shear-flexible"}
+    E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     own = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
-    return own, "the weighted least-squares estimate"
+    table = model.setup.published_coefficients
+    printed = None if table is None else _constants_of(table)
+    if table is None or printed is None:
+        return own, "the weighted least-squares estimate"
+    return replace(own, E_x=printed.E_x, E_y=printed.E_y, G_xy=printed.G_xy), f"those of {table.name}"
 
 
-def _has_shear(model: SetupModel) -> bool:
-    return model.system.theory == "shear-flexible"
+def _without(model: SetupModel) -> str:
+    """What the plates of a training and of a printed table lack: the board's effects but shear, which they may have."""
+    lacking = [one.name for one in model.system.effects if one.name not in _OF_TRAINING]
+    return f"; its plates have no {effect_names(lacking, 'or')}, which the board has" if lacking else ""
 
 
 def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
@@ -159,15 +176,24 @@ def _constants_of(card: CoefficientCard) -> TrainingConstants | None:
 def _published(board_name: str, model: SetupModel, values: Values, compared: bool) -> CoefficientRows:
     setup = model.setup
     card = named_table(board_name, setup)
-    rows = np.array([card.table[label] for label in setup.labels])
-    distances = _distances(card, setup, rows, _thickness_ratio(values, setup)) if compared else {}
+    own = [_label_in_table(card, setup, label) for label in setup.labels]
+    known = np.array([i for i, label in enumerate(own) if label in card.table], dtype=np.intp)
+    there = {setup.labels[i]: own[i] for i in known}
+    rows = np.array([card.table[one] for one in there.values()]).reshape(-1, len(RIGIDITIES))
+    beams = [setup.readings[i].beams for i in known]
+    distances = _distances(card, setup, beams, rows, _thickness_ratio(values, setup)) if compared and beams else {}
     theory = min(distances.items(), key=lambda item: item[1])[0] if distances else "not stated"
     sentence = f"printed table {card.name}: {card.title}"
     if distances:
         told = " and ".join(f"{rms:.1f} cents from {name} plates" for name, rms in distances.items())
         sentence += f"; at its own material it lies {told} solved here, so it holds for the {theory} plate"
-    r_squared = {label: r for label, r in card.r_squared.items() if label in setup.labels}
-    return CoefficientRows("published", rows, np.zeros(len(rows)), card.aspect_ratio, theory, sentence, r_squared)
+    nu_xy = float(values["poisson_xy"])
+    if card.training.nu_xy is not None and abs(card.training.nu_xy - nu_xy) > SAME_POISSON:
+        sentence += f"; its nu_xy is {card.training.nu_xy:.3g}, the board's {nu_xy:.3g}"
+    sentence += _without(model)
+    r_squared = {label: card.r_squared[one] for label, one in there.items() if one in card.r_squared}
+    rest = np.zeros(len(rows))
+    return CoefficientRows("published", known, rows, rest, card.aspect_ratio, theory, sentence, r_squared)
 
 
 def named_table(board_name: str, setup: Setup) -> CoefficientCard:
@@ -235,15 +261,25 @@ def _misfits(card: CoefficientCard, setup: Setup, board: Board, place: str) -> l
     if is_board and abs(card.aspect_ratio * length_y / length_x - 1.0) > SAME_ASPECT:
         wanted = f"a table of aspect ratio {length_x / length_y:.4g}"
         faults.append(Fault(place, wanted, f"{card.name}, made for {card.aspect_ratio:.4g}"))
-    missing = [str(label) for label in setup.labels if label not in card.table]
+    missing = [str(label) for label in setup.labels if _label_in_table(card, setup, label) not in card.table]
     if missing:
-        known = ", ".join(str(label) for label in card.table)
+        m, n = setup.first_label.m - card.first_label.m, setup.first_label.n - card.first_label.n
+        known = ", ".join(f"({label.m + m},{label.n + n})" for label in card.table)
         faults.append(Fault(place, f"a table with the labels {', '.join(missing)}", f"{card.name} with {known}"))
     return faults
 
 
+def _label_in_table(card: CoefficientCard, setup: Setup, label: Label) -> Label:
+    """What a table calls the mode of a setup's label: each counts from a first label of its own."""
+    return Label(label.m - setup.first_label.m + card.first_label.m, label.n - setup.first_label.n + card.first_label.n)
+
+
 def _distances(
-    card: CoefficientCard, setup: Setup, rows: NDArray[np.float64], thickness_ratio: float
+    card: CoefficientCard,
+    setup: Setup,
+    beams: Sequence[Beams],
+    rows: NDArray[np.float64],
+    thickness_ratio: float,
 ) -> dict[Theory, float]:
     """How far a table's frequencies lie from plates of each theory in the middle of its training: rms, cents."""
     constants = _constants_of(card)
@@ -253,7 +289,6 @@ def _distances(
     if own.thickness_mm is not None and own.length_x_mm is not None:
         thickness_ratio = own.thickness_mm / own.length_x_mm
     theories: tuple[Theory, ...] = ("thin",) if constants.G_xz is None or constants.G_yz is None else get_args(Theory)
-    beams = [reading.beams for reading in setup.readings]
     distances: dict[Theory, float] = {}
     for theory in theories:
         weights = training_weights(card.aspect_ratio, thickness_ratio, constants, theory)

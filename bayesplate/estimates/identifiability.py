@@ -18,6 +18,8 @@ WITHIN_A_FACTOR = 2.0
 
 HIGH_LEVERAGE = 0.9
 LOW_SHARE_PERCENT = 60.0
+_HELD = {"clamped", "supported"}
+"""Edges that do not move: where all are, the integral of w_xx w_yy is that of w_xy^2."""
 _MODULUS = {"D_x": "E_x", "D_y": "E_y", "D_s": "G_xy"}
 _HELP = {
     "D_x": "a mode that bends along the grain",
@@ -156,10 +158,11 @@ def remarks(board: Board, found: Identifiability) -> tuple[str, ...]:
                 sentences.append(
                     f"mode {name} alone carries a constant (leverage {leverage:.2f}): an error in it cannot be seen"
                 )
-    for setup in board.setups:
-        if set(setup.edges.values()) == {"clamped"}:
+    if all(set(setup.edges.values()) <= _HELD for setup in board.setups):
+        for setup in board.setups:
+            held = "clamped" if set(setup.edges.values()) == {"clamped"} else "held"
             sentences.append(
-                f"setup {setup.name} is clamped all round: only D_s + 2 nu_xy D_y is seen, so G_xy depends on nu_xy"
+                f"setup {setup.name} is {held} all round: only D_s + 2 nu_xy D_y is seen, so G_xy depends on nu_xy"
             )
     return tuple(sentences)
 

@@ -97,6 +97,7 @@ def paper_system(
     Returns
     -------
     PaperSystem
+        Of all readings, but for peaks without a sure label that are modes which a printed table lacks.
 
     Raises
     ------
@@ -108,7 +109,7 @@ def paper_system(
         coefficient_rows(board.name, model, estimate.values, source, compared=compared) for model in estimate.models
     )
     psi = [
-        (2.0 * np.pi * setup.measured) ** 2 * inverse_lambda(values, setup) - origin.rest
+        (2.0 * np.pi * setup.measured[origin.readings]) ** 2 * inverse_lambda(values, setup) - origin.rest
         for setup, origin in zip(board.setups, origins, strict=True)
     ]
     rows = [origin.coefficients for origin in origins]

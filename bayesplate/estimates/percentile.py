@@ -57,14 +57,14 @@ def percentile_estimate(system: PaperSystem) -> PercentileEstimate | None:
     Returns
     -------
     PercentileEstimate or None
-        None for more modes than `MOST_MODES`.
+        None for fewer modes than constants, or more than `MOST_MODES`.
 
     References
     ----------
     Ducceschi et al., section 5 and the table of results.
     """
     n_modes = system.psi.size
-    if n_modes > MOST_MODES:
+    if not len(MODULI) <= n_modes <= MOST_MODES:
         return None
     subsets = (np.array(list(combinations(range(n_modes), size))) for size in range(3, n_modes + 1))
     constants = np.concatenate([system.solve(rows) for rows in subsets])

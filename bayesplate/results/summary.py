@@ -173,7 +173,7 @@ class Summary(Run):
     weighted_least_squares : PointEstimate
         That of relative errors.
     percentile : Percentile or None
-        None where there are too many modes, or no estimate is positive.
+        None where there are too few or too many modes, or no estimate is positive.
     linear_means, exact_means : LawMeans
     modes : tuple of ModeRow
     peaks : tuple of AssignedPeak

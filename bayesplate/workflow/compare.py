@@ -144,13 +144,16 @@ def compare(
         for setup in board.setups:
             named_table(board.name, setup)
     problems = [pose(one.board, one.prior, robust=given.robust).under("exact") for one in prepared]
-    systems = [paper_system(problem.board, problem.estimate, coefficients) for problem in problems]
+    for problem in problems:  # what cannot be used is told before anything is sampled
+        paper_system(problem.board, problem.estimate, coefficients, compared=False)
     theories: list[TheoryRow] = []
     sampled: dict[str, tuple[Inference, Draws]] = {}
-    for problem, system in zip(problems, systems, strict=True):
-        methods = point_methods(problem, system, expected_sd(problem))
+    for problem in problems:
         posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
-        theories.append(theory_row(problem, system, [*methods, *posteriors], mode_errors(inference, draws)))
+        labelled = inference.problem  # as the draws label its peaks: all methods are held against the same readings
+        system = paper_system(labelled.board, labelled.estimate, coefficients)
+        methods = [*point_methods(labelled, system, expected_sd(labelled)), *posteriors]
+        theories.append(theory_row(labelled, system, methods, mode_errors(inference, draws)))
         sampled[theories[-1].theory] = inference, draws
     result = CompareResult(
         format=FORMAT,
@@ -172,8 +175,12 @@ def compare(
 def _posteriors(
     problem: PosedProblem, settings: SamplerSettings, progress: Tell
 ) -> tuple[list[Method], Inference, Draws]:
-    """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough."""
+    """The posteriors of both laws: the wider, exact one sampled, the linear one by weights where these leave enough.
+
+    Of the problem as the exact draws label its peaks.
+    """
     inference, draws = _sampled(problem, settings, progress)
+    problem = inference.problem
     methods = []
     for law in get_args(LawName):
         weights = law_weights(inference, draws, law)

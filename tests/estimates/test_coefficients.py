@@ -13,8 +13,12 @@ from bayesplate.errors import InputError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import paper_system
+from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.labels import Label
+from bayesplate.plate.measured import Peak
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.inference import pose
+from bayesplate.quantities import Quantity
 from bayesplate.results.references import references
 from bayesplate.workflow.prepare import prepare
 
@@ -120,3 +124,70 @@ def test_a_board_without_a_table_has_no_published_coefficients(estimates):
     assert paper_system(without, bare).origins[0].source == "sensitivity"
     with pytest.raises(InputError, match=r"wanted the name of a table, got nothing \(take --coefficients sensitivity"):
         paper_system(without, bare, "published")
+
+
+def test_a_table_is_read_in_its_own_names_of_the_modes(estimates):
+    """A laboratory that counts a cantilever's modes from (0,0) has the coefficients of one that begins with (1,0)."""
+    board, estimate = estimates[FINNISH, ()]
+    (setup,) = board.setups
+    readings = tuple(replace(one, label=Label(one.label.m - 1, one.label.n)) for one in setup.readings)
+    other = replace(board, setups=(replace(setup, first_label=Label(0, 0), readings=readings),))
+    models = (replace(m, system=replace(m.system, setup=other.setups[0])) for m in estimate.models)
+    here = paper_system(other, replace(estimate, models=tuple(models)), "published", compared=False)
+    there = paper_system(board, estimate, "published", compared=False)
+
+    assert coefficient_faults(other) == []
+    np.testing.assert_array_equal(here.coefficients, there.coefficients)
+    assert list(here.origins[0].r_squared.values()) == list(there.origins[0].r_squared.values())
+    assert list(here.origins[0].r_squared) == list(other.setups[0].labels)
+
+
+def test_a_training_has_the_poisson_ratio_of_the_board(estimates):
+    """Its plates had that of the named table: 1 to 2 % in the moduli, where the board's own is 0.3."""
+    board, _ = estimates[FINNISH, ()]
+    other = board.with_priors({"poisson_xy": 0.3})
+    estimate = weighted_least_squares(other)
+    systems = [paper_system(other, estimate, source) for source in ("sensitivity", "training", "published")]
+    one_solve, trained, _ = (np.array(system.moduli(system.solve())) for system in systems)
+
+    np.testing.assert_allclose(trained, one_solve, rtol=0.005)
+    assert "its nu_xy is 0.51, the board's 0.3" in systems[2].origins[0].sentence
+    assert "nu_xy" not in paper_system(board, estimates[FINNISH, ()][1]).origins[0].sentence
+
+
+def test_a_table_says_which_effects_of_the_board_its_plates_lack(estimates):
+    board, _ = estimates[FINNISH, ()]
+    (setup,) = board.setups
+    sensor = AttachedItem("accelerometer", ((0.24, 0.02),), Quantity.exact(0.003))
+    loaded = prepare(replace(board, setups=(replace(setup, attached=(sensor,)),))).board
+    estimate = weighted_least_squares(loaded)
+
+    for source, told in (("published", True), ("training", True), ("sensitivity", False)):
+        (origin,) = paper_system(loaded, estimate, source, compared=False).origins
+        assert ("its plates have no attached mass" in origin.sentence) == told
+    sheared, estimate = estimates[FINNISH, ("transverse_shear",)]
+    assert "have no" not in paper_system(sheared, estimate, compared=False).origins[0].sentence
+
+
+def test_a_peak_of_a_mode_that_the_table_lacks_is_left_out(estimates):
+    """(3,0) of the paper's board at 898 Hz: the fit proposes that label, and the printed table ends at (2,2)."""
+    board, _ = estimates[FINNISH, ()]
+    (setup,) = board.setups
+    peak = Peak(Quantity.exact(898.0))
+    with_peak = prepare(replace(board, setups=(replace(setup, peaks=(peak,)),))).board
+    problem = pose(with_peak, load_prior("weakly-informative"))
+    system = paper_system(problem.board, problem.estimate)
+    alone = paper_system(board, estimates[FINNISH, ()][1])
+
+    assert problem.board.setups[0].labels == (*setup.labels, Label(3, 0))
+    np.testing.assert_array_equal(system.coefficients, alone.coefficients)
+    np.testing.assert_array_equal(system.psi, alone.psi)
+    assert system.origins[0].sentence == alone.origins[0].sentence
+    assert paper_system(problem.board, problem.estimate, "sensitivity").psi.size == len(setup.labels) + 1
+
+
+def test_fewer_modes_than_constants_have_no_percentiles(estimates):
+    board, estimate = estimates[FINNISH, ()]
+    system = paper_system(board, estimate, compared=False)
+
+    assert percentile_estimate(replace(system, psi=system.psi[:2], coefficients=system.coefficients[:2])) is None

@@ -13,6 +13,11 @@ from bayesplate.cards import load_prior
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.identifiability import identifiability, remarks, require_identifiable, require_labels
 from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.frequencies.spectrum import spectrum
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.setup import Setup
 from bayesplate.posterior.inference import pose
 from bayesplate.workflow.prepare import prepare
 
@@ -103,6 +108,45 @@ def test_a_fully_clamped_board_is_told_what_it_sees():
         sentences = " ".join(remarks(board, identifiability(estimate.sensitivities, estimate.scales)))
         assert ("only D_s + 2 nu_xy D_y is seen" in sentences) == told
         assert "G_xy" in sentences or not told
+
+
+@pytest.mark.parametrize(
+    ("edges", "told"),
+    [
+        (("clamped", "supported", "supported", "clamped"), True),
+        (("supported",) * 4, True),
+        (("clamped", "free", "supported", "supported"), False),
+    ],
+)
+def test_a_board_with_every_edge_held_is_told_what_it_sees(edges, told):
+    """What is told is what the frequencies do: they stay where D_s + 2 nu_xy D_y stays, or not."""
+    labels = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0)]
+    hertz = dict(zip(labels, (100, 150, 200, 260, 230), strict=True))
+    setup = Setup.from_frequencies(hertz, edges=dict(zip(("x0", "x1", "y0", "y1"), edges, strict=True)))
+    board = Board.from_numbers(
+        "held", length_x=0.25, length_y=0.18, thickness=0.003, density=450, poisson_xy=0.2, setups=setup
+    )
+    system = system_of(board, setup)
+    values = board.nominal() | dict(zip(RIGIDITIES, np.array([27.0, 3.0, 10.0]), strict=True))
+    other = values | {"poisson_xy": np.asarray(0.5), "D_s": np.asarray(10.0 - 2 * (0.5 - 0.2) * 3.0)}
+    here, there = ([mode.frequency for mode in spectrum(system, one, 6)[1]] for one in (values, other))
+    sentences = " ".join(remarks(board, identifiability(0.5 * np.eye(5, 3), np.full(5, 0.01))))
+
+    assert (float(np.abs(1200.0 * np.log2(np.divide(there, here))).max()) < 1e-6) == told
+    assert ("is held all round: only D_s + 2 nu_xy D_y is seen" in sentences) == told
+
+
+def test_a_free_session_tells_what_a_clamped_one_does_not():
+    clamped = Setup.from_frequencies({(0, 0): 300, (1, 0): 400, (0, 1): 500}, edges="clamped", name="clamped")
+    free = Setup.from_frequencies({(1, 1): 90, (2, 0): 240, (0, 2): 200}, edges="free", name="free")
+    board = Board.from_numbers(
+        "both", length_x=0.25, length_y=0.18, thickness=0.003, density=450, setups=[clamped, free]
+    )
+    found = identifiability(0.5 * np.eye(6, 3), np.full(6, 0.01))
+
+    assert "G_xy depends on nu_xy" not in " ".join(remarks(board, found))
+    alone = replace(board, setups=(clamped,))
+    assert "setup clamped is clamped all round" in " ".join(remarks(alone, found))
 
 
 def test_leverages_and_errors_are_those_of_linear_regression():

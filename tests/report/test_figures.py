@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,13 +11,17 @@ from diagnoses import DIAGNOSES
 from made_reports import fitted
 from payloads import PAYLOADS
 
+from bayesplate.plate.measured import Peak
+from bayesplate.quantities import Quantity
 from bayesplate.report.health import health_picture
-from bayesplate.report.page import pictures
+from bayesplate.report.page import percentiles_pictures, pictures
 from bayesplate.report.pairs import _broken
 from bayesplate.report.percentiles import percentiles_figure
 from bayesplate.report.priors import Compared, compared
 from bayesplate.report.residuals import predictive_picture
 from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
+from bayesplate.workflow.prepare import prepare
+from bayesplate.workflow.problem import Problem
 
 LONG_NAME = "a-cantilever-with-a-very-long-setup-name-beyond-all-reason"
 TWO_SETUPS = f"""\
@@ -253,3 +258,16 @@ def test_the_corner_plot_names_a_quantity_in_two_lines():
     assert _broken("shape 2 of thickness profile", 0.75) == "shape 2,\nthickness"
     assert _broken("Poisson ratio nu_xy", 1.5) == "Poisson nu_xy\n"
     assert _broken("compliance of clamp rotation", 0.75) == "compliance,\nclamp rotat…"
+
+
+def test_percentiles_are_of_the_modes_that_the_table_has():
+    """A peak of the paper's board whose mode the printed table lacks takes no part: 42 subsets of six modes."""
+    board = prepare("finnish-spruce-cantilever").board
+    bare = replace(board, setups=(replace(board.setups[0], peaks=(Peak(Quantity.exact(898.0)),)),))
+    problem = Problem.from_card(bare).posed
+    moduli = dict.fromkeys(("E_x", "E_y", "G_xy"), np.geomspace(5e8, 2e10, 8).reshape(2, 4))
+
+    (picture,) = percentiles_pictures(SimpleNamespace(problem=problem), SimpleNamespace(moduli=moduli))
+
+    assert len(problem.board.setups[0].readings) == 7
+    assert "42" in picture.caption

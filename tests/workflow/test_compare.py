@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import runs
 from click.testing import CliRunner
@@ -9,6 +11,7 @@ from click.testing import CliRunner
 from bayesplate.cli import main
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
+from bayesplate.plate.measured import Peak
 from bayesplate.results.contract import as_json
 from bayesplate.workflow.compare import compare
 from bayesplate.workflow.prepare import prepare
@@ -153,3 +156,20 @@ def test_input_is_refused_before_anything_is_sampled(tmp_path, monkeypatch):
     assert "compare.json already there (--force replaces them" in taken.stderr
     assert "published_coefficients: wanted the name of a table, got nothing" in no_table.stderr
     assert runs.files_in(tmp_path) == {"compare.json": b"mine"}
+
+
+def test_all_methods_stand_on_the_labels_that_the_draws_leave(monkeypatch):
+    """A label that was proposed for a peak and that the draws take back is in no method and no table."""
+    board = prepare("fiemme-spruce-clamped").board
+    (setup,) = board.setups
+    *sure, last = setup.readings
+    bare = replace(setup, readings=tuple(sure), peaks=(Peak(last.frequency),))
+    monkeypatch.setattr("bayesplate.posterior.inference.LIKELY", 1.0)
+    monkeypatch.setattr("bayesplate.workflow.compare._SHEAR", ())  # the thin plate twice: shear takes its time
+
+    result = compare(replace(board, setups=(bare,)))
+
+    for theory in result.theories:
+        assert [mode.label for mode in theory.modes] == [str(one.label) for one in sure]
+        for one in theory.methods:
+            assert [forward.label for forward in one.forward] == [str(one.label) for one in sure]
