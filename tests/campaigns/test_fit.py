@@ -14,6 +14,7 @@ from bayesplate.campaigns.boards import Member
 from bayesplate.cards import load_prior
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.results.folder import OutputFolder
 
 
 def test_the_files_of_a_campaign(fitted_campaign):
@@ -37,6 +38,20 @@ def test_the_files_of_a_campaign(fitted_campaign):
 def test_a_folder_in_use_is_refused_and_force_clears_it(fitted_campaign, card):
     with pytest.raises(InputError, match="one that exists"):
         bayesplate.fit(card, out=fitted_campaign.folder)
+
+
+def test_the_prior_card_of_an_earlier_run_goes_with_its_other_results(tmp_path):
+    """The next run may have no population, or not converge: a card that is left would pass for its own."""
+    (tmp_path / "summary.json").write_text("earlier")
+    (tmp_path / "together-population.toml").write_text("earlier")
+    (tmp_path / "mine.toml").write_text("mine")
+    folder = OutputFolder(tmp_path)
+    folder.open(resume=False)
+    (tmp_path / "summary.json").write_text("new")
+    folder.close()
+    folder.release()
+
+    assert {path.name for path in tmp_path.iterdir()} == {"summary.json", "mine.toml"}
 
 
 def test_what_cannot_be_shared_is_refused_board_by_board(tmp_path):
