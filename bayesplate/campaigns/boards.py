@@ -144,10 +144,24 @@ class Member:
         return Pull.of_draws(self.alone.z, self.alone.weights, [one.prior for one in self.shared])
 
     def likelihood(self, drawn: Sample, log_reference: LogDensity) -> SharedLikelihood:
-        """Its likelihood of the shared parameters, from a sample that is weighted to be where r is another density."""
+        """Its likelihood of the shared parameters, from a sample that is weighted to be where r is another density.
+
+        Draws that were walked anew lie away from the board's own, where the polynomial that follows them is only
+        extrapolated; what this board teaches the others rests on its own. So both go into it, half and half: they are
+        draws of L times the mean of both densities r, each over its evidence.
+        """
         weights = drawn.weights_under(log_reference)
-        log_evidence = drawn.log_evidence_under(log_reference)
-        return SharedLikelihood.found(drawn.z, weights, drawn.effective(weights), log_reference, log_evidence)
+        n_effective, log_evidence = drawn.effective(weights), drawn.log_evidence_under(log_reference)
+        own = self.alone
+        if drawn is own:
+            return SharedLikelihood.found(drawn.z, weights, n_effective, log_reference, log_evidence)
+
+        def log_either(z: Floats) -> Floats:
+            return np.logaddexp(self.log_prior(z) - own.log_evidence, log_reference(z) - log_evidence) - np.log(2.0)
+
+        z, both = np.concatenate([own.z, drawn.z]), 0.5 * np.concatenate([own.weights, weights])
+        of_both = 4.0 / (1.0 / own.effective(own.weights) + 1.0 / n_effective)
+        return SharedLikelihood.found(z, both, of_both, log_either, 0.0)
 
     def anew(self, log_reference: LogDensity, before: Sample, aim: tuple[Floats, Floats], seed: int) -> Sample:
         """Walk where the shared parameters have another density, and weight the draws by the law itself.

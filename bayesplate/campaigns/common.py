@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.frequencies.laws import cents
+from bayesplate.labels import Label
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Setup
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
@@ -49,26 +52,31 @@ class CommonResidual:
         return float(2.0 * t.sf(abs(self.mean_cents) / self.error_cents, self.degrees_of_freedom))
 
 
-def common_residuals(summaries: Mapping[str, Summary]) -> dict[str, CommonResidual]:
+def common_residuals(summaries: Mapping[str, Summary], boards: Mapping[str, Board]) -> dict[str, CommonResidual]:
     """Every mode that several boards have, in the order in which boards name them first.
+
+    A mode is the same where the setups have one name and are held alike, whatever label the laboratory begins at.
 
     Parameters
     ----------
     summaries : dict of Summary
         By board.
+    boards : dict of Board
+        The same boards.
 
     Returns
     -------
     dict of CommonResidual
-        By label; by setup and label where the boards' setups have different names.
+        By label, as the first board held so counts; by setup and label where the boards' setups have different names,
+        and by the letters of the edges where one name stands for several ways to hold a board.
     """
-    setups = {row.setup for summary in summaries.values() for row in summary.modes}
+    ways = _ways(summaries, boards)
     spare = {board: max(len(summary.modes) - N_RIGIDITIES, 0) for board, summary in summaries.items()}
     found: dict[str, dict[str, tuple[float, float]]] = {}
     for board, summary in summaries.items():
         for row in summary.modes:
             noise = float(cents(np.asarray(summary.noise[row.setup].q50)))
-            found.setdefault(_key(row, len(setups) > 1), {})[board] = (row.residual_cents, noise)
+            found.setdefault(_key(row, boards[board], ways), {})[board] = (row.residual_cents, noise)
     return {
         key: _pooled(each, sum(spare[board] for board in each)) for key, each in found.items() if len(each) >= FEWEST
     }
@@ -79,8 +87,30 @@ def clear_of_zero(common: Mapping[str, CommonResidual]) -> list[str]:
     return [label for label, one in common.items() if one.p_value * len(common) < CLEAR]
 
 
-def _key(row: ModeRow, has_setups: bool) -> str:
-    return f"{row.setup} {row.label}" if has_setups else row.label
+def _ways(summaries: Mapping[str, Summary], boards: Mapping[str, Board]) -> dict[tuple[str, str], Label]:
+    """The first label by name of a setup and letters of its edges, of the first board that was held so."""
+    found: dict[tuple[str, str], Label] = {}
+    for board, summary in summaries.items():
+        for row in summary.modes:
+            setup = boards[board].setup(row.setup)
+            found.setdefault((setup.name, _letters(setup)), setup.first_label)
+    return found
+
+
+def _key(row: ModeRow, board: Board, ways: Mapping[tuple[str, str], Label]) -> str:
+    setup, label = board.setup(row.setup), Label.parse(row.label)
+    way = (setup.name, _letters(setup))
+    first = ways[way]
+    shown = Label(label.m - setup.first_label.m + first.m, label.n - setup.first_label.n + first.n)
+    has_names = len({name for name, _ in ways}) > 1
+    is_held_in_several = len([name for name, _ in ways if name == setup.name]) > 1
+    parts = [part for part, is_told in zip(way, (has_names, is_held_in_several), strict=True) if is_told]
+    return " ".join([*parts, str(shown)])
+
+
+def _letters(setup: Setup) -> str:
+    """Like "CFFF", in the paper's order x0, y0, x1, y1."""
+    return "".join(setup.edges[edge][0].upper() for edge in ("x0", "y0", "x1", "y1"))
 
 
 def _pooled(each: Mapping[str, tuple[float, float]], n_spare: int) -> CommonResidual:

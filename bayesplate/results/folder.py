@@ -23,6 +23,8 @@ BEFORE = "before"
 """Subfolder of the fit that a diagnosis questioned, where it was fitted again."""
 BOARDS = "boards"
 """Subfolder of a campaign, with one folder for each of its boards."""
+OF_POPULATION = "-population"
+"""What the name of the prior card ends with that a campaign leaves for its next board."""
 PAGE = "report.html"
 FIGURES = "figures"
 CONSTANTS = ("constants.csv", "constants.tex")
@@ -148,7 +150,8 @@ class OutputFolder:
         boards = (
             path for name in RESULTS for part in (BOARDS, BEFORE) for path in (self.path / part).glob(f"*/{name}")
         )
-        return [*(self.path / name for name in RESULTS), *before, *boards, *drawn]
+        priors = self.path.glob(f"*{OF_POPULATION}.toml")
+        return [*(self.path / name for name in RESULTS), *before, *boards, *drawn, *priors]
 
     @property
     def has_checkpoint(self) -> bool:

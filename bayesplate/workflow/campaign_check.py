@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bayesplate.campaigns.checking import CampaignCheck, CheckedShared
 from bayesplate.campaigns.given import GivenShared
-from bayesplate.campaigns.pulls import Pull
+from bayesplate.campaigns.pulls import Pull, moments_before
 from bayesplate.campaigns.scatter import expected_width
+from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.workflow.campaign import Campaign
@@ -32,14 +35,9 @@ def check_campaign(campaign: Campaign) -> CampaignCheck:
 def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
     """What normal approximations of the boards' posteriors say of the shared numbers."""
     pulls = {one.board.name: _pull(one.posed, campaign) for one in campaign.problems}
-    n, width = len(campaign.shared), expected_width(campaign.shared)
-
-    def sds(*some: Pull) -> list[float]:
-        total = np.eye(n) + np.sum([one.precision for one in some], axis=0)
-        return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(total)))]
-
-    alone = {name: sds(pull) for name, pull in pulls.items()}
-    every = sds(*(one.scattered(width) for one in pulls.values()))
+    width = expected_width(campaign.shared)
+    alone = {name: expected_sds(campaign.shared, [pull]) for name, pull in pulls.items()}
+    every = expected_sds(campaign.shared, [one.scattered(width) for one in pulls.values()])
     return {
         one.name: CheckedShared(
             unit=one.unit,
@@ -51,6 +49,13 @@ def _shared(campaign: Campaign) -> dict[str, CheckedShared]:
         )
         for i, one in enumerate(campaign.shared)
     }
+
+
+def expected_sds(shared: Sequence[Shared], pulls: Sequence[Pull]) -> list[float]:
+    """Standard deviation of each shared number after what some boards say, over that of its prior, bounds kept."""
+    before = np.array([moments_before(one.prior)[1] for one in shared])
+    precision = np.diag(1.0 / before) + np.sum([one.precision for one in pulls], axis=0)
+    return [float(sd) for sd in np.sqrt(np.diagonal(np.linalg.inv(precision)) / before)]
 
 
 def _pull(posed: PosedProblem, campaign: Campaign) -> Pull:

@@ -36,6 +36,7 @@ from bayesplate.results.contract import as_json
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
 from bayesplate.workflow.campaign import Campaign
 from bayesplate.workflow.campaign_fit import (
+    boards_of,
     fit_boards,
     fitted_together,
     open_folder,
@@ -270,7 +271,7 @@ def _diagnosis(
         before=PooledErrors(pooled_before, left_before),
         after=PooledErrors(pooled_after, left_after),
         common_residual=after.summary.common_residual,
-        common_residual_before=common_residuals({name: one.summary for name, one in before.items()}),
+        common_residual_before=common_residuals({name: one.summary for name, one in before.items()}, boards_of(before)),
         recommendation=next_step(
             after.summary.common_residual,
             claim,

@@ -24,6 +24,7 @@ from bayesplate.campaigns.summary import (
     shared_numbers,
 )
 from bayesplate.errors import CheckpointError, NotConvergedError
+from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings
@@ -204,12 +205,17 @@ def _summary(
         converged=True,
         shared={} if learnt is None else shared_numbers(learnt, seed),
         left_out_boards={} if learnt is None else left_out_boards(learnt),
-        common_residual=common_residuals(summaries),
+        common_residual=common_residuals(summaries, boards_of(boards)),
         population=None if population is None or prior is None else population_summary(population, prior.name, seed),
         boards=summaries,
         sampler=None if learnt is None else sampler_health(learnt.chains, learnt.convergence),
         warnings=warnings,
     )
+
+
+def boards_of(found: Mapping[str, Fitted]) -> dict[str, Board]:
+    """The boards that were fitted, by name."""
+    return {name: one.inference.problem.board for name, one in found.items()}
 
 
 def _refusing(name: str) -> Callable[[Inference], None]:

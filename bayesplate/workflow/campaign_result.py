@@ -26,6 +26,7 @@ from bayesplate.results.contract import as_json
 from bayesplate.results.folder import (
     ARCHIVE,
     BOARDS,
+    OF_POPULATION,
     PAGE,
     SUMMARY,
     json_text,
@@ -76,7 +77,7 @@ class CampaignFitResult:
             return None
         source = f"{len(self.boards)} boards of the campaign {self.campaign.name}"
         rng = np.random.default_rng([self.summary.seed, _BOARD_LINE])
-        return prior_of(self.population, f"{self.campaign.name}-population", source, rng)
+        return prior_of(self.population, f"{self.campaign.name}{OF_POPULATION}", source, rng)
 
     @cached_property
     def plot(self) -> CampaignPlots:

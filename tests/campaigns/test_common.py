@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from bayesplate.campaigns.claim import SharedClaim
-from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero
+from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero, common_residuals
 from bayesplate.campaigns.diagnosis import next_step, pooled_rms
 from bayesplate.campaigns.search import Explanation
+from bayesplate.plate.setup import Setup
 from bayesplate.posterior.parameters import N_RIGIDITIES
 
 N_MODES, N_CAMPAIGNS = 12, 400
@@ -101,3 +104,36 @@ def test_what_boards_have_of_their_own_is_to_be_declared(way, board, card):
 
 def test_pooled_errors_count_every_mode_once():
     assert pooled_rms({"a": 3.0, "b": 6.0}, {"a": 3, "b": 1}) == pytest.approx(np.sqrt((27.0 + 36.0) / 4.0))
+
+
+def read(edges, labels, first=(0, 0), name="setup"):
+    """What a board with one setup leaves over, 10 cents on each mode, and the board."""
+    setup = Setup.from_frequencies(dict.fromkeys(labels, 100.0), edges=edges, first_label=first, name=name)
+    rows = tuple(SimpleNamespace(setup=name, label=label, residual_cents=10.0) for label in labels)
+    summary = SimpleNamespace(modes=rows, noise={name: SimpleNamespace(q50=0.003)})
+    return summary, SimpleNamespace(setup=lambda _: setup)
+
+
+def pooled_of(**boards):
+    summaries, there = ({name: one[i] for name, one in boards.items()} for i in (0, 1))
+    return {key: tuple(one.boards) for key, one in common_residuals(summaries, there).items()}
+
+
+def test_a_mode_of_boards_that_are_held_otherwise_is_another_one():
+    """Their setups have the name that a card without one gets: (1,1) of a free plate is no mode of a clamped one."""
+    labels = ("(1,1)", "(2,1)")
+    found = pooled_of(a=read("free", labels), b=read("clamped", labels), c=read("free", labels[:1]))
+
+    assert found == {"FFFF (1,1)": ("a", "c")}
+
+
+def test_a_mode_is_the_same_wherever_labels_begin():
+    found = pooled_of(a=read("free", ("(1,1)", "(2,2)")), b=read("free", ("(2,2)", "(3,3)"), first=(1, 1)))
+
+    assert found == {"(1,1)": ("a", "b"), "(2,2)": ("a", "b")}
+
+
+def test_setups_of_different_names_are_told_apart_by_them():
+    boards = {"a": read("free", ("(1,1)",)), "b": read("free", ("(1,1)",)), "c": read("free", ("(1,1)",), name="hung")}
+
+    assert pooled_of(**boards) == {"setup (1,1)": ("a", "b")}

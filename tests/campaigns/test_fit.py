@@ -11,9 +11,14 @@ from made_campaigns import write_campaign
 
 import bayesplate
 from bayesplate.campaigns.boards import Member
+from bayesplate.campaigns.pulls import Pull
+from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import load_prior
 from bayesplate.errors import InputError
 from bayesplate.posterior.sampling import SamplerSettings
+from bayesplate.quantities import Quantity
+from bayesplate.results.folder import OutputFolder
+from bayesplate.workflow.campaign_check import expected_sds
 
 
 def test_the_files_of_a_campaign(fitted_campaign):
@@ -37,6 +42,20 @@ def test_the_files_of_a_campaign(fitted_campaign):
 def test_a_folder_in_use_is_refused_and_force_clears_it(fitted_campaign, card):
     with pytest.raises(InputError, match="one that exists"):
         bayesplate.fit(card, out=fitted_campaign.folder)
+
+
+def test_the_prior_card_of_an_earlier_run_goes_with_its_other_results(tmp_path):
+    """The next run may have no population, or not converge: a card that is left would pass for its own."""
+    (tmp_path / "summary.json").write_text("earlier")
+    (tmp_path / "together-population.toml").write_text("earlier")
+    (tmp_path / "mine.toml").write_text("mine")
+    folder = OutputFolder(tmp_path)
+    folder.open(resume=False)
+    (tmp_path / "summary.json").write_text("new")
+    folder.close()
+    folder.release()
+
+    assert {path.name for path in tmp_path.iterdir()} == {"summary.json", "mine.toml"}
 
 
 def test_what_cannot_be_shared_is_refused_board_by_board(tmp_path):
@@ -115,6 +134,19 @@ def test_check_says_what_the_boards_would_share(campaign):
     assert set(report.boards) == set(one.boards) == {"board-0", "board-1", "board-2"}
     assert one.expected_sd < min(one.boards.values()) < 1.0
     assert report.population == "spruce"
+
+
+@pytest.mark.parametrize(("lower", "sd_before"), [(-np.inf, 1.0), (0.0, np.sqrt(1.0 - 2.0 / np.pi))])
+def test_the_sd_to_expect_is_over_that_of_the_prior(lower, sd_before):
+    """That of a half-normal prior is 0.6 of its scale: far from its bound two boards of sd 0.1 leave 0.1 / 2^0.5."""
+    prior = Quantity.from_mean(0.0, 2e4, "normal", lower=lower)
+    shared = (Shared("support_stiffness", "stiffness", prior, "N/m^3"),)
+    z = np.random.default_rng(1).normal(1.2, 0.1, (20000, 1))
+    pull = Pull.of_draws(z, np.full(len(z), 1.0 / len(z)), [prior])
+
+    assert expected_sds(shared, [pull])[0] == pytest.approx(0.1 / sd_before, rel=0.03)
+    assert expected_sds(shared, [pull, pull])[0] == pytest.approx(0.1 / np.sqrt(2.0) / sd_before, rel=0.03)
+    assert expected_sds(shared, [Pull(np.zeros((1, 1)), np.zeros(1))]) == pytest.approx([1.0])
 
 
 def test_members_of_a_ratio_have_the_campaign_s_prior(fitted_campaign):

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from linear_boards import linear_boards
 from scipy import stats
 
+from bayesplate.campaigns.boards import Member, Sample
 from bayesplate.campaigns.evidence import bridge_sampling
 from bayesplate.campaigns.likelihood import _REACH, SharedLikelihood, _near
+from bayesplate.diagnosis.evidence.terms import log_sum
+from bayesplate.quantities import Quantity
 
 N = 6000
 Z_TRUE = [1.2, -0.7, 0.4]
@@ -122,3 +126,36 @@ def test_a_polynomial_is_believed_in_a_ball_about_its_draws():
     assert np.linalg.norm(_near(corners), axis=1) == pytest.approx(_REACH)
     assert _near(corners) == pytest.approx(corners * _REACH / np.linalg.norm(corners[0]))
     assert np.array_equal(_near(0.5 * corners), 0.5 * corners)
+
+
+def test_a_board_that_was_walked_anew_is_known_where_its_own_draws_are_as_well():
+    """The others learn of it from there: from draws near what they teach it alone, its peak would be extrapolated."""
+    rng, grid = np.random.default_rng(6), np.linspace(-6.0, 6.0, 24001)[:, None]
+    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    member = Member(None, None, (SimpleNamespace(prior=prior),))
+
+    def log_likelihood(z):
+        """A narrow peak, and a wide foot of what the board's noise makes up for."""
+        return np.logaddexp(-0.5 * ((z - 1.7) / 0.2) ** 2, -4.0 - 0.5 * ((z - 1.7) / 0.8) ** 2)[:, 0]
+
+    def log_near(z):
+        return -0.5 * ((z[:, 0] - 0.2) / 0.3) ** 2
+
+    def sample_of(log_reference, n):
+        log_density = log_reference(grid) + log_likelihood(grid)
+        weights = np.exp(log_density - log_density.max())
+        z = rng.choice(grid[:, 0], size=n, p=weights / weights.sum())[:, None]
+        log_evidence = float(np.log(np.exp(log_density).sum() * (grid[1, 0] - grid[0, 0])))
+        return Sample(z, z, np.zeros(n), n, log_reference, log_evidence, ())
+
+    def log_evidence_of(likelihood, log_reference):
+        return float(log_sum(log_reference(grid) + likelihood.at(grid)) + np.log(grid[1, 0] - grid[0, 0]))
+
+    vars(member)["alone"] = sample_of(member.log_prior, 8000)
+    anew = sample_of(log_near, 2048)
+    found = member.likelihood(anew, log_near)
+    extrapolated = SharedLikelihood.found(anew.z, anew.weights, 2048, log_near, anew.log_evidence)
+
+    assert log_evidence_of(found, log_near) == pytest.approx(anew.log_evidence, abs=0.1)
+    assert log_evidence_of(found, member.log_prior) == pytest.approx(member.alone.log_evidence, abs=0.1)
+    assert abs(log_evidence_of(extrapolated, member.log_prior) - member.alone.log_evidence) > 0.2
