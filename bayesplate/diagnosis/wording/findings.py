@@ -36,7 +36,7 @@ from bayesplate.effects.words import effect_names, joined
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
-from bayesplate.results.contract import Spread
+from bayesplate.results.contract import Spread, finite
 from bayesplate.results.summary import Summary
 
 Floats = NDArray[np.float64]
@@ -136,7 +136,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
         p_value=PValues(before=p_value_of(found, 0), after=p_value_of(found, verdict.index)),
         before=_errors(case, case.before),
         after=_errors(case, case.after),
-        gain_null_percentile=control.percentile_of(found.against_none) if found.ground.n_directions else None,
+        gain_null_percentile=None if (odds := _log_odds(found)) is None else control.percentile_of(odds),
         null_control=_null_control(case),
         elastic_shift=_elastic_shift(case),
         finalists=tuple(_finalist(answer, figures) for answer, figures in case.finalists),
@@ -177,7 +177,7 @@ def _null_control(case: Case) -> NullControlSummary:
     return NullControlSummary(
         n_sets=int(control.against.size),
         flagged_percent=100.0 * control.flagged,
-        log_odds=found.against_none if found.ground.n_directions else None,
+        log_odds=_log_odds(found),
         log_odds_needed=control.needed_from,
         log_odds_of_sets=_histogram(control.against),
         nested_ratio=ratio,
@@ -185,6 +185,11 @@ def _null_control(case: Case) -> NullControlSummary:
         nested_ratio_percentile=None if ratio is None else control.place_of(ratio),
         nested_ratio_of_sets=_histogram(np.array([np.nan]) if control.ratio is None else control.ratio),
     )
+
+
+def _log_odds(found: Found) -> float | None:
+    """ln of the odds that something is lacking; None where nothing is left to judge by, or nothing could be lacking."""
+    return finite(found.against_none) if found.ground.n_directions else None
 
 
 def _histogram(values: Floats) -> Histogram | None:
