@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.decision.claim import Claim
 from bayesplate.diagnosis.decision.constants import draw_constants
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, answers
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives_words, answer_words, answers
 from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
@@ -32,7 +32,7 @@ from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries,
 from bayesplate.diagnosis.wording.fates import ratio_words
 from bayesplate.diagnosis.wording.known import known_models
 from bayesplate.effects import EFFECTS
-from bayesplate.effects.words import effect_names, joined
+from bayesplate.effects.words import joined
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
@@ -240,9 +240,7 @@ def _words(case: Case, taken: Sequence[Answer]) -> str:
     """What a verdict stands for, as people read it: all of it if it is named, otherwise the alternatives."""
     if case.verdict.word == "named":
         return joined([answer_words(case.found, one) for one in taken])
-    singles = [effect_names([name]) for name in case.verdict.effects if name != RELABELLING]
-    exchanged = [answer_words(case.found, one) for one in taken if one.members == (RELABELLING,)]
-    return joined([*singles, *exchanged], "or")
+    return alternatives_words(case.found, taken)
 
 
 def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.diagnosis.evidence.terms import Terms
-from bayesplate.diagnosis.shifts.tables import nothing
+from bayesplate.diagnosis.shifts.tables import nothing, together
 from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
@@ -464,3 +464,17 @@ def test_a_board_that_declares_every_effect_has_no_odds():
     assert (told.verdict, told.null_control.log_odds, told.gain_null_percentile) == ("none needed", None, None)
     assert told.null_control.flagged_percent == 0.0
     json_text(diagnosis_json(told))
+
+
+def test_two_effects_that_are_one_alternative_stay_together():
+    """Neither of a pair explains the readings by itself: it is not told as two alternatives."""
+    found = made({}, residual=np.zeros(6))
+    ground = found.ground
+    tables = [ground.candidates[name].coarse for name in (SHEAR, AIR)]
+    pair = Hypothesis((SHEAR, AIR), 0.1, together(*tables), ground.hypotheses[0].noise)
+    shares = np.array([0.02, 0.01, 0.01, 0.4, 0.01, 0.55])
+    ground = replace(ground, hypotheses=(*ground.hypotheses, pair))
+    found = Found(ground, found.residual, np.log(shares), shares)
+    told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
+    assert (told.verdict, told.effects) == ("indistinguishable group", (SHEAR, AIR, GRAIN))
+    assert told.words == "transverse shear and air loading, or grain angle"
