@@ -12,6 +12,7 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Errors
 from bayesplate.effects.words import effect_name, joined
 
 MISSING = "–"
+TOO_FEW = "the readings are too few to choose anew without each of them"
 _UNLIKELY = 0.01
 """Probability below which an exchange of two labels is not worth showing: any two neighbours are a candidate."""
 
@@ -98,8 +99,10 @@ def claim_sentence(diagnosis: Diagnosis) -> str:
         return f"The {change}. No improvement is claimed."
     if diagnosis.claim:
         return f"The error of the prediction is reduced: the {change}, and every condition of that claim is met."
-    missed = joined([CONDITIONS[one.name].lacking for one in diagnosis.conditions if not one.is_met])
-    return f"The {change}. No improvement is claimed: {missed}."
+    missed = [
+        TOO_FEW if one.value is None else CONDITIONS[one.name].lacking for one in diagnosis.conditions if not one.is_met
+    ]
+    return f"The {change}. No improvement is claimed: {joined(list(dict.fromkeys(missed)))}."
 
 
 @dataclass(frozen=True)

@@ -175,6 +175,16 @@ def test_with_too_few_readings_the_error_that_both_models_have_is_told():
     assert claim_sentence(one).startswith("The error in the fit fell from 21.2 to 4.2 cents")
 
 
+def test_conditions_that_too_few_readings_leave_open_are_not_said_to_fail():
+    """Nothing was chosen anew without a reading, and so nothing is known of what that would have given."""
+    group = DIAGNOSES["indistinguishable group"]
+    unjudged = {"chance selection", "log score"}
+    few = [replace(c, value=None, limit=None, is_met=False) if c.name in unjudged else c for c in group.conditions]
+    assert claim_sentence(replace(group, conditions=tuple(few))).endswith(
+        "No improvement is claimed: the readings are too few to choose anew without each of them."
+    )
+
+
 def test_the_probabilities_sum_to_one_as_they_are_printed():
     table = answers_table(NAMED)
     assert (table.columns, table.rows) == (
