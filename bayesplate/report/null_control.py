@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _HEIGHT = 1.05
-_FEWEST_TICKS = 4
+_FEWEST_TICKS, _MOST_TICKS, _MOST_ZEROS = 4, 7, 3
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,16 @@ def _as_odds(panel: Axes) -> None:
     """Natural logarithms as people read odds."""
     low, high = panel.get_xlim()
     decades = np.arange(np.ceil(low / np.log(10.0)), np.floor(high / np.log(10.0)) + 1.0)
-    odds = 10.0 ** decades[:: max(1, len(decades) // 6)]
-    if odds.size < _FEWEST_TICKS:
-        odds = np.array([one * power for power in (0.01, 0.1, 1.0, 10.0, 100.0) for one in (1.0, 1.0 / 0.3)])
-        odds = odds[(np.log(odds) >= low) & (np.log(odds) <= high)]
+    if decades.size >= _FEWEST_TICKS:
+        marked = decades[decades % np.ceil(decades.size / _MOST_TICKS) == 0]
+        panel.set_xticks(np.log(10.0) * marked, [_odds_of_ten(int(power)) for power in marked])
+        return
+    odds = np.array([one * power for power in (0.01, 0.1, 1.0, 10.0, 100.0) for one in (1.0, 1.0 / 0.3)])
+    odds = odds[(np.log(odds) >= low) & (np.log(odds) <= high)]
     panel.set_xticks(np.log(odds), [f"{one:.0f} : 1" if one >= 1.0 else f"1 : {1.0 / one:.0f}" for one in odds])
+
+
+def _odds_of_ten(power: int) -> str:
+    """A power of ten as odds: in figures as far as they are read at a glance."""
+    number = str(10 ** abs(power)) if abs(power) <= _MOST_ZEROS else f"$10^{{{abs(power)}}}$"
+    return f"{number} : 1" if power >= 0 else f"1 : {number}"
