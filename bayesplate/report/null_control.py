@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _HEIGHT = 1.05
-_FEWEST_TICKS, _MOST_TICKS, _MOST_ZEROS = 4, 7, 3
+_FEWEST_TICKS, _MOST_TICKS, _MOST_ZEROS = 4, 5, 3
 
 
 @dataclass(frozen=True)
