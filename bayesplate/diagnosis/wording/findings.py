@@ -259,8 +259,9 @@ def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
 def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
     """What the most probable explanation does to the errors though it is not enough, and how to go on from it."""
     before, after = case.before.summary.error, summary.error
+    comes, it = ("come", "them") if len(answer.members) > 1 else ("comes", "it")
     told = (
-        f"{answer_words(case.found, answer).capitalize()} comes nearest: with it the error goes from "
+        f"{answer_words(case.found, answer).capitalize()} {comes} nearest: with {it} the error goes from "
         f"{before.in_sample_rms_cents:.1f} to {after.in_sample_rms_cents:.1f} cents in the fit"
     )
     first, last = before.leave_one_out_rms_cents, after.leave_one_out_rms_cents
@@ -269,10 +270,10 @@ def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
     if RELABELLING in answer.members:
         return f"{told}."
     if case.has_slip:
-        return f"{told}. Before it is declared, look at the readings that are told below."
+        return f"{told}. Before you declare {it}, look at the readings that are told below."
     every = (*case.found.ground.baseline.board.effects, *answer.members)  # what a card lists is all that it declares
     names = ", ".join(f'"{name}"' for name in every)
-    return f"{told}. Declare it, effects = [{names}], and diagnose again to look for what else is lacking."
+    return f"{told}. Declare {it}, effects = [{names}], and diagnose again to look for what else is lacking."
 
 
 def _finalist(answer: Answer, summary: Summary) -> Finalist:

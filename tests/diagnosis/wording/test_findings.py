@@ -12,7 +12,7 @@ from made_searches import NOISE, bare, baseline, candidate, decided, ground_of
 from made_summaries import SUMMARY
 
 from bayesplate.diagnosis.decision.claim import Claim, Condition
-from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, answers
+from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, Answer, answers
 from bayesplate.diagnosis.evidence.folds import Nested, nested
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap, probabilities
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
@@ -24,7 +24,7 @@ from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
 from bayesplate.diagnosis.wording.fates import fate_of
-from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
+from bayesplate.diagnosis.wording.findings import Case, Side, _nearest_sentence, diagnosis_of
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.parameter import BOARD, Parameter
@@ -478,3 +478,11 @@ def test_two_effects_that_are_one_alternative_stay_together():
     told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
     assert (told.verdict, told.effects) == ("indistinguishable group", (SHEAR, AIR, GRAIN))
     assert told.words == "transverse shear and air loading, or grain angle"
+
+
+def test_two_effects_come_nearest_where_one_comes_nearest():
+    found = made({}, residual=np.zeros(6))
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    told = _nearest_sentence(case, Answer((SHEAR, AIR), 1, 0.9), MOVED)
+    assert told.startswith("Transverse shear and air loading come nearest: with them the error goes from")
+    assert 'Declare them, effects = ["transverse_shear", "air_loading"],' in told
