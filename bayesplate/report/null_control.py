@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ class _Row:
     limit: float
     words: str
     axis: str
+    shown: Callable[[float], str] = "{:.3g}".format
 
 
 def null_picture(diagnosis: Diagnosis) -> Picture | None:
@@ -48,7 +50,7 @@ def null_picture(diagnosis: Diagnosis) -> Picture | None:
             f" Below, by how much an effect that {sum(rows[1].sets.counts)} of them were made to choose changes the "
             "error of modes that are left out: a claim needs a smaller ratio than nearly all of them have by chance."
         )
-    alt = "; ".join(f"{row.axis}: this board {row.board:.3g}, limit {row.limit:.3g}" for row in rows)
+    alt = "; ".join(f"{row.axis}: this board {row.shown(row.board)}, limit {row.shown(row.limit)}" for row in rows)
     return Picture("null-control", "This board among boards that lack nothing", alt, caption, figure)
 
 
@@ -56,7 +58,7 @@ def _rows(null: NullControlSummary) -> list[_Row]:
     found = []
     if null.log_odds_of_sets is not None and null.log_odds is not None:
         words, axis = "needed beyond", "odds that something is lacking"
-        found.append(_Row(null.log_odds_of_sets, null.log_odds, null.log_odds_needed, words, axis))
+        found.append(_Row(null.log_odds_of_sets, null.log_odds, null.log_odds_needed, words, axis, _odds))
     if null.nested_ratio_of_sets and null.nested_ratio is not None and null.nested_ratio_to_beat is not None:
         words, axis = "claimed below", "left-out error with the chosen effect over that without"
         found.append(_Row(null.nested_ratio_of_sets, null.nested_ratio, null.nested_ratio_to_beat, words, axis))
@@ -86,6 +88,13 @@ def _as_odds(panel: Axes) -> None:
     odds = np.array([one * power for power in (0.01, 0.1, 1.0, 10.0, 100.0) for one in (1.0, 1.0 / 0.3)])
     odds = odds[(np.log(odds) >= low) & (np.log(odds) <= high)]
     panel.set_xticks(np.log(odds), [f"{one:.0f} : 1" if one >= 1.0 else f"1 : {1.0 / one:.0f}" for one in odds])
+
+
+def _odds(log_odds: float) -> str:
+    """Odds in words for those who do not see the axis, from their natural logarithm."""
+    power = abs(log_odds) / np.log(10.0)
+    number = f"{10.0**power:.3g}" if power <= _MOST_ZEROS else f"10^{power:.0f}"
+    return f"{number} : 1" if log_odds >= 0.0 else f"1 : {number}"
 
 
 def _odds_of_ten(power: int) -> str:
