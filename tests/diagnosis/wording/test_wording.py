@@ -35,7 +35,7 @@ from bayesplate.diagnosis.wording.told import (
     verdict_sentences,
     warnings,
 )
-from bayesplate.diagnosis.wording.words import MERITS, VERDICTS, claim_sentence
+from bayesplate.diagnosis.wording.words import MERITS, VERDICTS, claim_sentence, meaning
 from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
@@ -380,3 +380,11 @@ def test_a_text_stays_a_text_in_a_notebook(payload):
     page = _Tags(told._repr_html_())
     assert set(page.tags) == {"h3", "p", "table", "caption", "tr", "th", "td"}
     assert page.text.count(payload) >= 4
+
+
+def test_a_plate_with_declared_effects_is_not_called_ideal():
+    calm = DIAGNOSES["none needed"]
+    assert meaning(calm).startswith("The readings differ from those of an ideal plate by no more than their noise")
+    told = meaning(replace(calm, declared=("grain_angle", "air_loading")))
+    assert "those of a plate with grain angle and air loading by no more than" in told
+    assert "No further effect is needed" in told
