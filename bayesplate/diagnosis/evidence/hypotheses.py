@@ -9,7 +9,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid, reach_of
 from bayesplate.diagnosis.evidence.terms import Fold, Terms, log_sum, normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import with_readings_exchanged
@@ -127,7 +127,9 @@ def hypotheses(
         Effects that may be one of two: those whose visible part could be seen at all. A pair costs nothing for a
         member that cannot be seen, so that every effect would seem to come with an invisible one.
     """
-    levels, few = noise_grid(baseline.board), noise_grid(baseline.board, few=True)
+    board = baseline.board
+    reach = reach_of(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))
+    levels, few = (noise_grid(board, few=are_few, reach=reach) for are_few in (False, True))
     empty = nothing(baseline.every.log_frequency.size)
     swaps = confusable(baseline)
     pairs = list(combinations([name for name in fine if name in paired], 2))
