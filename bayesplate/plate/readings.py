@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 
 _LOWEST = 1e-3
 """Share of a reading that its rounding interval stays above: the logarithm needs a positive end."""
+_DECIMALS = 9
+"""Of a rounded reading in Hz: more than anyone writes."""
 _NEAR = 1e-4
 """Share of an interval's scale about its middle where the first-order term is good to 1e-8 and a difference is not."""
 
@@ -194,7 +196,8 @@ class ReadingErrors:
         """
         hertz = np.exp(predicted + _join(noise, self.own_sd) * self._density.draw(rng, predicted.shape))
         steps = self.resolution[self.rounded]
-        hertz[..., self.rounded] = np.round(hertz[..., self.rounded] / steps) * steps
+        whole = np.round(hertz[..., self.rounded] / steps)
+        hertz[..., self.rounded] = np.round(whole * steps, _DECIMALS)  # 483 * 0.1 lies just above the reading 48.3
         return np.asarray(hertz)
 
     @property

@@ -15,8 +15,9 @@ from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.predictive import noise_of_board
 from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.shifts.signatures import Signature, look_alikes, signatures
+from bayesplate.diagnosis.shifts.signatures import Signature, acts_both_ways, look_alikes, signatures
 from bayesplate.diagnosis.wording.entries import effect_entry
+from bayesplate.effects import declare, effects_of
 from bayesplate.posterior.inference import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -83,17 +84,32 @@ def test_a_size_is_at_its_limit_where_half_a_percent_of_its_prior_lies_beyond(ba
 
 
 @pytest.mark.parametrize(("likeness", "alike"), [(0.949, False), (0.951, True), (-0.949, False), (-0.951, True)])
-def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike):
-    """Of what each leaves visible, with either sign; in `check` and in `diagnose`."""
+@pytest.mark.parametrize("prior", [HALF_NORMAL, Quantity.from_mean(0.0, 1.0, "normal")])
+def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike, prior):
+    """Of what each leaves visible, with either sign if they may act either way; in `check` and in `diagnose`."""
+    either = prior is not HALF_NORMAL
+    alike = alike and (either or likeness > 0)
     some = 0.02 * np.random.default_rng(3).standard_normal((2, 6))
     one, other = (shift - base.slopes @ (base.absorbing @ shift) for shift in some)
     one = one / np.linalg.norm(one / base.scales)
     other = other - one * np.sum(one * other / base.scales**2)
     other = likeness * one + np.sqrt(1.0 - likeness**2) * other / np.linalg.norm(other / base.scales)
-    seen = [Signature(name, {}, d, d, {}, 1.0, base.scales) for name, d in ((A, one), (B, other))]
+    seen = [Signature(name, {}, d, d, {}, 1.0, base.scales, either) for name, d in ((A, one), (B, other))]
 
     assert look_alikes(seen) == {A: (B,) if alike else (), B: (A,) if alike else ()}
-    assert entry_of(found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6))).look_alikes == (B,) * alike
+    found = found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6), prior)
+    assert entry_of(found).look_alikes == (B,) * alike
+
+
+@pytest.mark.parametrize(
+    ("name", "either"),
+    [("density_gradient", True), ("transverse_shear", False), ("grain_angle", False), ("support_stiffness", False)],
+)
+def test_which_effects_may_act_either_way(name, either):
+    """Shear only lowers, a support only raises, and an angle is even; a gradient has two directions."""
+    board = declare(replace(prepare("spruce-free-1L").board, effects=(name,)))
+    sizes = [size for one in effects_of(board, board.setups[0]) if one.name == name for size in one.parameters()]
+    assert acts_both_ways(sizes) is either
 
 
 def test_the_bias_of_an_ignored_effect_has_the_sign_of_what_it_hides(base):

@@ -347,3 +347,11 @@ def test_a_list_of_readings_joins_its_standard_error_with_the_rounding_of_the_se
     assert errors.resolution.tolist() == [step if variance == 0 else 0.0, step]
     own = np.array([variance / mean**2, 0.0]) + (errors.resolution / [mean, 90]) ** 2 / 12
     assert errors.own_variance == pytest.approx(own, rel=1e-12)
+
+
+def test_a_simulated_reading_equals_the_measured_one_that_it_rounds_to():
+    """Also in the last digit: 483 * 0.1 is no 48.3, and a third of exact readings lay outside their intervals."""
+    hertz = [float(f"{40.1 + 7.1 * i:.1f}") for i in range(40)]
+    errors = ReadingErrors(np.array(hertz), np.zeros(40), np.full(40, 0.1))
+    draws = errors.simulate(np.tile(np.log(hertz), (10, 1)), 1e-6, np.random.default_rng(6))
+    np.testing.assert_array_equal(draws, np.tile(hertz, (10, 1)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ from payloads import PAYLOADS
 from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
 from bayesplate.report.health import health_picture
+from bayesplate.report.null_control import null_picture
 from bayesplate.report.page import percentiles_pictures, pictures
 from bayesplate.report.pairs import _broken
 from bayesplate.report.percentiles import percentiles_figure
@@ -138,6 +140,29 @@ def test_the_board_stands_among_simulated_ones(drawn):
     assert [line.get_xdata()[0] for line in ratios.lines] == [0.25, 0.75]
     assert [one.get_title("right") for one in (odds, ratios)] == ["dashed: needed beyond", "dashed: claimed below"]
     assert [text.get_text() for text in odds.get_xticklabels()] == ["1 : 100", "1 : 10", "1 : 1", "10 : 1", "100 : 1"]
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "words"), [(np.log(90.0), "90 : 1"), (-np.log(4.0), "1 : 4"), (12_000.0, "10^5212 : 1")]
+)
+def test_odds_are_told_as_odds_to_who_does_not_see_the_axis(log_odds, words):
+    named = DIAGNOSES["named"]
+    null = replace(named.null_control, log_odds=log_odds, log_odds_needed=np.log(2.0))
+    told = null_picture(replace(named, null_control=null)).alt
+    assert told.startswith(f"odds that something is lacking: this board {words}, limit 2 : 1; left-out error")
+
+
+@pytest.mark.parametrize("log_odds", [12.0, 20.0, 90.0, 12_000.0])
+def test_odds_beyond_all_doubt_are_read_as_powers_of_ten(log_odds):
+    """No label runs into the next, even odds that no number holds are drawn, and even odds have a mark."""
+    named = DIAGNOSES["named"]
+    picture = null_picture(replace(named, null_control=replace(named.null_control, log_odds=log_odds)))
+    picture.figure.canvas.draw()
+    labels = picture.figure.axes[0].get_xticklabels()
+    boxes = [one.get_window_extent() for one in labels]
+    assert "1 : 1" in [one.get_text() for one in labels]
+    assert 3 <= len(labels) <= 6
+    assert all(right.x0 - left.x1 > 3.0 for left, right in pairwise(boxes))
 
 
 def test_the_expected_readings_have_a_bar_where_all_round_to_one(clamped):

@@ -154,7 +154,7 @@ def decide(found: Found, control: NullControl, others: Iterable[Variant] | None 
             reason = f"{answer_words(found, best)} has no rival within a factor 3, whatever is assumed"
             return Verdict("named", best.members, best.index, best, reason, True, (best,))
         words, rivals = turned
-        reason = f"{words} {joined([answer_words(found, one) for one in rivals], 'or')} may be as probable"
+        reason = f"{words} {alternatives_words(found, rivals)} may be as probable"
         near = (best, *rivals)
     else:
         reason = "several explanations are about equally probable"
@@ -263,6 +263,12 @@ def answer_words(found: Found, answer: Answer) -> str:
     if swap is None:
         return effect_names(answer.members)
     return f"{effect_name(RELABELLING)} {swap.words(found.ground.baseline)}"
+
+
+def alternatives_words(found: Found, told: Sequence[Answer]) -> str:
+    """Answers of which one is the case, in words; two effects that are one answer stay together."""
+    words = [answer_words(found, one) for one in told]
+    return ", or ".join(words) if any(len(one.members) > 1 for one in told) else joined(words, "or")
 
 
 def p_words(p_value: float) -> str:

@@ -9,9 +9,10 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid, reach_of
 from bayesplate.diagnosis.evidence.terms import Fold, Terms, log_sum, normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.forms import with_readings_exchanged
 from bayesplate.diagnosis.shifts.tables import Table, nothing, together
 
 Floats = NDArray[np.float64]
@@ -46,12 +47,22 @@ class Swap:
         return f"{labels[self.first]} and {labels[self.second]}{where}"
 
     def in_fold(self, fold: Fold) -> Fold:
-        """The fold that leaves out the same readings where the two are exchanged: they stand under the other label."""
+        """The fold that leaves out the same readings where the two are exchanged: they stand under the other label.
+
+        Each takes its own error and its rounding along.
+        """
+        baseline = self._exchanged(fold.baseline)
         if fold.left_out is None:
-            return fold
+            return fold if baseline is fold.baseline else Fold(baseline)
         exchanged = {self.first: self.second, self.second: self.first}
         left_out, *others = (exchanged.get(one, one) for one in (fold.left_out, *fold.others))
-        return Fold(fold.baseline, left_out, tuple(others))
+        return Fold(baseline, left_out, tuple(others))
+
+    def _exchanged(self, baseline: Baseline) -> Baseline:
+        """The baseline with each reading's own error under the other label; the same where both err alike."""
+        if baseline.own_variance[self.first] == baseline.own_variance[self.second]:
+            return baseline
+        return replace(baseline, board=with_readings_exchanged(baseline.board, self.first, self.second))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +127,9 @@ def hypotheses(
         Effects that may be one of two: those whose visible part could be seen at all. A pair costs nothing for a
         member that cannot be seen, so that every effect would seem to come with an invisible one.
     """
-    levels, few = noise_grid(baseline.board), noise_grid(baseline.board, few=True)
+    board = baseline.board
+    reach = reach_of(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))
+    levels, few = (noise_grid(board, few=are_few, reach=reach) for are_few in (False, True))
     empty = nothing(baseline.every.log_frequency.size)
     swaps = confusable(baseline)
     pairs = list(combinations([name for name in fine if name in paired], 2))

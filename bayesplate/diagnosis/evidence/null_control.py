@@ -44,7 +44,12 @@ class NullControl:
 
     @property
     def needed_from(self) -> float:
-        """ln odds against no effect above which one is needed: those of the false alarms, or of certainty if less."""
+        """ln odds against no effect above which one is needed: those of the false alarms, or of certainty if less.
+
+        Of certainty too where there is nothing that could be lacking, and so no odds.
+        """
+        if not np.isfinite(self.against).all():
+            return CERTAINLY_NEEDED
         return min(float(np.quantile(self.against, 1.0 - FALSE_ALARMS)), CERTAINLY_NEEDED)
 
     @property

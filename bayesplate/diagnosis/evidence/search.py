@@ -9,7 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, hypotheses, log_evidences, probabilities
+from bayesplate.diagnosis.evidence.hypotheses import (
+    Hypothesis,
+    hypotheses,
+    log_evidences,
+    odds_against_none,
+    probabilities,
+)
 from bayesplate.diagnosis.evidence.predictive import predictive_p_value
 from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.diagnosis.shifts.baseline import Baseline
@@ -136,8 +142,10 @@ class Found:
     @property
     def against_none(self) -> float:
         """ln of the odds that something is lacking against that nothing is."""
+        if not self.none:  # less than any number: the logarithms still tell how much less
+            return float(odds_against_none(self.ground.hypotheses, self.log_evidence))
         with np.errstate(divide="ignore"):
-            return float(np.log(self.probability[1:].sum()) - np.log(self.probability[0]))
+            return float(np.log(self.probability[1:].sum()) - np.log(self.none))
 
     def inclusion(self, name: str) -> float:
         """Probability that an effect is present, alone or with another."""

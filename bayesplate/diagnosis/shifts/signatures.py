@@ -7,7 +7,7 @@ effect's nominal size; first-order columns of the bare plate are wrong by factor
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,17 +22,22 @@ from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, Moduli, moduli
+from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.parameters import N_RIGIDITIES
+from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 
 LOOK_ALIKE = 0.95
-"""|cos| of two visible parts above which two effects look alike: they differ by less than a third of their trace.
+"""Cosine of two visible parts above which two effects look alike: they differ by less than a third of their trace.
 
-A remark, no rule: whether the readings tell two of them apart is said by their probabilities.
+Below its negative too, if one of them may act either way: a mass that can only lower what a tension can only raise is
+told from it at sight. A remark, no rule: whether the readings tell two apart is said by their probabilities.
 """
+_WITHIN = 3.0
+"""Standard deviations of its prior within which a size may lie."""
 
 INVISIBLE = (
     "A uniform change of thickness, density or side lengths cannot be seen in the frequencies: it goes into the "
@@ -59,6 +64,8 @@ class Signature:
         Rms below which a visible part drowns in the noise: 2 noise / sqrt(n).
     scales : (n_modes,) array
         Relative uncertainty of each reading: its weight in the fit, in every rms and in the likeness of two effects.
+    acts_both_ways : bool
+        Whether it may also be the opposite of what it is here: see `acts_both_ways`.
     """
 
     effect: str
@@ -68,6 +75,7 @@ class Signature:
     bias_percent: Mapping[str, float]
     detection_limit_cents: float
     scales: Floats
+    acts_both_ways: bool = False
 
     @property
     def raw_rms(self) -> float:
@@ -114,17 +122,18 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
     noise = float(1.0 / np.sqrt(np.mean(1.0 / cents(scales) ** 2)))
     result = []
     for name in candidates(problem.board) if names is None else names:
-        shifted, size = frequencies_with(problem, name)
+        shifted, sizes = frequencies_with(problem, name)
         fitted = refit(predict, shifted, scales, start)
         result.append(
             Signature(
                 effect=name,
-                size=size,
+                size={one.name: one.nominal for one in sizes},
                 raw=cents(shifted - base),
                 visible=cents(shifted - predict(fitted[None, :])[0]),
                 bias_percent=_bias(problem, start, fitted),
                 detection_limit_cents=2.0 * noise / np.sqrt(base.size),
                 scales=scales,
+                acts_both_ways=acts_both_ways(sizes),
             )
         )
     return tuple(result)
@@ -136,34 +145,55 @@ def constants_predictor(problem: PosedProblem) -> Predictor:
     return predict.with_fixed(problem.centre[problem.parameters.fitted_columns][N_RIGIDITIES:])
 
 
-def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, dict[str, float]]:
-    """ln f of all modes with one more effect at its nominal size, by full solves; and that size."""
+def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, tuple[Parameter, ...]]:
+    """ln f of all modes with one more effect at its nominal size, by full solves; and what has that size."""
     board = declare(replace(problem.board, effects=(*problem.board.effects, name)))
     values = problem.parameters.values_at(problem.centre)
-    size: dict[str, float] = {}
-    for setup in board.setups:
-        for effect in effects_of(board, setup):
-            if effect.name == name:
-                nominal = {p.name: p.nominal for p in effect.parameters()}
-                size |= nominal
+    acting = (one for setup in board.setups for one in effects_of(board, setup) if one.name == name)
+    sizes = {one.name: one for effect in acting for one in effect.parameters()}
     for key, quantity in board.inputs.items():
         values.setdefault(key, np.asarray(quantity.mean))
-    values |= {key: np.asarray(value) for key, value in size.items()}
+    values |= {key: np.asarray(one.nominal) for key, one in sizes.items()}
     parts = []
     for setup, fitted in zip(board.setups, problem.posterior.models, strict=True):
         plate = setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0]
         parts.append(plate + fitted.discrepancies(values)[0, : plate.size])
-    return np.concatenate(parts), size
+    return np.concatenate(parts), tuple(sizes.values())
 
 
 def look_alikes(found: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
-    """For each effect, the others whose visible part has a |cos| above `LOOK_ALIKE` with its own."""
-    result = {}
-    for one in found:
-        result[one.effect] = tuple(
-            other.effect for other in found if other is not one and abs(cosine(one, other)) > LOOK_ALIKE
+    """For each effect, the others that look like it."""
+    return {
+        one.effect: tuple(
+            other.effect
+            for other in found
+            if other is not one and are_alike(cosine(one, other), one.acts_both_ways or other.acts_both_ways)
         )
-    return result
+        for one in found
+    }
+
+
+def are_alike(likeness: float, either_way: bool) -> bool:
+    """Whether two effects look alike, from the cosine of their visible parts.
+
+    Parameters
+    ----------
+    likeness : float
+    either_way : bool
+        Whether one of them may act the other way round.
+    """
+    return (abs(likeness) if either_way else likeness) > LOOK_ALIKE
+
+
+def acts_both_ways(sizes: Iterable[Parameter]) -> bool:
+    """Whether a size of an effect may lie on either side of that of no effect."""
+    return any(_is_within(one.prior, one.null) for one in sizes if one.null is not None)
+
+
+def _is_within(prior: Quantity, value: float) -> bool:
+    """Whether an uncertain quantity may as well lie on either side of a value."""
+    inside = not prior.is_exact and prior.lower < value < prior.upper
+    return inside and abs(float(prior.standard(value))) < _WITHIN
 
 
 def cosine(one: Signature, other: Signature) -> float:

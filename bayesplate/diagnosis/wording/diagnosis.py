@@ -71,8 +71,10 @@ class NullControlSummary:
     n_sets : int
     flagged_percent : float
         Share of the sets in which an effect would be called needed.
-    log_odds, log_odds_needed : float or None
-        ln odds of these readings that something is lacking, and those above which an effect is needed.
+    log_odds : float or None
+        ln odds of these readings that something is lacking; None where nothing could be.
+    log_odds_needed : float
+        Those above which an effect is needed.
     log_odds_of_sets : Histogram or None
         None where nothing could be lacking.
     nested_ratio, nested_ratio_to_beat : float or None
@@ -185,7 +187,7 @@ class Diagnosis:
         The same where nothing was added.
     gain_null_percentile : float or None
         Share of simulated boards without any effect with smaller odds against no effect, percent; None where no
-        readings are left to judge by.
+        readings are left to judge by, or every effect is declared.
     null_control : NullControlSummary
     elastic_shift : dict of ElasticShift
         By modulus.

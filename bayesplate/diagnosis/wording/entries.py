@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.decision.refits import likely_form
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
 from bayesplate.diagnosis.evidence.search import Candidate, Found
-from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
+from bayesplate.diagnosis.shifts.signatures import acts_both_ways, are_alike
 from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.fates import fate_of, fate_of_exchange
 from bayesplate.effects import EFFECTS, effects_of
@@ -59,8 +59,8 @@ def effect_entry(
         learnt_bits=_learnt(found, index, one),
         look_alikes=tuple(
             other
-            for other in ground.candidates
-            if other != one.name and abs(ground.cosine(one.name, other)) > LOOK_ALIKE
+            for other, its in ground.candidates.items()
+            if other != one.name and are_alike(ground.cosine(one.name, other), _acts_both_ways(one, its))
         ),
         rejected_because=because,
         fate=fate,
@@ -94,6 +94,11 @@ def exchange_entries(found: Found, verdict: Verdict, ranked: Sequence[Answer]) -
 def p_value_of(found: Found, index: int) -> float | None:
     """The prior predictive p-value of a hypothesis; None where constants meet every reading and nothing is left."""
     return found.p_value(index) if found.ground.n_directions else None
+
+
+def _acts_both_ways(*every: Candidate) -> bool:
+    """Whether one of some effects may also be the opposite of what is shown of it."""
+    return any(acts_both_ways(one.laws[one.shown].form.free) for one in every)
 
 
 def _where(one: Candidate) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.decision.claim import Claim
 from bayesplate.diagnosis.decision.constants import draw_constants
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, answers
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives_words, answer_words, answers
 from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
@@ -32,11 +32,11 @@ from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries,
 from bayesplate.diagnosis.wording.fates import ratio_words
 from bayesplate.diagnosis.wording.known import known_models
 from bayesplate.effects import EFFECTS
-from bayesplate.effects.words import effect_names, joined
+from bayesplate.effects.words import joined
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
-from bayesplate.results.contract import Spread
+from bayesplate.results.contract import Spread, finite
 from bayesplate.results.summary import Summary
 
 Floats = NDArray[np.float64]
@@ -136,7 +136,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
         p_value=PValues(before=p_value_of(found, 0), after=p_value_of(found, verdict.index)),
         before=_errors(case, case.before),
         after=_errors(case, case.after),
-        gain_null_percentile=control.percentile_of(found.against_none) if found.ground.n_directions else None,
+        gain_null_percentile=None if (odds := _log_odds(found)) is None else control.percentile_of(odds),
         null_control=_null_control(case),
         elastic_shift=_elastic_shift(case),
         finalists=tuple(_finalist(answer, figures) for answer, figures in case.finalists),
@@ -177,7 +177,7 @@ def _null_control(case: Case) -> NullControlSummary:
     return NullControlSummary(
         n_sets=int(control.against.size),
         flagged_percent=100.0 * control.flagged,
-        log_odds=found.against_none if found.ground.n_directions else None,
+        log_odds=_log_odds(found),
         log_odds_needed=control.needed_from,
         log_odds_of_sets=_histogram(control.against),
         nested_ratio=ratio,
@@ -185,6 +185,11 @@ def _null_control(case: Case) -> NullControlSummary:
         nested_ratio_percentile=None if ratio is None else control.place_of(ratio),
         nested_ratio_of_sets=_histogram(np.array([np.nan]) if control.ratio is None else control.ratio),
     )
+
+
+def _log_odds(found: Found) -> float | None:
+    """ln of the odds that something is lacking; None where nothing is left to judge by, or nothing could be lacking."""
+    return finite(found.against_none) if found.ground.n_directions else None
 
 
 def _histogram(values: Floats) -> Histogram | None:
@@ -235,9 +240,7 @@ def _words(case: Case, taken: Sequence[Answer]) -> str:
     """What a verdict stands for, as people read it: all of it if it is named, otherwise the alternatives."""
     if case.verdict.word == "named":
         return joined([answer_words(case.found, one) for one in taken])
-    singles = [effect_names([name]) for name in case.verdict.effects if name != RELABELLING]
-    exchanged = [answer_words(case.found, one) for one in taken if one.members == (RELABELLING,)]
-    return joined([*singles, *exchanged], "or")
+    return alternatives_words(case.found, taken)
 
 
 def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
@@ -256,8 +259,9 @@ def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
 def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
     """What the most probable explanation does to the errors though it is not enough, and how to go on from it."""
     before, after = case.before.summary.error, summary.error
+    comes, it = ("come", "them") if len(answer.members) > 1 else ("comes", "it")
     told = (
-        f"{answer_words(case.found, answer).capitalize()} comes nearest: with it the error goes from "
+        f"{answer_words(case.found, answer).capitalize()} {comes} nearest: with {it} the error goes from "
         f"{before.in_sample_rms_cents:.1f} to {after.in_sample_rms_cents:.1f} cents in the fit"
     )
     first, last = before.leave_one_out_rms_cents, after.leave_one_out_rms_cents
@@ -266,10 +270,10 @@ def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
     if RELABELLING in answer.members:
         return f"{told}."
     if case.has_slip:
-        return f"{told}. Before it is declared, look at the readings that are told below."
+        return f"{told}. Before you declare {it}, look at the readings that are told below."
     every = (*case.found.ground.baseline.board.effects, *answer.members)  # what a card lists is all that it declares
     names = ", ".join(f'"{name}"' for name in every)
-    return f"{told}. Declare it, effects = [{names}], and diagnose again to look for what else is lacking."
+    return f"{told}. Declare {it}, effects = [{names}], and diagnose again to look for what else is lacking."
 
 
 def _finalist(answer: Answer, summary: Summary) -> Finalist:

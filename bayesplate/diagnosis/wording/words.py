@@ -9,16 +9,20 @@ from bayesplate.diagnosis.decision.claim import ConditionName
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Errors
-from bayesplate.effects.words import effect_name, joined
+from bayesplate.effects.words import effect_name, effect_names, joined
 
 MISSING = "–"
+TOO_FEW = "the readings are too few to choose anew without each of them"
 _UNLIKELY = 0.01
 """Probability below which an exchange of two labels is not worth showing: any two neighbours are a candidate."""
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """A verdict in plain words: a heading, and what it means; {effects} stands for what it names."""
+    """A verdict in plain words: a heading, and what it means.
+
+    {effects} stands for what it names, {model} for the one before, {further} for that some effects are declared.
+    """
 
     heading: str
     sentence: str
@@ -27,7 +31,7 @@ class Meaning:
 VERDICTS: dict[Word, Meaning] = {
     "none needed": Meaning(
         "These readings need no further effect",
-        "The readings differ from those of an ideal plate by no more than their noise would make them. No effect is "
+        "The readings differ from those of {model} by no more than their noise would make them. No {further}effect is "
         "needed to explain them, which does not prove that there is none.",
     ),
     "named": Meaning("An effect was found", "The readings point to {effects}."),
@@ -86,7 +90,10 @@ MERITS = (
 
 def meaning(diagnosis: Diagnosis) -> str:
     """What the verdict means, with the effects that it names."""
-    return VERDICTS[diagnosis.verdict].sentence.format_map({"effects": diagnosis.words})
+    declared = effect_names(diagnosis.declared)
+    model, further = ("an ideal plate", "") if not declared else (f"a plate with {declared}", "further ")
+    words = {"effects": diagnosis.words, "model": model, "further": further}
+    return VERDICTS[diagnosis.verdict].sentence.format_map(words)
 
 
 def claim_sentence(diagnosis: Diagnosis) -> str:
@@ -98,8 +105,10 @@ def claim_sentence(diagnosis: Diagnosis) -> str:
         return f"The {change}. No improvement is claimed."
     if diagnosis.claim:
         return f"The error of the prediction is reduced: the {change}, and every condition of that claim is met."
-    missed = joined([CONDITIONS[one.name].lacking for one in diagnosis.conditions if not one.is_met])
-    return f"The {change}. No improvement is claimed: {missed}."
+    missed = [
+        TOO_FEW if one.value is None else CONDITIONS[one.name].lacking for one in diagnosis.conditions if not one.is_met
+    ]
+    return f"The {change}. No improvement is claimed: {joined(list(dict.fromkeys(missed)))}."
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.diagnosis.shifts.signatures import cosine, signatures
+from bayesplate.diagnosis.shifts.signatures import cosine, look_alikes, signatures
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.inference import pose
 from bayesplate.workflow.prepare import prepare
@@ -88,6 +88,7 @@ def cosines(folder: Path, card: str) -> str:
         colour = "white" if on_dark else "black"
         panel.text(j, i, signed(matrix[i, j], 2), ha="center", va="center", fontsize=7, color=colour)
     names = [plain(one.effect) for one in found]
+    alike = look_alikes(found)
     panel.set_yticks(range(len(names)), names, fontsize=8)
     panel.set_xticks(range(len(names)), names, fontsize=8, rotation=90)
     panel.spines[:].set_visible(False)
@@ -97,7 +98,7 @@ def cosines(folder: Path, card: str) -> str:
         f"{plain(found[i].effect)} and {plain(found[j].effect)} ({signed(matrix[i, j], 2)})"
         for i in range(len(found))
         for j in range(i)
-        if abs(matrix[i, j]) > 0.95
+        if found[j].effect in alike[found[i].effect]
     ]
     said = f"\nThese look alike to the readings: {'; '.join(pairs)}.\n" if pairs else "\nNo pair is above 0.95.\n"
     return figure(drawn, folder, f"cosines-{card}", alt) + said
@@ -136,8 +137,7 @@ def designs(folder: Path) -> str:
     rows = []
     for design in DESIGNS:
         problem, found = _seen(design)
-        pairs = [(i, j) for i in range(len(found)) for j in range(i)]
-        alike = sum(abs(cosine(found[i], found[j])) > 0.95 for i, j in pairs)
+        alike = sum(len(others) for others in look_alikes(found).values()) // 2
         soft = seen[design]["clamp_rotation"]
         n_modes = len(problem.identifiability.leverages)
         rows.append(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, ground_of, one_level, table, with_readings
+from made_searches import NOISE, bare, baseline, ground_of, one_level, table, with_readings
 
 from bayesplate.diagnosis.evidence.folds import left_out, nested
 from bayesplate.diagnosis.evidence.hypotheses import (
@@ -20,8 +20,9 @@ from bayesplate.diagnosis.evidence.hypotheses import (
 )
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.terms import Fold
-from bayesplate.diagnosis.shifts.forms import with_labels_exchanged
+from bayesplate.diagnosis.shifts.forms import with_labels_exchanged, with_readings_exchanged
 from bayesplate.diagnosis.shifts.tables import nothing, together
+from bayesplate.quantities import Quantity
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]
 
@@ -133,3 +134,25 @@ def test_readings_with_exchanged_labels_are_predicted_once_the_exchange_is_seen(
     assert (nested(ground, mixed).chosen[0, [0, 1, 2, 5]] == 1).all()
     assert nested(ground, mixed).ratio[0] < 0.1
     assert (nested(ground, straight).chosen == 0).all()
+
+
+@pytest.mark.parametrize("left_out", [None, 1, 3, 4])
+def test_a_reading_takes_its_own_error_along_to_the_other_label(base, left_out):
+    """A doubtful reading and a sharp one exchanged are those of a board on which they stand so from the start."""
+    (setup,) = base.board.setups
+    readings = list(setup.readings)
+    readings[3] = replace(readings[3], frequency=Quantity.from_mean(readings[3].frequency.mean, 4.0, "normal"))
+    base = replace(base, board=replace(base.board, setups=(replace(setup, readings=tuple(readings)),)))
+    put_right = replace(base, board=with_readings_exchanged(base.board, 3, 4))
+    swap, none = swap_of(base, 3, 4), bare(base, one_level(base))
+    mixed = 0.01 * np.random.default_rng(7).standard_normal((2, 6))
+    straight = swap.swap.applied(base, mixed.copy())
+    fold, there = Fold(base, left_out), Fold(put_right, {3: 4, 4: 3}.get(left_out, left_out))
+    assert base.own_variance[3] > 10.0 * NOISE**2
+    assert put_right.own_variance[[3, 4]] == pytest.approx([0.0, (4.0 / readings[3].frequency.mean) ** 2])
+    assert log_evidences((swap,), fold, mixed) == pytest.approx(log_evidences((none,), there, straight))
+    if left_out is not None:
+        errors = [one.terms(each).left_out_errors(seen) for one, each, seen in (
+            (swap, fold, swap.seen(base, mixed)), (none, there, straight),
+        )]  # fmt: skip
+        assert errors[0] == pytest.approx(errors[1])

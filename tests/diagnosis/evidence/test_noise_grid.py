@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 from made_searches import baseline, table
 
+from bayesplate.diagnosis.evidence.hypotheses import hypotheses
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
 from bayesplate.diagnosis.evidence.terms import Fold, Terms
 from bayesplate.diagnosis.shifts.tables import nothing
@@ -64,3 +66,29 @@ def test_levels_are_no_more_for_twenty_setups_than_for_three(few):
         assert grid.weights.sum() == pytest.approx(1.0)
         np.testing.assert_allclose(grid.weights @ logs, 0.0, atol=0.1)  # the middle of the prior and its width
         np.testing.assert_allclose(grid.weights @ logs**2, 1.0, atol=0.15)
+
+
+@pytest.mark.parametrize("n_setups", [1, 2])
+@pytest.mark.parametrize("times", [0.5, 4.0, 16.0])
+def test_a_large_misfit_is_a_large_noise(n_setups, times):
+    """The evidence of none and of a pair against a fine grid over nine sd: levels that end at 3.5 sd are off.
+
+    Readings of sixteen times the noise stand 5.5 sd up its prior.
+    """
+    rng = np.random.default_rng(3)
+    base = baseline(rng, 6 * n_setups, noise=(0.005,) * n_setups)
+    base = replace(base, residual=times * 0.005 * rng.standard_normal(base.n_modes))
+    t = np.array(list(product(np.linspace(-4.0, 10.0, 71), repeat=n_setups)))
+    weights = np.exp(-0.5 * (t**2).sum(axis=1))
+    fine = NoiseGrid(0.005 * np.exp(0.5 * t), weights / weights.sum())
+    some = {name: table(rng, base.n_modes, name=name) for name in "ab"}
+    found = hypotheses(base, some, some, "ab")
+
+    def off(one, grid):
+        both = (Terms(one.table, Fold(base), each).log_evidence(base.residual[None, :])[0] for each in (grid, fine))
+        return abs(next(both) - next(both))
+
+    assert off(found[0], found[0].noise) < 0.7
+    assert off(found[-1], found[-1].noise) < 1.5  # a pair has few levels
+    assert (off(found[0], noise_grid(base.board)) > 5.0) == (times > 10.0)  # levels that end at 3.5 sd
+    assert (found[0].noise.weights.size > noise_grid(base.board).weights.size) == (times > 2.0)

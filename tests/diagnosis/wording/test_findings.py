@@ -12,24 +12,25 @@ from made_searches import NOISE, bare, baseline, candidate, decided, ground_of
 from made_summaries import SUMMARY
 
 from bayesplate.diagnosis.decision.claim import Claim, Condition
-from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, answers
+from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, Answer, answers
 from bayesplate.diagnosis.evidence.folds import Nested, nested
-from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap, probabilities
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
 from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.diagnosis.evidence.terms import Terms
-from bayesplate.diagnosis.shifts.tables import nothing
+from bayesplate.diagnosis.shifts.tables import nothing, together
 from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
 from bayesplate.diagnosis.wording.fates import fate_of
-from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
+from bayesplate.diagnosis.wording.findings import Case, Side, _nearest_sentence, diagnosis_of
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.quantities import Quantity
 from bayesplate.results.contract import Elastic
+from bayesplate.results.folder import json_text
 
 SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "air_loading", "grain_angle")
 FIGURES = replace(
@@ -438,3 +439,50 @@ def test_four_and_five_modes_are_judged(n_modes):
     assert 0.0 < told.p_value.before <= 1.0
     assert 0.0 <= told.gain_null_percentile <= 100.0
     assert (told.before.log_score is None) is (n_modes < 5)
+
+
+def test_a_misfit_beyond_all_doubt_has_odds():
+    """Probabilities of none below the smallest number there is: the odds are those of the logarithms."""
+    found = made(NAMED)
+    evidence = np.array([-2000.0, -3.0, -9.0, -9.0, -9.0])
+    sure = Found(found.ground, found.residual, evidence, probabilities(found.ground.hypotheses, evidence))
+    assert sure.none == 0.0
+    wanted = 1997.0 + np.log(0.1 / 0.5) + np.log1p(3.0 * np.exp(-6.0))
+    assert sure.against_none == pytest.approx(wanted)
+    told = diagnosis_of(case_of(sure, control_of(sure, 0.5), folds_of(sure, 0.25)))
+    assert told.null_control.log_odds == pytest.approx(wanted)
+    assert told.gain_null_percentile == 100.0
+    json_text(diagnosis_json(told))
+
+
+def test_a_board_that_declares_every_effect_has_no_odds():
+    base = baseline(np.random.default_rng(1))
+    ground = ground_of(base, bare(base, noise_grid(base.board), 1.0))
+    found = search(ground, 0.003 * np.random.default_rng(2).standard_normal(6))
+    control = null_control(ground, np.random.default_rng(3), 100, found.against_none)
+    told = diagnosis_of(case_of(found, control, folds_of(found, 1.0)))
+    assert (told.verdict, told.null_control.log_odds, told.gain_null_percentile) == ("none needed", None, None)
+    assert told.null_control.flagged_percent == 0.0
+    json_text(diagnosis_json(told))
+
+
+def test_two_effects_that_are_one_alternative_stay_together():
+    """Neither of a pair explains the readings by itself: it is not told as two alternatives."""
+    found = made({}, residual=np.zeros(6))
+    ground = found.ground
+    tables = [ground.candidates[name].coarse for name in (SHEAR, AIR)]
+    pair = Hypothesis((SHEAR, AIR), 0.1, together(*tables), ground.hypotheses[0].noise)
+    shares = np.array([0.02, 0.01, 0.01, 0.4, 0.01, 0.55])
+    ground = replace(ground, hypotheses=(*ground.hypotheses, pair))
+    found = Found(ground, found.residual, np.log(shares), shares)
+    told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
+    assert (told.verdict, told.effects) == ("indistinguishable group", (SHEAR, AIR, GRAIN))
+    assert told.words == "transverse shear and air loading, or grain angle"
+
+
+def test_two_effects_come_nearest_where_one_comes_nearest():
+    found = made({}, residual=np.zeros(6))
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    told = _nearest_sentence(case, Answer((SHEAR, AIR), 1, 0.9), MOVED)
+    assert told.startswith("Transverse shear and air loading come nearest: with them the error goes from")
+    assert 'Declare them, effects = ["transverse_shear", "air_loading"],' in told

@@ -35,7 +35,7 @@ from bayesplate.diagnosis.wording.told import (
     verdict_sentences,
     warnings,
 )
-from bayesplate.diagnosis.wording.words import MERITS, VERDICTS, claim_sentence
+from bayesplate.diagnosis.wording.words import MERITS, VERDICTS, claim_sentence, meaning
 from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
@@ -173,6 +173,16 @@ def test_with_too_few_readings_the_error_that_both_models_have_is_told():
     fewer = few | {"leave_one_out_rms_cents": None}
     one = replace(one, before=replace(BEFORE, **fewer), after=replace(AFTER, **fewer))
     assert claim_sentence(one).startswith("The error in the fit fell from 21.2 to 4.2 cents")
+
+
+def test_conditions_that_too_few_readings_leave_open_are_not_said_to_fail():
+    """Nothing was chosen anew without a reading, and so nothing is known of what that would have given."""
+    group = DIAGNOSES["indistinguishable group"]
+    unjudged = {"chance selection", "log score"}
+    few = [replace(c, value=None, limit=None, is_met=False) if c.name in unjudged else c for c in group.conditions]
+    assert claim_sentence(replace(group, conditions=tuple(few))).endswith(
+        "No improvement is claimed: the readings are too few to choose anew without each of them."
+    )
 
 
 def test_the_probabilities_sum_to_one_as_they_are_printed():
@@ -370,3 +380,11 @@ def test_a_text_stays_a_text_in_a_notebook(payload):
     page = _Tags(told._repr_html_())
     assert set(page.tags) == {"h3", "p", "table", "caption", "tr", "th", "td"}
     assert page.text.count(payload) >= 4
+
+
+def test_a_plate_with_declared_effects_is_not_called_ideal():
+    calm = DIAGNOSES["none needed"]
+    assert meaning(calm).startswith("The readings differ from those of an ideal plate by no more than their noise")
+    told = meaning(replace(calm, declared=("grain_angle", "air_loading")))
+    assert "those of a plate with grain angle and air loading by no more than" in told
+    assert "No further effect is needed" in told
