@@ -201,7 +201,11 @@ def _next_modes(
     there = station.values(system, values)
     modes, named = spectrum(system, there, SEARCHED)
     sensor = None if station.is_new else station.base.sensor
-    at = np.ones(len(named)) if sensor is None else np.abs(deflections(station.base, modes, there, sensor, system.shaped))
+    at = (
+        np.ones(len(named))
+        if sensor is None
+        else np.abs(deflections(station.base, modes, there, sensor, system.shaped))
+    )
     seen = [one for one, share in zip(named, at, strict=True) if share >= NODAL_LINE]
     new = [one for one in seen if one.label is not None and one.label not in taken]
     return tuple(
