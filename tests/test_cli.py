@@ -79,7 +79,7 @@ BAD_CARDS = {
                                  "got paper-cantilever, made for x0 clamped, x1 free",
                                  "[setup] published_coefficients: wanted a table of aspect ratio 2.219, got "
                                  "paper-cantilever, made for 1.956",
-                                 "[setup] published_coefficients: wanted a table with the labels (0,0), (0,2), got",
+                                 "[setup] published_coefficients: wanted a table with the labels (2,0), got",
                                  "[plate] mass_g: wanted a density from 20 to 25000 kg/m3",
                                  'frequencies_hz "(0,0)": wanted a mode of a plate']),
     "cards that are not there": ([('name = "free"', 'name = "free"\npublished_coefficients = "./mine.toml"'),
