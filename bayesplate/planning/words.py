@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from bayesplate.effects.words import joined
-from bayesplate.planning.beliefs import Beliefs
+from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Gain
 from bayesplate.planning.plan import ProposalEntry
 from bayesplate.planning.proposals import CONSTANTS, EXPLANATIONS
@@ -30,12 +30,19 @@ def _of_doubt(gain: Gain, beliefs: Beliefs) -> str:
     """What becomes of the doubt between explanations."""
     if len(beliefs.explanations) < 2 or gain.explanations < max(WORTH, _CLEAR * gain.explanations_error):
         return ""
-    names = joined([one.words for one in beliefs.explanations])
+    names = _names(beliefs.explanations)
     share = 100.0 * gain.explanations / beliefs.entropy
     return (
         f"the doubt between {names} would fall by {share:.0f} % ({gain.explanations:.2f} ± "
         f"{gain.explanations_error:.2f} of {beliefs.entropy:.2f} nats)"
     )
+
+
+def _names(explanations: Sequence[Explanation]) -> str:
+    """Explanations in words; where one is two effects, it is told which of them are meant to be alone."""
+    paired = {name for one in explanations if len(one.members) > 1 for name in one.members}
+    ways = ["together" if len(one.members) > 1 else "alone" if paired & {*one.members} else "" for one in explanations]
+    return joined([f"{one.words} {way}".rstrip() for one, way in zip(explanations, ways, strict=True)])
 
 
 def _of_constants(gain: Gain) -> str:

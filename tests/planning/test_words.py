@@ -11,9 +11,12 @@ from bayesplate.planning.gains import Gain
 from bayesplate.planning.proposals import GOALS, Costs, score
 from bayesplate.planning.words import campaign_line, first_line, shared_words
 
-TWO = SimpleNamespace(
-    explanations=(SimpleNamespace(words="no effect"), SimpleNamespace(words="air loading")), entropy=0.6
-)
+
+def explained(words, *members):
+    return SimpleNamespace(words=words, members=members)
+
+
+TWO = SimpleNamespace(explanations=(explained("no effect"), explained("air loading", "air_loading")), entropy=0.6)
 ONE = SimpleNamespace(explanations=TWO.explanations[:1], entropy=0.0)
 
 
@@ -30,6 +33,16 @@ def test_doubt_and_intervals_are_told_with_their_numbers():
     )
     assert first_line("Do it", one, ONE, None) == (
         "Do it: the intervals of E_x and E_y would shrink to 0.50 and 0.80 of what they are."
+    )
+
+
+def test_two_effects_that_are_one_explanation_are_told_from_each_alone():
+    pair = explained("shear and grain", "shear", "grain")
+    alone = [explained(name, name) for name in ("shear", "grain", "air")]
+    three = SimpleNamespace(explanations=(pair, *alone), entropy=1.0)
+
+    assert "between shear and grain together, shear alone, grain alone and air would fall" in first_line(
+        "Do it", gain(explanations=0.5, error=0.01), three, None
     )
 
 
