@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesplate.cards.setup import edge_letters
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board
-from bayesplate.plate.setup import Setup
 from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
@@ -93,24 +93,19 @@ def _ways(summaries: Mapping[str, Summary], boards: Mapping[str, Board]) -> dict
     for board, summary in summaries.items():
         for row in summary.modes:
             setup = boards[board].setup(row.setup)
-            found.setdefault((setup.name, _letters(setup)), setup.first_label)
+            found.setdefault((setup.name, edge_letters(setup.edges)), setup.first_label)
     return found
 
 
 def _key(row: ModeRow, board: Board, ways: Mapping[tuple[str, str], Label]) -> str:
     setup, label = board.setup(row.setup), Label.parse(row.label)
-    way = (setup.name, _letters(setup))
+    way = (setup.name, edge_letters(setup.edges))
     first = ways[way]
     shown = Label(label.m - setup.first_label.m + first.m, label.n - setup.first_label.n + first.n)
     has_names = len({name for name, _ in ways}) > 1
     is_held_in_several = len([name for name, _ in ways if name == setup.name]) > 1
     parts = [part for part, is_told in zip(way, (has_names, is_held_in_several), strict=True) if is_told]
     return " ".join([*parts, str(shown)])
-
-
-def _letters(setup: Setup) -> str:
-    """Like "CFFF", in the paper's order x0, y0, x1, y1."""
-    return "".join(setup.edges[edge][0].upper() for edge in ("x0", "y0", "x1", "y1"))
 
 
 def _pooled(each: Mapping[str, tuple[float, float]], n_spare: int) -> CommonResidual:

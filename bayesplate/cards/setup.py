@@ -74,7 +74,12 @@ class Edges(Section):
     @property
     def letters(self) -> str:
         """The paper's four letters, "CFFF", in its order x0, y0, x1, y1."""
-        return "".join(word[0].upper() for word in (self.x0, self.y0, self.x1, self.y1))
+        return edge_letters(self.words)
+
+
+def edge_letters(words: Mapping[str, str]) -> str:
+    """The paper's four letters, "CFFF", in its order x0, y0, x1, y1, from the words of the four edges."""
+    return "".join(words[edge][0].upper() for edge in ("x0", "y0", "x1", "y1"))
 
 
 def edge_words(text: object) -> dict[str, EdgeWord] | None:

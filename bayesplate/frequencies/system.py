@@ -55,21 +55,26 @@ class System:
         values : dict of float
             D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
         """
-        effects = _on_outline(self.effects)
         finest = max((effect.refines for effect in self.effects), default=1.0)
         per_side = SHEAR_ELEMENTS_PER_SIDE if self.theory == "shear-flexible" else round(ELEMENTS_PER_SIDE * finest)
         elements = mesh(term_weights(values, self.setup).at(0), per_side)
-        return _plate(self.setup.ends_x, self.setup.ends_y, self.theory, effects, *elements)
+        return _plate(self.setup.ends_x, self.setup.ends_y, self.theory, self._acting, *elements)
 
     @cached_property
     def contributions(self) -> Contributions:
         """The terms that the effects add, by kind."""
-        return contributions_of(_on_outline(self.effects))
+        return contributions_of(self._acting)
 
     @property
     def shaped(self) -> Effect | None:
         """The effect that gives the plate its outline, where that is not the whole rectangle."""
-        return _shaped(self.effects)
+        return next((effect for effect in self.effects if effect.outline() is not None), None)
+
+    @cached_property
+    def _acting(self) -> tuple[Effect, ...]:
+        """The effects as they act on the true outline, where one of them gives it."""
+        shaped = self.shaped
+        return self.effects if shaped is None else tuple(effect.within(shaped) for effect in self.effects)
 
     def adjusted(self, values: Values) -> Values:
         """The values as all weights take them: sizes and density corrected, shear moduli where the plate has them."""
@@ -119,16 +124,6 @@ def contributions_of(effects: Sequence[Effect]) -> Contributions:
 def system_of(board: Board, setup: Setup) -> System:
     """A setup of a board with the board's declared effects."""
     return System(setup, effects_of(board, setup))
-
-
-def _shaped(effects: Sequence[Effect]) -> Effect | None:
-    return next((effect for effect in effects if effect.outline() is not None), None)
-
-
-def _on_outline(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
-    """The effects as they act on the true outline, where one of them gives it."""
-    shaped = _shaped(effects)
-    return effects if shaped is None else tuple(effect.within(shaped) for effect in effects)
 
 
 def _plate(
