@@ -21,6 +21,23 @@ def made(n_peaks: tuple[int, ...], n_modes: int, seed: int = 0) -> Assignments:
     return Assignments(log_pair, log_alone, rng.uniform(0.05, 1.0, (n_modes, N_DRAWS)))
 
 
+def made_apart(n_peaks: tuple[int, ...], n_modes: int, seed: int) -> Assignments:
+    """Peaks that are near a few modes each, and say next to nothing of the others."""
+    rng = np.random.default_rng(seed)
+    modes = np.sort(rng.uniform(0.0, 1.0, n_modes))[:, None] + 0.05 * rng.standard_normal((n_modes, N_DRAWS))
+    peaks = [np.sort(rng.uniform(0.0, 1.0, n)) for n in n_peaks]
+    log_pair = tuple(5.0 - 0.5 * ((own[:, None, None] - modes) / 0.02) ** 2 for own in peaks)
+    log_alone = tuple(rng.standard_normal(n) for n in n_peaks)
+    return Assignments(log_pair, log_alone, rng.uniform(0.05, 1.0, (n_modes, N_DRAWS)))
+
+
+def made_in_disorder(n_peaks: tuple[int, ...], n_modes: int, seed: int) -> Assignments:
+    """Every other pair out of the question, in no order."""
+    one, rng = made(n_peaks, n_modes, seed), np.random.default_rng(seed)
+    log_pair = tuple(np.where(rng.random((*row.shape[:2], 1)) < 0.5, row, -100.0) for row in one.log_pair)
+    return Assignments(log_pair, one.log_alone, one.missed)
+
+
 def ascending(n_peaks: int, n_modes: int) -> list[list[tuple[int, int]]]:
     """All sets of pairs of a row that rise in both."""
     return [
@@ -51,9 +68,19 @@ def enumerated(one: Assignments, draw: int) -> tuple[float, list[np.ndarray]]:
     return total, [own / total for own in pairs]
 
 
-@pytest.mark.parametrize(("n_peaks", "n_modes"), SIZES)
-def test_the_sums_and_the_pairs_are_those_of_every_assignment_counted_once(n_peaks, n_modes) -> None:
-    one = made(n_peaks, n_modes)
+@pytest.mark.parametrize(
+    "one",
+    [made(*size) for size in SIZES]
+    + [
+        make(*size, seed)
+        for make in (made_apart, made_in_disorder)
+        for size in SIZES
+        if size[1] > 2
+        for seed in range(3)
+    ],
+)
+def test_the_sums_and_the_pairs_are_those_of_every_assignment_counted_once(one) -> None:
+    n_peaks = [len(row) for row in one.log_alone]
     rng = np.random.default_rng(1)
     taking = [np.array([[True] * n, *(rng.random((3, n)) < 0.6)]) for n in n_peaks]
     for *some, log_sum in zip(*taking, one.log_sums(taking), strict=True):
