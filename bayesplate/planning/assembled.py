@@ -24,7 +24,8 @@ from bayesplate.planning.plan import (
     SequenceEntry,
 )
 from bayesplate.planning.proposals import Proposal, score
-from bayesplate.planning.stations import SEARCHED, BareLaw, Station
+from bayesplate.planning.station_laws import BareLaw
+from bayesplate.planning.stations import SEARCHED, Station
 from bayesplate.plate.board import Board, Values
 
 Floats = NDArray[np.float64]

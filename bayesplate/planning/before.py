@@ -13,7 +13,8 @@ from bayesplate.frequencies.prior_bands import prior_medians, with_rigidities
 from bayesplate.planning.beliefs import N_TERMS, NOTHING_LACKS, Beliefs, Explanation, moduli_at
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import levels
-from bayesplate.planning.stations import BareLaw, Station, bare_law
+from bayesplate.planning.station_laws import BareLaw, bare_law
+from bayesplate.planning.stations import Station
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors

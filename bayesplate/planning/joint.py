@@ -15,7 +15,8 @@ from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.planning.beliefs import moduli_at
-from bayesplate.planning.stations import BareLaw, bare_law, new_stations, stations
+from bayesplate.planning.station_laws import BareLaw, bare_law
+from bayesplate.planning.stations import new_stations, stations
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share

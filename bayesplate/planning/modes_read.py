@@ -13,7 +13,8 @@ from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.looks import members_of
 from bayesplate.planning.shifts import EffectShift, Nodes, form_shift
-from bayesplate.planning.stations import BareLaw, Station
+from bayesplate.planning.station_laws import BareLaw
+from bayesplate.planning.stations import Station
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share, unknown_discrepancies
 from bayesplate.posterior.parameters import N_RIGIDITIES

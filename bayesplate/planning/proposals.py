@@ -16,7 +16,8 @@ from bayesplate.planning.inputs_read import input_readings, measurements
 from bayesplate.planning.looks import LOOKS, look_readings
 from bayesplate.planning.modes_read import StationReadings, effect_shifts, station_readings
 from bayesplate.planning.shifts import nodes_of
-from bayesplate.planning.stations import BareLaw, Station, bare_law, known_mass, stations
+from bayesplate.planning.station_laws import BareLaw, bare_law, known_mass
+from bayesplate.planning.stations import Station, stations
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI
 

@@ -17,7 +17,7 @@ from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.diagnosis.shifts.tables import Table
-from bayesplate.planning.stations import BareLaw, solved
+from bayesplate.planning.station_laws import BareLaw, SolvedStation
 from bayesplate.plate.material import RIGIDITIES
 
 Floats = NDArray[np.float64]
@@ -168,7 +168,8 @@ def _beside(found: Found, table: Table, form: Form, cell: int, law: BareLaw) -> 
     sizes = {free.name: np.asarray(free.prior.value(table.z[cell, j])) for j, free in enumerate(form.free)}
     constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities + table.moved[cell]), strict=True))
     exact = {name: np.asarray(q.mean) for name, q in form.board.inputs.items() if q.is_exact}
-    shift = solved(law.station, form.board, {**exact, **baseline.values, **sizes, **constants}) - law.solved
+    there = {**exact, **baseline.values, **sizes, **constants}
+    shift = SolvedStation.of(law.station, form.board, there).log_frequency - law.solved
     shift[0] -= law.slopes[:, : len(RIGIDITIES)] @ table.moved[cell]
     shift[:, np.abs(shift[0]) > _TOO_FAR] = np.nan
     return np.asarray(shift.ravel())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,21 +10,15 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.effects import effects_of
-from bayesplate.effects.attached_items import board_mass, places_on
+from bayesplate.effects.attached_items import places_on
 from bayesplate.effects.base import Effect
-from bayesplate.estimates.refit import sensitivities
-from bayesplate.frequencies.model import setup_model
-from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.residues import NODAL_LINE, deflections
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
-from bayesplate.modes.solve import Modes
-from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.measured import Reading
-from bayesplate.plate.sessions import under_prior_scales
 from bayesplate.plate.setup import Ends, Setup, assumed_noise
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -35,12 +29,6 @@ ELSEWHERE = 6
 """Lowest modes that are read where the board is held another way."""
 SEARCHED = 24
 """Lowest modes of a way to hold the board among which those that are read are looked for."""
-_SHARE = 0.02
-"""Of the board's mass that a known mass has, about: it shifts a mode by up to some per cent."""
-_HANDY = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3)
-"""Masses that come in a set of weights, kg."""
-PLACED = 1e-3
-"""Standard deviation along each side of where a known mass stands, m: it is put on a pencil mark by hand."""
 _NEAR_FREE, _NEAR_HELD = 0.94, 0.7
 """Where a known mass stands besides the middle, as fractions of a side whose end is free or held."""
 
@@ -184,12 +172,6 @@ def _elsewhere(board: Board, name: str, ends_x: Ends, prior: PriorCard | None) -
     return Setup(name, ends_x, ("free", "free"), (), noise, attached=first.attached, air=first.air)
 
 
-def known_mass(board: Board) -> float:
-    """A weight of a set that has about a fiftieth of the board's mass, kg."""
-    wanted = _SHARE * board_mass(board)
-    return min(_HANDY, key=lambda one: abs(np.log(one / wanted)))
-
-
 def _next_modes(
     board: Board, station: Station, values: Values, n: int, taken: Collection[Label]
 ) -> tuple[Reading, ...]:
@@ -213,158 +195,3 @@ def _next_modes(
         for one in new[:n]
         if one.label is not None
     )
-
-
-def solved(station: Station, board: Board, values: Values) -> Floats:
-    """ln f (Hz) of all modes of a station, and what a known mass at each of its spots adds to each, by full solution.
-
-    Not a number where a mode has lost its name.
-
-    Parameters
-    ----------
-    station : Station
-    board : Board
-        With its effects.
-    values : dict of float
-
-    Returns
-    -------
-    (1 + n_spots, n_modes) array
-    """
-    system = station.system(board)
-    there = station.values(system, values)
-    modes, named = spectrum(system, there, SEARCHED)
-    at = {one.label: i for i, one in enumerate(named)}
-    rows = [at.get(label, -1) for label in station.setup.labels]
-    log_frequency = np.array([np.log(named[i].frequency) if i >= 0 else np.nan for i in rows])
-    return np.concatenate([log_frequency[None, :], _added(station, board, modes, there, station.spots)[:, rows]])
-
-
-def off_place(station: Station, board: Board, values: Values) -> Floats:
-    """Standard deviation of what a known mass at each spot adds to ln f, for it is not put quite there.
-
-    Parameters
-    ----------
-    station, board, values
-        As of `solved`.
-
-    Returns
-    -------
-    (n_spots, n_modes) array
-    """
-    if not station.spots:
-        return np.zeros((0, len(station.setup.labels)))
-    system = station.system(board)
-    there = station.values(system, values)
-    modes, named = spectrum(system, there, SEARCHED)
-    at = {one.label: i for i, one in enumerate(named)}
-    variance = np.zeros((len(station.spots), len(modes.eigenvalues)))
-    for axis, side in enumerate(vibrating_lengths(there, station.setup)):
-        step = np.eye(2)[axis] * PLACED / float(np.ravel(side)[0])
-        far, near = (
-            _added(station, board, modes, there, [(s + sign * step[0], t + sign * step[1]) for s, t in station.spots])
-            for sign in (1.0, -1.0)
-        )
-        variance += (0.5 * (far - near)) ** 2
-    return np.sqrt(variance[:, [at.get(label, -1) for label in station.setup.labels]])
-
-
-def _added(
-    station: Station, board: Board, modes: Modes, values: Values, spots: Sequence[tuple[float, float]]
-) -> Floats:
-    """What a known mass at each of some spots adds to ln f of each mode: (n_spots, n_modes) array.
-
-    Solved among the modes at hand, and the rigid motions of a free board, whose shapes it mixes.
-    """
-    length_x, length_y = vibrating_lengths(values, station.setup)
-    vibrating = density(values) * values["thickness"] * length_x * length_y
-    share = known_mass(board) / float(np.ravel(vibrating)[0])
-    added = np.empty((len(spots), len(modes.eigenvalues)))
-    for row, (s, t) in zip(added, spots, strict=True):
-        moved = modes.displacement(np.array([s]), np.array([t]))[:, 0, 0]
-        rigid = [1.0, np.sqrt(12.0) * (s - 0.5), np.sqrt(12.0) * (t - 0.5)] if station.setup.is_free else []
-        row[:] = with_point_mass(modes.eigenvalues, moved, np.array(rigid), share)
-    return added
-
-
-def with_point_mass(eigenvalues: Floats, moved: Floats, rigid: Floats, share: float) -> Floats:
-    """What a point mass adds to ln f of each mode, solved among them: (n_modes,) array.
-
-    Parameters
-    ----------
-    eigenvalues : (n_modes,) array
-        omega^2, s^-2.
-    moved : (n_modes,) array
-        Mass-normalised deflection of each at the place.
-    rigid : (n_rigid,) array
-        That of the motions without stiffness.
-    share : float
-        The mass over that of what vibrates.
-    """
-    from scipy.linalg import eigh
-    from scipy.optimize import linear_sum_assignment
-
-    at = np.concatenate([rigid, moved])
-    squared = np.concatenate([np.zeros(rigid.size), eigenvalues])
-    found, shapes = eigh(np.diag(squared), np.eye(at.size) + share * np.outer(at, at))
-    rows, columns = linear_sum_assignment(shapes**2, maximize=True)
-    same = found[columns[np.argsort(rows)]][rigid.size :]
-    return np.asarray(0.5 * np.log(same / eigenvalues))
-
-
-@dataclass(frozen=True, eq=False)
-class BareLaw:
-    """The modes of a station without further effects, linear in constants and inputs.
-
-    Attributes
-    ----------
-    station : Station
-    solved : (1 + n_spots, n_modes) array
-        See `solved`, at the estimate.
-    middle : (n_modes,) array
-        ln f (Hz) with the inputs at the middle of their priors.
-    slopes : (n_modes, 3 + n_inputs) array
-        By ln D_x, ln D_y, ln D_s and the inputs' standard coordinates.
-    off_place : (n_spots, n_modes) array
-        See `off_place`, at the estimate.
-    """
-
-    station: Station
-    solved: Floats
-    middle: Floats
-    slopes: Floats
-    off_place: Floats
-
-
-def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> BareLaw:
-    """Solve a station at an estimate.
-
-    Parameters
-    ----------
-    board : Board
-    station : Station
-    values : dict of float
-        Rigidities and the board's inputs.
-
-    Raises
-    ------
-    KeyError
-        If one of its modes is no mode of the plate.
-    """
-    parameters = Parameters(board)
-    centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
-    system = station.system(board)
-    model = setup_model(system, station.values(system, values))
-
-    def at(x: Floats) -> Values:
-        theta = np.tile(centre, (len(x), 1))
-        theta[:, parameters.fitted_columns] = x
-        return station.values(system, parameters.values(theta))
-
-    start = centre[parameters.fitted_columns]
-    slopes = sensitivities(Predictor(at, [model], "linear"), start)
-    found = solved(station, board, values)
-    there = found[0] + model.discrepancies(at(start[None, :]))[0]
-    of_inputs, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], start[N_RIGIDITIES:])
-    every = np.concatenate([slopes[:, :N_RIGIDITIES], of_inputs], axis=1)
-    return BareLaw(station, found, there - of_inputs @ inputs, every, off_place(station, board, values))

@@ -42,7 +42,7 @@ from bayesplate.planning.gains import Readings, entropy, expected_gain, probabil
 from bayesplate.planning.looks import LOOKS
 from bayesplate.planning.modes_read import REPEATED
 from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, proposals
-from bayesplate.planning.stations import known_mass
+from bayesplate.planning.station_laws import known_mass
 from bayesplate.planning.survivors import survivors
 from bayesplate.plate.board import Board
 from bayesplate.plate.sessions import shared_share

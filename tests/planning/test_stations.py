@@ -15,7 +15,8 @@ from bayesplate.cards import load_prior
 from bayesplate.planning.assembled import bench_of
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.modes_read import station_readings
-from bayesplate.planning.stations import PLACED, bare_law, known_mass, stations
+from bayesplate.planning.station_laws import PLACED, bare_law, known_mass
+from bayesplate.planning.stations import stations
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies

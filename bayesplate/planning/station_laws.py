@@ -1,0 +1,193 @@
+"""What a station teaches: its modes and how they change with constants, inputs, and a known mass on the board."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.effects.attached_items import board_mass
+from bayesplate.estimates.refit import sensitivities
+from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.spectrum import spectrum
+from bayesplate.modes.solve import Modes
+from bayesplate.planning.stations import SEARCHED, Station
+from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.sessions import under_prior_scales
+from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+
+Floats = NDArray[np.float64]
+
+_SHARE = 0.02
+"""Of the board's mass that a known mass has, about: it shifts a mode by up to some per cent."""
+_HANDY = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3)
+"""Masses that come in a set of weights, kg."""
+PLACED = 1e-3
+"""Standard deviation along each side of where a known mass stands, m: it is put on a pencil mark by hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedStation:
+    """The modes of a station by full solution, and a known mass among them.
+
+    Attributes
+    ----------
+    station : Station
+    values : dict of float
+        With those that the station's effects take.
+    modes : Modes
+        The lowest ones.
+    rows : list of int
+        Where the station's modes stand among them; -1 where one has lost its name.
+    share : float
+        The known mass over that of what vibrates.
+    """
+
+    station: Station
+    values: Values
+    modes: Modes
+    rows: list[int]
+    share: float
+
+    @classmethod
+    def of(cls, station: Station, board: Board, values: Values) -> SolvedStation:
+        """Solve a station of a board with its effects."""
+        system = station.system(board)
+        there = station.values(system, values)
+        modes, named = spectrum(system, there, SEARCHED)
+        at = {one.label: i for i, one in enumerate(named)}
+        length_x, length_y = vibrating_lengths(there, station.setup)
+        vibrating = density(there) * there["thickness"] * length_x * length_y
+        share = known_mass(board) / float(np.ravel(vibrating)[0])
+        return cls(station, there, modes, [at.get(label, -1) for label in station.setup.labels], share)
+
+    @property
+    def log_frequency(self) -> Floats:
+        """ln f (Hz) of the station's modes, and what a known mass at each of its spots adds: (1 + n_spots, n_modes).
+
+        Not a number where a mode has lost its name.
+        """
+        there = 0.5 * np.log(self.modes.eigenvalues) - np.log(2.0 * np.pi)
+        lost = np.where(np.array(self.rows) < 0, np.nan, 0.0)
+        return np.concatenate([there[None, :], self._added(self.station.spots)])[:, self.rows] + lost
+
+    @property
+    def off_place(self) -> Floats:
+        """Standard deviation of what a known mass at each spot adds, for it is not put quite there.
+
+        An (n_spots, n_modes) array.
+        """
+        variance = np.zeros((len(self.station.spots), len(self.modes.eigenvalues)))
+        for axis, side in enumerate(vibrating_lengths(self.values, self.station.setup)):
+            step = np.eye(2)[axis] * PLACED / float(np.ravel(side)[0])
+            far, near = (
+                self._added([(s + sign * step[0], t + sign * step[1]) for s, t in self.station.spots])
+                for sign in (1.0, -1.0)
+            )
+            variance += (0.5 * (far - near)) ** 2
+        return np.sqrt(variance[:, self.rows])
+
+    def _added(self, spots: Sequence[tuple[float, float]]) -> Floats:
+        """What a known mass at each of some spots adds to ln f of each mode: (n_spots, n_modes) array.
+
+        Solved among the modes at hand, and the rigid motions of a free board, whose shapes it mixes.
+        """
+        added = np.empty((len(spots), len(self.modes.eigenvalues)))
+        for row, (s, t) in zip(added, spots, strict=True):
+            moved = self.modes.displacement(np.array([s]), np.array([t]))[:, 0, 0]
+            rigid = [1.0, np.sqrt(12.0) * (s - 0.5), np.sqrt(12.0) * (t - 0.5)] if self.station.setup.is_free else []
+            row[:] = with_point_mass(self.modes.eigenvalues, moved, np.array(rigid), self.share)
+        return added
+
+
+def known_mass(board: Board) -> float:
+    """A weight of a set that has about a fiftieth of the board's mass, kg."""
+    wanted = _SHARE * board_mass(board)
+    return min(_HANDY, key=lambda one: abs(np.log(one / wanted)))
+
+
+def with_point_mass(eigenvalues: Floats, moved: Floats, rigid: Floats, share: float) -> Floats:
+    """What a point mass adds to ln f of each mode, solved among them: (n_modes,) array.
+
+    Parameters
+    ----------
+    eigenvalues : (n_modes,) array
+        omega^2, s^-2.
+    moved : (n_modes,) array
+        Mass-normalised deflection of each at the place.
+    rigid : (n_rigid,) array
+        That of the motions without stiffness.
+    share : float
+        The mass over that of what vibrates.
+    """
+    from scipy.linalg import eigh
+    from scipy.optimize import linear_sum_assignment
+
+    at = np.concatenate([rigid, moved])
+    squared = np.concatenate([np.zeros(rigid.size), eigenvalues])
+    found, shapes = eigh(np.diag(squared), np.eye(at.size) + share * np.outer(at, at))
+    rows, columns = linear_sum_assignment(shapes**2, maximize=True)
+    same = found[columns[np.argsort(rows)]][rigid.size :]
+    return np.asarray(0.5 * np.log(same / eigenvalues))
+
+
+@dataclass(frozen=True, eq=False)
+class BareLaw:
+    """The modes of a station without further effects, linear in constants and inputs.
+
+    Attributes
+    ----------
+    station : Station
+    solved : (1 + n_spots, n_modes) array
+        Of `SolvedStation.log_frequency`, at the estimate.
+    middle : (n_modes,) array
+        ln f (Hz) with the inputs at the middle of their priors.
+    slopes : (n_modes, 3 + n_inputs) array
+        By ln D_x, ln D_y, ln D_s and the inputs' standard coordinates.
+    off_place : (n_spots, n_modes) array
+        Of `SolvedStation`, at the estimate.
+    """
+
+    station: Station
+    solved: Floats
+    middle: Floats
+    slopes: Floats
+    off_place: Floats
+
+
+def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> BareLaw:
+    """Solve a station at an estimate.
+
+    Parameters
+    ----------
+    board : Board
+    station : Station
+    values : dict of float
+        Rigidities and the board's inputs.
+
+    Raises
+    ------
+    KeyError
+        If one of its modes is no mode of the plate.
+    """
+    parameters = Parameters(board)
+    centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
+    system = station.system(board)
+    model = setup_model(system, station.values(system, values))
+
+    def at(x: Floats) -> Values:
+        theta = np.tile(centre, (len(x), 1))
+        theta[:, parameters.fitted_columns] = x
+        return station.values(system, parameters.values(theta))
+
+    start = centre[parameters.fitted_columns]
+    slopes = sensitivities(Predictor(at, [model], "linear"), start)
+    found = SolvedStation.of(station, board, values)
+    log_frequency = found.log_frequency
+    there = log_frequency[0] + model.discrepancies(at(start[None, :]))[0]
+    of_inputs, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], start[N_RIGIDITIES:])
+    every = np.concatenate([slopes[:, :N_RIGIDITIES], of_inputs], axis=1)
+    return BareLaw(station, log_frequency, there - of_inputs @ inputs, every, found.off_place)
