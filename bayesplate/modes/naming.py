@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,7 +162,8 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
     found: dict[Beams, Found] = {}
     while counts:
         solved = solve_classes(plate, weights, counts)
-        found = {name: one for name, one in found.items() if one.place.parity not in solved} | _found(plate, solved)
+        found = {name: one for name, one in found.items() if one.place.parity not in solved}
+        found |= _found(plate, solved, names)
         lost = {plate.parity(n) for n in names if n not in found or found[n].place.correlation < _STRAY}
         unsure = {plate.parity(n) for n in names if n in found and not found[n].place.is_certain}
         counts = {
@@ -189,12 +190,13 @@ def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) 
     return {p: sum(bool(values[b] <= top) for b in plate.elastic_products[p]) for p, top in highest.items()}
 
 
-def _found(plate: PlateMatrices, solved: Mapping[Parity, ClassModes]) -> dict[Beams, Found]:
+def _found(plate: PlateMatrices, solved: Mapping[Parity, ClassModes], names: Sequence[Beams]) -> dict[Beams, Found]:
+    """Those of the wanted names that some of the solved modes have."""
     result = {}
     for parity, modes in solved.items():
-        stiffness, mass = modes.coefficients()
-        for rank, (beams, correlation) in enumerate(name_shapes(plate, modes.block.spread(modes.vectors), parity)):
-            result[beams] = Found(
-                Place(parity, rank, correlation), modes.eigenvalues[rank], stiffness[rank], mass[rank]
-            )
+        of_each = name_shapes(plate, modes.block.spread(modes.vectors), parity)
+        places = {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}
+        stiffness, mass = modes.of([place.rank for place in places.values()]).coefficients()
+        for (name, place), k, m in zip(places.items(), stiffness, mass, strict=True):
+            result[name] = Found(place, modes.eigenvalues[place.rank], k, m)
     return result

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,10 @@ class ClassModes:
     eigenvalues: NDArray[np.float64]
     vectors: NDArray[np.float64]
     rigid: NDArray[np.float64]
+
+    def of(self, ranks: Sequence[int] | NDArray[np.intp]) -> ClassModes:
+        """Some of the modes."""
+        return replace(self, eigenvalues=self.eigenvalues[list(ranks)], vectors=self.vectors[:, list(ranks)])
 
     def coefficients(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi' K_i phi and phi' M_j phi of each mode: (n_modes, n_terms) and (n_modes, n_masses) arrays.
@@ -127,21 +132,36 @@ class Modes:
         Symmetry class of each mode.
     ranks : (n_modes,) array of int
         Position of each mode among the elastic modes of its class, from 0.
-    coefficients : (n_modes, n_terms) array
-        phi' K_i phi; weighted they sum to the eigenvalue exactly (the sum rule).
-    mass_coefficients : (n_modes, n_masses) array
-        phi' M_j phi; weighted they sum to 1.
     shapes : (n_modes, n_dof_x, n_dof_y) array
         Mass-normalised shapes as coefficients of the two lines' functions.
+    classes : dict of ClassModes
+        The modes of each symmetry class, at least these.
     """
 
     plate: PlateMatrices
     eigenvalues: NDArray[np.float64]
     parities: tuple[Parity, ...]
     ranks: NDArray[np.intp]
-    coefficients: NDArray[np.float64]
-    mass_coefficients: NDArray[np.float64]
     shapes: NDArray[np.float64]
+    classes: Mapping[Parity, ClassModes]
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """phi' K_i phi; weighted they sum to the eigenvalue exactly (the sum rule): (n_modes, n_terms) array."""
+        return self._energies[0]
+
+    @property
+    def mass_coefficients(self) -> NDArray[np.float64]:
+        """phi' M_j phi; weighted they sum to 1: (n_modes, n_masses) array."""
+        return self._energies[1]
+
+    @cached_property
+    def _energies(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        rows = {p: [i for i, parity in enumerate(self.parities) if parity == p] for p in dict.fromkeys(self.parities)}
+        found = [self.classes[parity].of(self.ranks[own]).coefficients() for parity, own in rows.items()]
+        order = np.argsort(np.concatenate(list(rows.values())))
+        stiffness, mass = (np.concatenate(parts)[order] for parts in zip(*found, strict=True))
+        return stiffness, mass
 
     def displacement(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Shapes on a grid: (n_modes, n_x, n_y) array; x and y are fractions of the sides in [0, 1]."""
@@ -200,13 +220,11 @@ def collect(plate: PlateMatrices, solved: Mapping[Parity, ClassModes], n_modes: 
     order = np.argsort(eigenvalues, kind="stable")[:n_modes]
     parities = [p for p, c in solved.items() for _ in c.eigenvalues]
     ranks = np.concatenate([np.arange(c.eigenvalues.size) for c in solved.values()])
-    stiffness, mass = zip(*(c.coefficients() for c in solved.values()), strict=True)
     return Modes(
         plate=plate,
         eigenvalues=eigenvalues[order],
         parities=tuple(parities[i] for i in order),
         ranks=ranks[order],
-        coefficients=np.concatenate(stiffness)[order],
-        mass_coefficients=np.concatenate(mass)[order],
         shapes=np.concatenate([c.block.spread(c.vectors) for c in solved.values()])[order],
+        classes=solved,
     )
