@@ -90,7 +90,7 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
         reasons = {"noise": mode.expected / (1.0 + mode.expected)}
         reasons["not alike from hit to hit"] = _unlike(answered[m].alike, len(spectra.between), spare)
         reasons |= _of_lines(mode, spectra.duration, reasons["not alike from hit to hit"])
-        faint, split, part_of = _odds(m, modes, answered, usual, spacing, has_force=spectra.force is not None)
+        faint, split, part_of = _odds(m, modes, answered, usual, broad, spacing, has_force=spectra.force is not None)
         unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
         reasons["something broad"] = 1.0 - 1.0 / (1.0 + broad[m])
         reasons["faint"] = 1.0 - 1.0 / (1.0 + faint * unstable)
@@ -172,7 +172,14 @@ def _unlike(alike: float, n_places: int, spare: int) -> float:
 
 
 def _odds(
-    m: int, modes: Sequence[Mode], answered: Sequence[Answer], usual: Floats, spacing: float, *, has_force: bool
+    m: int,
+    modes: Sequence[Mode],
+    answered: Sequence[Answer],
+    usual: Floats,
+    broad: Floats,
+    spacing: float,
+    *,
+    has_force: bool,
 ) -> tuple[float, float, int]:
     """Odds that a mode is a faint line of something else, or a part of a stronger one, against its being a mode."""
     mode, answer = modes[m], answered[m]
@@ -188,7 +195,7 @@ def _odds(
             continue
         share = answer.strength / answered[k].strength
         odds = _log_normal(share, SPLIT, SPLIT_FACTOR) / of_mode * spacing / (2.0 * REACH * width)
-        odds *= off_real * _pattern(answer, answered[k])
+        odds *= off_real * _pattern(answer, answered[k]) / (1.0 + broad[k])  # the ground has no parts
         if has_force:
             reach = float(np.degrees(np.arctan(2.0 * share)))
             angle = complexity(answered[k])

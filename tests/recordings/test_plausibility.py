@@ -67,15 +67,28 @@ def test_broad_things_do_not_tell_how_the_board_damps_where_they_are_weak():
     assert broad_odds(damping, weak)[3:].min() > 1.0
 
 
+HERTZ = np.arange(20.0, 1000.0, 0.5)
+ONES = np.ones((HERTZ.size, 1), dtype=complex)
+SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), np.zeros(1, dtype=np.intp), ((None, None),), "acceleration", 2.0)
+
+
 def test_a_verdict_says_that_something_is_broad():
-    hertz = np.arange(20.0, 1000.0, 0.5)
-    values = np.ones((hertz.size, 1), dtype=complex)
-    spectra = Spectra(hertz, values, values, ("frf",), np.zeros(1, dtype=np.intp), ((None, None),), "acceleration", 2.0)
     modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
-    found = verdicts(spectra, modes, [answer() for _ in modes])
+    found = verdicts(SPECTRA, modes, [answer() for _ in modes])
 
     assert (found[-1].kind, found[-1].spurious > 0.5) == ("something broad", True)
     assert max(one.spurious for one in found[:-1]) < 0.1
+
+
+def test_a_weak_mode_is_a_part_of_a_peak_nearby_and_of_nothing_broad():
+    modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
+    answered = [*(answer() for _ in modes), answer(0.05)]
+    beside_a_peak = verdicts(SPECTRA, [*modes, mode(810.0)], answered)
+    beside_the_ground = verdicts(SPECTRA, [*modes, mode(910.0)], answered)
+
+    assert beside_a_peak[-1].kind == "part of 800.0 Hz"
+    assert beside_the_ground[-2].kind == "something broad"
+    assert (beside_the_ground[-1].part_of, beside_the_ground[-1].spurious < 0.5) == (-1, True)
 
 
 @pytest.fixture
