@@ -20,7 +20,7 @@ from bayesplate.results.folder import FIGURES, make_folder, require_new, write_t
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fragment import fragment_text
 from bayesplate.workflow.pick_sand import pictures_of, upright
-from bayesplate.workflow.pick_words import show_pick
+from bayesplate.workflow.pick_words import moved_between_hits, show_pick
 from bayesplate.workflow.places import given_places, require_on_board
 from bayesplate.workflow.prepare import Prepared, prepare
 
@@ -198,6 +198,7 @@ def _summary(
     flips = flips if labels is None else labels.flips
     by_mode = {} if labels is None else {number: labels.of(i) for i, number in enumerate(numbers)}
     peaks = rows(picked, flips, by_mode)
+    remarks += moved_between_hits(peaks, picked.spectra.duration)
     sure = {} if labels is None else {number: labels.stated(i) for i, number in enumerate(numbers)}
     named = _each_once({number: one for number, one in sure.items() if one is not None})
     text = fragment_text(
