@@ -86,7 +86,8 @@ def pick(
     Parameters
     ----------
     files : sequence of path
-        WAV or CSV; FLAC and UFF with the extra `bayesplate[recordings]`. Files between the same two places are repeats.
+        WAV or CSV; FLAC and UFF with the extra `bayesplate[recordings]`. Files of which both places are given
+        and the same are repeats.
     card : str or path, optional
         A board card with sizes and edges, which may be without frequencies: labels are computed for it.
     rate : float, optional, Hz
