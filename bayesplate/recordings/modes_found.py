@@ -60,8 +60,8 @@ class Mode:
         Twice the ln of how much likelier the spectra are with this mode.
     expected : float
         Of how many modes noise alone would give so much, in all the band.
-    shift : float, Hz
-        By which the frequency differs in a narrower window, where that is more than the fewer lines let expect.
+    shift : (2,) array, Hz
+        By which both differ in a narrower window, where that is more than the fewer lines let expect.
     seen : float
         Share of the widths of windows in which it was found.
     """
@@ -75,7 +75,7 @@ class Mode:
     residue_sd: Floats
     gain: float
     expected: float
-    shift: float
+    shift: Floats
     seen: float
 
     @property
@@ -238,7 +238,7 @@ def _modes_of(
             residue_sd=_residue_sd(fit, m) * noise,
             gain=gains[m],
             expected=_expected(gains[m], few.rest.shape[1], n_lines),
-            shift=_shift(narrow, fit.poles[m], inverse[m, m]),
+            shift=_shift(narrow, fit.poles[m], np.diagonal(inverse)[at]),
             seen=float(np.mean(counted)),
         )
 
@@ -283,14 +283,14 @@ def _narrower(fit: Fitted, low: float, high: float) -> Fitted:
     return refined(replace(window, frequency=window.frequency[kept], values=window.values[kept]), fit.poles)
 
 
-def _shift(narrow: Fitted, pole: Floats, variance: float) -> float:
-    """By how much a frequency moves in the narrower window, if that is more than fewer lines let expect."""
+def _shift(narrow: Fitted, pole: Floats, variances: Floats) -> Floats:
+    """By how much frequency and decay rate move in the narrower window, if that is more than fewer lines let expect."""
     nearest = int(np.argmin(np.abs(narrow.poles[:, 0] - pole[0])))
     _, information = narrow.information()
     inverse = np.linalg.pinv(information.sum(axis=0), hermitian=True)
-    expected = max(float(inverse[nearest, nearest]) - variance, 0.0)
-    moved = float(narrow.poles[nearest, 0] - pole[0])
-    return float(np.sqrt(moved**2 - expected)) if moved**2 > _NOTED**2 * expected else 0.0
+    expected = np.maximum(np.diagonal(inverse)[[nearest, len(narrow.poles) + nearest]] - variances, 0.0)
+    squares = (narrow.poles[nearest] - pole) ** 2
+    return np.asarray(np.sqrt(np.where(squares > _NOTED**2 * expected, squares - expected, 0.0)))
 
 
 def _residue_sd(fit: Fitted, mode: int) -> Floats:

@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 
 LOWEST, HIGHEST = 20.0, 1000.0
 """Hz between which modes are looked for unless others are given."""
-_BEYOND = 60.0
-"""Hz above the highest in which modes are looked for too: they reach into the band."""
+_BEYOND = 100.0
+"""Hz below the lowest and above the highest in which modes are looked for too: they reach into the band."""
 _FEWEST_LINES = 5
 _PART = 0.5
 """Probability from which on a part of another peak is fitted together with it as one mode."""
@@ -127,7 +127,8 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
     if n_lines < _FEWEST_LINES:
         place, wanted = f"{spectra.names[0]} between {lowest:g} and {highest:g} Hz", f"{_FEWEST_LINES} lines or more"
         raise InputError(Fault(place, wanted, str(n_lines), "--lowest and --highest look elsewhere"))
-    by_width, paths = find_modes(spectra, lowest, min(highest + _BEYOND, float(spectra.frequency[-1])))
+    below, above = max(lowest - _BEYOND, min(lowest, LOWEST)), min(highest + _BEYOND, float(spectra.frequency[-1]))
+    by_width, paths = find_modes(spectra, below, above)
     modes = fit_modes(spectra, joined(by_width, spectra), by_width, lowest, highest)
     kept, parts = _without_parts(spectra, modes, by_width, (lowest, highest))
     every = sorted((*kept, *parts), key=lambda peak: peak.mode.frequency)
@@ -149,9 +150,18 @@ class _Peak:
     doubt: float = 1.0
 
     @property
-    def frequency(self) -> float:
-        """Averaged over both, Hz."""
-        return self.doubt * self.mode.frequency + (1.0 - self.doubt) * self.other.frequency
+    def pole(self) -> Floats:
+        """Frequency and decay rate averaged over both: (2,) array, Hz."""
+        return self.doubt * _pole(self.mode) + (1.0 - self.doubt) * _pole(self.other)
+
+    @property
+    def split(self) -> Floats:
+        """Standard deviations of both for not knowing which of the two it is: (2,) array, Hz."""
+        return np.abs(_pole(self.mode) - _pole(self.other)) * np.sqrt(self.doubt * (1.0 - self.doubt))
+
+
+def _pole(mode: Mode) -> Floats:
+    return np.array([mode.frequency, mode.decay])
 
 
 def _without_parts(
@@ -214,27 +224,28 @@ def _whole(now: _Peak, before: Sequence[_Peak]) -> _Peak:
 
 def _part_of(part: _Peak, whole: _Peak) -> _Peak:
     """A part that is told by the frequency of its peak as that came out."""
-    return replace(part, verdict=replace(part.verdict, kind=part_words(whole.frequency)))
+    return replace(part, verdict=replace(part.verdict, kind=part_words(whole.pole[0])))
 
 
 def _picked(spectra: Spectra, peak: _Peak, strongest: float) -> PickedMode:
     """A mode averaged over two fits: with a part of its peak as a mode, and without."""
     mode, answer, verdict = peak.mode, peak.answer, peak.verdict
-    split = abs(mode.frequency - peak.other.frequency) * float(np.sqrt(peak.doubt * (1.0 - peak.doubt)))
-    noise = float(np.sqrt(mode.covariance[0, 0]))
-    scatter = noise * np.sqrt(max(_excess(spectra, mode, 0) - 1.0, 0.0))
-    damping_sd = float(np.sqrt(mode.covariance[1, 1] * max(_excess(spectra, mode, 1), 1.0))) / mode.frequency
+    frequency, decay = (float(one) for one in peak.pole)
+    noise, noise_decay = np.sqrt(np.diagonal(mode.covariance))
+    scatter, scatter_decay = (
+        sd * np.sqrt(max(_excess(spectra, mode, k) - 1.0, 0.0)) for k, sd in enumerate((noise, noise_decay))
+    )
     # two choices of lines are two estimates, each with an error of its own: their difference has twice its variance
-    window = float(np.hypot(mode.shift / np.sqrt(2.0), split))
+    window, window_decay = np.hypot(mode.shift / np.sqrt(2.0), peak.split)
     turned = answer.mobility
     return PickedMode(
-        frequency=peak.frequency,
+        frequency=frequency,
         sd=float(np.sqrt(noise**2 + scatter**2 + window**2)),
-        noise_sd=noise,
+        noise_sd=float(noise),
         scatter_sd=float(scatter),
-        window_sd=window,
-        damping=mode.damping,
-        damping_sd=damping_sd,
+        window_sd=float(window),
+        damping=decay / frequency,
+        damping_sd=float(np.sqrt(noise_decay**2 + scatter_decay**2 + window_decay**2)) / frequency,
         mobility=tuple(float(one) for one in np.real(turned)),
         mobility_sd=tuple(float(one) for one in answer.sd),
         complexity=complexity(answer),

@@ -24,6 +24,8 @@ FAINT, FAINT_FACTOR = 0.01, 4.5
 """Strength of what is no mode over that of modes nearby, log-normal: its median and factor."""
 SPLIT, SPLIT_FACTOR = 0.05, 2.7
 """The same of the second part of a peak that is not simple over the first."""
+UNLIKE = "not alike from hit to hit"
+"""What is called so a mode is not, if all hits were between the same two places."""
 REACH = 3.0
 """Widths (both decay rates together) within which a second part lies."""
 _REAL, _REAL_SHARE = 12.0, 0.85
@@ -52,7 +54,7 @@ class Verdict:
     spurious : float
         Probability that it is none.
     kind : str
-        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint", "something broad";
+        What it is otherwise: "noise", "hum", "a steady line", "part of NNN Hz", "faint", "something broad", `UNLIKE`;
         empty where nothing speaks of it.
     part_of : int
         Number of the mode of which it is likeliest a part; -1 if of none.
@@ -88,9 +90,9 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
     found = []
     for m, mode in enumerate(modes):
         reasons = {"noise": mode.expected / (1.0 + mode.expected)}
-        reasons["not alike from hit to hit"] = _unlike(answered[m].alike, len(spectra.between), spare)
-        reasons |= _of_lines(mode, spectra.duration, reasons["not alike from hit to hit"])
-        faint, split, part_of = _odds(m, modes, answered, usual, spacing, has_force=spectra.force is not None)
+        reasons[UNLIKE] = _unlike(answered[m].alike, len(spectra.between), spare)
+        reasons |= _of_lines(mode, spectra.duration, reasons[UNLIKE])
+        faint, split, part_of = _odds(m, modes, answered, usual, broad, spacing, has_force=spectra.force is not None)
         unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
         reasons["something broad"] = 1.0 - 1.0 / (1.0 + broad[m])
         reasons["faint"] = 1.0 - 1.0 / (1.0 + faint * unstable)
@@ -172,7 +174,14 @@ def _unlike(alike: float, n_places: int, spare: int) -> float:
 
 
 def _odds(
-    m: int, modes: Sequence[Mode], answered: Sequence[Answer], usual: Floats, spacing: float, *, has_force: bool
+    m: int,
+    modes: Sequence[Mode],
+    answered: Sequence[Answer],
+    usual: Floats,
+    broad: Floats,
+    spacing: float,
+    *,
+    has_force: bool,
 ) -> tuple[float, float, int]:
     """Odds that a mode is a faint line of something else, or a part of a stronger one, against its being a mode."""
     mode, answer = modes[m], answered[m]
@@ -188,7 +197,7 @@ def _odds(
             continue
         share = answer.strength / answered[k].strength
         odds = _log_normal(share, SPLIT, SPLIT_FACTOR) / of_mode * spacing / (2.0 * REACH * width)
-        odds *= off_real * _pattern(answer, answered[k])
+        odds *= off_real * _pattern(answer, answered[k]) / (1.0 + broad[k])  # the ground has no parts
         if has_force:
             reach = float(np.degrees(np.arctan(2.0 * share)))
             angle = complexity(answered[k])

@@ -148,8 +148,8 @@ def _force_spectrum(recording: Recording, hit: Hit, frequency: Floats) -> Comple
 def _grouped(
     between: Sequence[tuple[Place | None, Place | None]], names: Sequence[str]
 ) -> tuple[Rows, tuple[tuple[Place | None, Place | None], ...]]:
-    """Which records share their places; a file whose places are not known is a place of its own."""
-    keys = [pair if pair != (None, None) else name for pair, name in zip(between, names, strict=True)]
+    """Which records share their places; a file of which one place is not known is a pair of places of its own."""
+    keys = [name if None in pair else pair for pair, name in zip(between, names, strict=True)]
     order = list(dict.fromkeys(keys))
     places = np.array([order.index(key) for key in keys], dtype=np.intp)
     return places, tuple(between[keys.index(key)] for key in order)

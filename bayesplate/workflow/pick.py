@@ -20,7 +20,7 @@ from bayesplate.results.folder import FIGURES, make_folder, require_new, write_t
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fragment import fragment_text
 from bayesplate.workflow.pick_sand import pictures_of, upright
-from bayesplate.workflow.pick_words import show_pick
+from bayesplate.workflow.pick_words import moved_between_hits, show_pick
 from bayesplate.workflow.places import given_places, require_on_board
 from bayesplate.workflow.prepare import Prepared, prepare
 
@@ -86,7 +86,8 @@ def pick(
     Parameters
     ----------
     files : sequence of path
-        WAV or CSV; FLAC and UFF with the extra `bayesplate[recordings]`. Files between the same two places are repeats.
+        WAV or CSV; FLAC and UFF with the extra `bayesplate[recordings]`. Files of which both places are given
+        and the same are repeats.
     card : str or path, optional
         A board card with sizes and edges, which may be without frequencies: labels are computed for it.
     rate : float, optional, Hz
@@ -198,6 +199,7 @@ def _summary(
     flips = flips if labels is None else labels.flips
     by_mode = {} if labels is None else {number: labels.of(i) for i, number in enumerate(numbers)}
     peaks = rows(picked, flips, by_mode)
+    remarks += moved_between_hits(peaks, picked.spectra.duration)
     sure = {} if labels is None else {number: labels.stated(i) for i, number in enumerate(numbers)}
     named = _each_once({number: one for number, one in sure.items() if one is not None})
     text = fragment_text(

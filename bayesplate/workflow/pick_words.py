@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from bayesplate.recordings.contract import PickedRow, PickReport
+from bayesplate.recordings.plausibility import UNLIKE
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING, chances, percent, two_digits
 from bayesplate.workflow.shown import Shown
 
 MOST_SET_ASIDE = 8
+_LOUD, _RINGS, _MANY = 0.1, 1.0, 3
+"""Strength over the strongest, decay rate times duration, and number of peaks from which on it is likelier that hits
+were at several places than that all of these are no modes."""
 
 
 def show_pick(report: PickReport) -> Shown:
@@ -25,6 +31,25 @@ def show_pick(report: PickReport) -> Shown:
     if not report.likely:
         closing += " Is the board among what was recorded? --highest looks further up."
     return Shown((picked_table(report),), tuple(told), report.remarks, closing)
+
+
+def moved_between_hits(peaks: Sequence[PickedRow], seconds: float) -> list[str]:
+    """What to ask where several loud peaks ring down and differ from hit to hit; `seconds` is the length of a decay."""
+    loud = [
+        f"{peak.hz:.1f}"
+        for peak in peaks
+        if peak.kind == UNLIKE
+        and peak.amplitude > _LOUD
+        and peak.damping_percent / 100.0 * peak.hz * seconds > _RINGS
+        and not peak.is_likely
+    ]
+    if len(loud) < _MANY:
+        return []
+    listed = ", ".join(loud[:4]) + " Hz" + " and more" * (len(loud) > 4)
+    return [
+        f"{len(loud)} loud peaks ring down but are {UNLIKE}, {listed}: were all hits of a file at one place, and heard "
+        "at one? They are set aside, and labels cannot be trusted: record one file for each place, or give the places"
+    ]
 
 
 def picked_table(report: PickReport) -> Table:

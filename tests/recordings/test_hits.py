@@ -102,6 +102,19 @@ def test_what_can_be_used_is_used_and_the_rest_is_told():
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("hammer", "sensor", "n_pairs"),
+    [(HAMMER, (0.5, 0.2), 1), (HAMMER, None, 2), (None, (0.5, 0.2), 2), (None, None, 2)],
+)
+def test_files_are_repeats_only_where_both_places_are_known_and_the_same(hammer, sensor, n_pairs):
+    files = [[recording(TIMES, name=name).at(hammer, sensor)] for name in ("a.wav", "b.wav")]
+
+    spectra = take(files, 500.0).spectra
+
+    assert len(spectra.between) == n_pairs
+    assert len(set(spectra.places)) == n_pairs
+
+
 def test_what_cannot_be_used_is_refused_with_every_hit_and_every_file():
     quiet = Recording("quiet.wav", RATE, 1e-3 * np.random.default_rng(2).standard_normal(24_000), np.zeros(24_000))
     close = recording([0.5, 0.7, 0.9], name="close.wav", seconds=1.4)

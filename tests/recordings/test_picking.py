@@ -51,6 +51,15 @@ def test_the_planted_modes_are_found_and_nothing_else(picked):
     assert np.abs(errors).max() < 4.0
 
 
+def test_modes_beyond_the_asked_band_do_not_spoil_those_near_its_ends(heard):
+    """From 280 to 420 Hz there are modes at 266 and 432, a pair one width apart and a mode at the upper end."""
+    found = pick_modes(heard.spectra, 280.0, HIGHEST).modes
+    truth = board().damped[(board().damped > 280.0) & (board().damped < HIGHEST)]
+
+    np.testing.assert_allclose([mode.frequency for mode in found], truth, atol=0.02)
+    assert max(mode.sd for mode in found) < 0.03
+
+
 def test_hum_is_set_aside_by_its_name(picked):
     (hum,) = (mode for mode in picked.modes if abs(mode.frequency - 50.0) < 0.1)
 

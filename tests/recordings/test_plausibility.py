@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -23,7 +26,7 @@ MODE = Verdict(0.02, "")
 def mode(frequency: float, damping: float = 0.007) -> Mode:
     one, none = np.ones(1, dtype=complex), np.zeros((1, 2))
     decay = damping * frequency
-    return Mode(frequency, decay, 1e-4 * np.eye(2), none, none + 1.0, one, np.ones(1), 1e4, 0.0, 0.0, 1.0)
+    return Mode(frequency, decay, 1e-4 * np.eye(2), none, none + 1.0, one, np.ones(1), 1e4, 0.0, np.zeros(2), 1.0)
 
 
 def answer(strength: float = 1.0) -> Answer:
@@ -64,15 +67,28 @@ def test_broad_things_do_not_tell_how_the_board_damps_where_they_are_weak():
     assert broad_odds(damping, weak)[3:].min() > 1.0
 
 
+HERTZ = np.arange(20.0, 1000.0, 0.5)
+ONES = np.ones((HERTZ.size, 1), dtype=complex)
+SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), np.zeros(1, dtype=np.intp), ((None, None),), "acceleration", 2.0)
+
+
 def test_a_verdict_says_that_something_is_broad():
-    hertz = np.arange(20.0, 1000.0, 0.5)
-    values = np.ones((hertz.size, 1), dtype=complex)
-    spectra = Spectra(hertz, values, values, ("frf",), np.zeros(1, dtype=np.intp), ((None, None),), "acceleration", 2.0)
     modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
-    found = verdicts(spectra, modes, [answer() for _ in modes])
+    found = verdicts(SPECTRA, modes, [answer() for _ in modes])
 
     assert (found[-1].kind, found[-1].spurious > 0.5) == ("something broad", True)
     assert max(one.spurious for one in found[:-1]) < 0.1
+
+
+def test_a_weak_mode_is_a_part_of_a_peak_nearby_and_of_nothing_broad():
+    modes = [*(mode(100.0 * i) for i in range(1, 9)), mode(950.0, damping=0.035)]
+    answered = [*(answer() for _ in modes), answer(0.05)]
+    beside_a_peak = verdicts(SPECTRA, [*modes, mode(810.0)], answered)
+    beside_the_ground = verdicts(SPECTRA, [*modes, mode(910.0)], answered)
+
+    assert beside_a_peak[-1].kind == "part of 800.0 Hz"
+    assert beside_the_ground[-2].kind == "something broad"
+    assert (beside_the_ground[-1].part_of, beside_the_ground[-1].spurious < 0.5) == (-1, True)
 
 
 @pytest.fixture
@@ -95,7 +111,7 @@ def test_modes_beside_a_part_are_those_of_a_fit_without_it_and_others_stay(left_
 
     assert [peak.mode.frequency for peak in kept] == [375.0, 401.73, 404.22, 430.0]
     assert [(peak.mode.frequency, peak.verdict.kind) for peak in parts] == [
-        (404.65, f"part of {kept[2].frequency:.1f} Hz")
+        (404.65, f"part of {kept[2].pole[0]:.1f} Hz")
     ]
 
 
@@ -105,3 +121,25 @@ def test_a_mode_is_averaged_with_what_was_nearest_to_it_while_the_part_was_there
 
     assert kept[2].other.frequency == 404.65
     assert kept[2].doubt == 0.8
+
+
+def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits():
+    as_whole, beside_part = mode(400.0, damping=0.005), mode(401.0, damping=0.007)
+    spectra = SimpleNamespace(between=((None, None),), places=np.zeros(1, dtype=int))
+
+    one = picking._picked(spectra, picking._Peak(as_whole, answer(), MODE, beside_part, doubt=0.8), 1.0)
+
+    decay, other = as_whole.decay, beside_part.decay
+    assert one.frequency == pytest.approx(400.2)
+    assert one.damping == pytest.approx((0.8 * decay + 0.2 * other) / 400.2)
+    assert one.damping_sd == pytest.approx(np.hypot(0.01, 0.4 * (other - decay)) / 400.2)
+
+
+def test_damping_carries_by_how_much_it_moves_with_the_choice_of_lines():
+    moved = replace(mode(400.0), shift=np.array([0.0, 0.2]))
+    spectra = SimpleNamespace(between=((None, None),), places=np.zeros(1, dtype=int))
+
+    one = picking._picked(spectra, picking._Peak(moved, answer(), MODE, moved), 1.0)
+
+    assert one.window_sd == 0.0
+    assert one.damping_sd == pytest.approx(np.hypot(0.01, 0.2 / np.sqrt(2.0)) / 400.0)

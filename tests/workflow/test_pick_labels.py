@@ -14,6 +14,7 @@ from bayesplate.results.words import chances
 from bayesplate.workflow import pick_labels
 from bayesplate.workflow.pick_labels import FEWEST_SURE, Labels, label_peaks, proposing
 from bayesplate.workflow.pick_sand import upright
+from bayesplate.workflow.pick_words import moved_between_hits
 from bayesplate.workflow.prepare import prepare
 
 CASES = {
@@ -126,3 +127,13 @@ def test_without_a_card_the_recordings_alone_decide():
     bare = replace(ROW, labels=(), unlabelled_probability=None)
     assert bare.mode_probability == pytest.approx(0.9)
     assert chances(bare.may_be(2)) == "–"
+
+
+def test_loud_peaks_that_differ_from_hit_to_hit_ask_whether_the_hits_were_at_one_place():
+    unlike = replace(ROW, kind="not alike from hit to hit", spurious_probability=0.9, amplitude=0.5)
+    steady, faint = replace(unlike, damping_percent=0.01), replace(unlike, amplitude=0.02)
+    moved = [replace(unlike, hz=hz) for hz in (181.0, 263.9, 283.3)]
+
+    assert moved_between_hits([ROW, *moved[:2], steady, faint], 2.0) == []
+    (told,) = moved_between_hits([ROW, *moved], 2.0)
+    assert told.startswith("3 loud peaks ring down but are not alike from hit to hit, 181.0, 263.9, 283.3 Hz: were all")
