@@ -172,7 +172,8 @@ def _weakest(found: Identifiability) -> str:
     weakest = max(errors, key=lambda name: errors[name])
     share = 100 * found.shares[:, RIGIDITIES.index(weakest)].max()
     sentence = (
-        f"the modes tell {_MODULUS[weakest]} least well: noise alone leaves it {100 * errors[weakest]:.1f} % uncertain"
+        f"the modes tell {_MODULUS[weakest]} least well: the expected noise alone leaves it "
+        f"{100 * errors[weakest]:.1f} % uncertain"
     )
     if share < LOW_SHARE_PERCENT:
         sentence += f", because no mode has more than {share:.0f} % of its energy in it"

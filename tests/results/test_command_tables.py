@@ -113,7 +113,7 @@ def test_modes_are_shown_with_their_reading_or_their_range():
     )
     (table,) = sheet_tables(report)
 
-    assert table.columns[2:4] == ("likely Hz", "% in D_x/D_y/D_s")
+    assert table.columns[2:4] == ("measured or\nlikely Hz", "% in D_x/D_y/D_s")
     assert table.rows[0] == ("(1,0)", "51.4", "52", "100 / 0 / 0", "3.232", "-0.3164", "0.01128")
     assert table.rows[1][2] == "800 to 836"
     assert show_modes(report).closing == "Frequencies at the estimate; sheet to print: m.png"
