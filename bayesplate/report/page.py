@@ -162,14 +162,14 @@ def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Pict
 
 
 def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
-    """The picture of the percentile method; none where there are too few or too many, or no estimate is positive."""
+    """The picture of the percentile method; none of one estimate, of too many, or where none is positive."""
     problem = inference.problem
     system = paper_system(problem.board, problem.estimate, compared=False)
     n_modes = system.psi.size
     if n_modes > MOST_MODES_OF_PERCENTILES:
         return []
     found = percentile_estimate(system)
-    if found is None or not np.isfinite(list(found.mean.values())).all():
+    if found is None or found.n_subsets == 1 or not np.isfinite(list(found.mean.values())).all():
         return []
     return [percentiles_picture(found, n_modes, draws.moduli)]
 

@@ -399,3 +399,13 @@ def test_percentiles_are_of_the_modes_that_the_table_has():
 
     assert len(problem.board.setups[0].readings) == 7
     assert "42" in picture.caption
+
+
+def test_one_estimate_is_no_picture_of_the_percentile_method():
+    """Three modes have one subset of three, and its spread is none."""
+    board = prepare("finnish-spruce-cantilever").board
+    kept = [one for one in board.setups[0].readings if str(one.label) in {"(1,0)", "(1,1)", "(1,2)"}]
+    problem = Problem.from_card(replace(board, setups=(replace(board.setups[0], readings=tuple(kept)),))).posed
+
+    assert len(problem.board.setups[0].readings) == 3
+    assert percentiles_pictures(SimpleNamespace(problem=problem), SimpleNamespace(moduli={})) == []
