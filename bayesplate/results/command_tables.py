@@ -33,6 +33,7 @@ METHODS_REMARK = (
     "is no error; linear, exact: posterior under that law, ± its standard deviation"
 )
 _DEFAULT_DIGITS = 3
+_WHOLE_HZ = 100.0
 _NO_MODE, _LEAST_TOLD = "none", 0.005
 
 
@@ -190,5 +191,5 @@ def _shares(shares: EnergyShares, has_effects: bool) -> list[int]:
 
 def _reading(mode: SheetRow) -> str:
     if mode.likely_hz is not None:
-        return f"{mode.likely_hz[0]:.0f} to {mode.likely_hz[1]:.0f}"
+        return " to ".join(f"{end:.1f}" if end < _WHOLE_HZ else f"{end:.0f}" for end in mode.likely_hz)
     return MISSING if mode.measured_hz is None else f"{mode.measured_hz:.6g}"
