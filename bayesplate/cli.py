@@ -302,7 +302,9 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
         elif not quiet:
             shown = quote(str(card))
             say(
-                f"written to {card}. Next: bayesplate modes {shown}, which shows the figures and where to listen; "
+                f"written to {card}. Next: bayesplate check {shown}, which tells every fault, or what it can say"
+                if told.get("frequencies")
+                else f"written to {card}. Next: bayesplate modes {shown}, which shows the figures and where to listen; "
                 f"bayesplate plan {shown}, where to tap; with frequencies bayesplate check {shown}"
             )
 

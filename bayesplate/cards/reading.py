@@ -39,6 +39,8 @@ def read_file(path: str | Path) -> bytes:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with open(descriptor, "rb") as file:
             data = file.read(LARGEST_FILE + 1)
+    except InputError:  # a ValueError too
+        raise
     except FileNotFoundError:
         _refuse(asked, "a card", "no such file", f"looked in {plain(str(Path(path).absolute().parent))}")
     except PermissionError:

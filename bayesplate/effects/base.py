@@ -241,6 +241,10 @@ class Effect(ABC):
         """
         return x, y
 
+    def as_stated(self, x: float, y: float) -> tuple[float, float]:
+        """The inverse of `placed`: how a place on the plate is stated."""
+        return x, y
+
     def within(self, shaped: Effect) -> Effect:
         """The effect on a plate whose outline another effect gives: its places lie on that, its own terms end there."""
         return self

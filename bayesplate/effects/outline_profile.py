@@ -150,8 +150,19 @@ class OutlineProfile(Effect):
         """The corner of x0 and y0 is that of the outline."""
         if self.profile is None:
             return x, y
-        (corner, low), (_, high) = self.limits(np.array([-self.part_x.start / self.part_x.share, x]))
-        return x, float(np.clip(corner + y * self.part_y.share / self._widest_part, low, high))
+        (low,), (high,) = self.limits(np.array([x]))
+        return x, float(np.clip(self._corner + y * self.part_y.share / self._widest_part, low, high))
+
+    def as_stated(self, x: float, y: float) -> tuple[float, float]:
+        """From the corner of the outline, over the mean width."""
+        if self.profile is None:
+            return x, y
+        return x, float((y - self._corner) * self._widest_part / self.part_y.share)
+
+    @property
+    def _corner(self) -> float:
+        """Where the whole board has its corner of x0 and y0, as a fraction along y of the widest width."""
+        return float(self.limits(np.array([-self.part_x.start / self.part_x.share]))[0][0])
 
     @property
     def _strip_steps(self) -> float:

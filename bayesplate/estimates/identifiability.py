@@ -170,9 +170,10 @@ def remarks(board: Board, found: Identifiability) -> tuple[str, ...]:
 def _weakest(found: Identifiability) -> str:
     errors: Mapping[str, float] = dict(zip(RIGIDITIES, found.standard_errors, strict=True))
     weakest = max(errors, key=lambda name: errors[name])
-    share = 100 * found.shares[:, RIGIDITIES.index(weakest)].max()
+    share, error = 100 * found.shares[:, RIGIDITIES.index(weakest)].max(), 100 * errors[weakest]
     sentence = (
-        f"the modes tell {_MODULUS[weakest]} least well: noise alone leaves it {100 * errors[weakest]:.1f} % uncertain"
+        f"the modes tell {_MODULUS[weakest]} least well: the expected noise alone leaves it "
+        f"{error:.{max(1 - int(np.floor(np.log10(min(error, 10.0)))), 0)}f} % uncertain"
     )
     if share < LOW_SHARE_PERCENT:
         sentence += f", because no mode has more than {share:.0f} % of its energy in it"

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.combined import corner_signs
-from bayesplate.estimates.sheet import points
+from bayesplate.estimates.sheet import limits_of, points, sampled
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.modes.plate import Parity
 from bayesplate.modes.solve import collect, solve_classes
@@ -30,7 +29,7 @@ def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, d
     Returns
     -------
     dict of dict of (n_x, n_y) array
-        By setup and label; sampled at `points(N_POINTS)` of both sides, positive next to the corner of x1 and y1.
+        By setup and label; as `sampled` at `points(N_POINTS)`.
     """
     grid = points(N_POINTS)
     result = {}
@@ -40,8 +39,7 @@ def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, d
             counts[place.parity] = max(counts.get(place.parity, 0), place.rank + 1)
         modes = collect(model.plate, solve_classes(model.plate, model.system.weights(values).at(0), counts))
         where = {place: i for i, place in enumerate(zip(modes.parities, modes.ranks.tolist(), strict=True))}
-        shapes = modes.displacement(grid, grid)
-        shapes = shapes * corner_signs(shapes)[:, None, None]
+        shapes = sampled(modes, limits_of(model.system, grid), grid)
         result[model.setup.name] = {
             str(label): shapes[where[place.parity, place.rank]]
             for label, place in zip(model.setup.labels, model.places, strict=True)

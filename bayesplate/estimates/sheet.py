@@ -13,8 +13,11 @@ from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
 from bayesplate.frequencies.system import System
+from bayesplate.modes.solve import Modes
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.material import MODULI, RIGIDITIES
+
+Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 NUMBERS_OF_MODES = (12, 16, 20)
 """The first that holds every measured label; beyond the last the highest are not shown."""
@@ -46,7 +49,7 @@ class SheetMode:
     coefficients : (3,) array
         The paper's a, b, c.
     shape : (n_x, n_y) array
-        Deflection at `points` of both sides, positive next to the corner of x1 and y1.
+        As `sampled` at `points`.
     """
 
     name: str
@@ -85,7 +88,7 @@ class Sheet:
     first_label : str
         At which this laboratory's names begin.
     aspect_ratio : float
-        L_x / L_y of the part that vibrates.
+        L_x / L_y of the part that vibrates, L_y where it is widest.
     theory : str
     basis : str
         At which constants the modes are computed.
@@ -95,6 +98,9 @@ class Sheet:
         Empty where the modes do not tell the constants apart.
     likely : str
         What the bands come from; empty where there are none.
+    limits : ((n,) array, (n,) array) or None
+        Where the board begins and ends along y at `points` of its length, as fractions of its widest width; None: a
+        rectangle.
     """
 
     title: str
@@ -107,6 +113,14 @@ class Sheet:
     modes: tuple[SheetMode, ...]
     combined: tuple[CombinedMode, ...]
     likely: str = ""
+    limits: Limits | None = None
+
+    def drawn_at(self, x: float, y: float) -> tuple[float, float]:
+        """A place, as fractions of the length and of the width there, as fractions of the sides that are drawn."""
+        if self.limits is None:
+            return x, y
+        low, high = (float(np.interp(x, points(), limit)) for limit in self.limits)
+        return x, low + y * (high - low)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +156,40 @@ class Precision:
 def points(n: int = _GRID) -> NDArray[np.float64]:
     """Where shapes are sampled along each side, as fractions of it, a hair within the edges: (n,) array."""
     return np.linspace(1e-3, 1.0 - 1e-3, n)
+
+
+def limits_of(system: System, grid: NDArray[np.float64]) -> Limits | None:
+    """Where the plate of a setup begins and ends along y at points of its length; None where it is a rectangle."""
+    shaped = system.shaped
+    outline = None if shaped is None else shaped.outline()
+    return None if outline is None else outline(grid)
+
+
+def sampled(modes: Modes, limits: Limits | None, grid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Deflections of modes within the outline.
+
+    Parameters
+    ----------
+    modes : Modes
+    limits : ((n,) array, (n,) array) or None
+        `limits_of` the plate at the grid.
+    grid : (n,) array
+        Fractions of the length, and of the width at each of its points.
+
+    Returns
+    -------
+    (n_modes, n, n) array
+        Positive next to the corner of x1 and y1.
+    """
+    if limits is None:
+        shapes = modes.displacement(grid, grid)
+    else:
+        across = [
+            modes.displacement(np.array([x]), low + (high - low) * grid)
+            for x, low, high in zip(grid, *limits, strict=True)
+        ]
+        shapes = np.concatenate(across, axis=1)
+    return np.asarray(shapes * corner_signs(shapes)[:, None, None])
 
 
 def sheet(
@@ -182,9 +230,9 @@ def sheet(
             break
     found = columns(system, values, modes.coefficients)
     shares = found.shares(np.array([float(values[name]) for name in RIGIDITIES]))
-    shapes = modes.displacement(points(), points())
-    shapes = shapes * corner_signs(shapes)[:, None, None]
-    length_x, length_y = vibrating_lengths(values, setup)
+    limits = limits_of(system, points())
+    shapes = sampled(modes, limits, points())
+    length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
     rows = tuple(
         SheetMode(
             name=mode.name,
@@ -205,7 +253,8 @@ def sheet(
     ratio = float(length_x / length_y)
     first = str(setup.first_label)
     likely = "" if all(row.band_hz is None for row in rows) else _BY_MODES if precision is not None else _BY_PRIOR
-    return Sheet(title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, _combined(rows), likely)
+    mixtures = _combined(rows)
+    return Sheet(title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, mixtures, likely, limits)
 
 
 def _band(mode: NamedMode, bands: Mapping[str, tuple[float, float]] | None) -> tuple[float, float] | None:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.effects.attached_items import places_on
+from bayesplate.effects import Effect
+from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, points, sheet
 from bayesplate.frequencies.prior_bands import WITHIN
 from bayesplate.planning.beliefs import Beliefs
@@ -141,9 +142,11 @@ def bench_of(
     )
     grid = points()[::_EVERY]
     shapes = np.stack([mode.shape[::_EVERY, ::_EVERY] for mode in shown])
-    placed = placing(shapes, grid, _sensor(board, station) if goes_on else None)
+    placed = placing(shapes, grid, _sensor(board, station, drawn, system.shaped) if goes_on else None)
     kept = replace(drawn, modes=shown, combined=(), likely=likely)
-    marks = places_on(board, station.setup, (placed.sensor, placed.hammer, *placed.taps))
+    seen_at = (drawn.drawn_at(*place) for place in (placed.sensor, placed.hammer, *placed.taps))
+    stated = seen_at if system.shaped is None else (system.shaped.as_stated(*place) for place in seen_at)
+    marks = places_on(board, station.setup, tuple(stated))
     sensor, hammer, *taps = ((round(1e3 * x), round(1e3 * y)) for x, y in marks)
     modes = tuple(
         ModeToFind(mode.name, mode.hertz, *(mode.band_hz or (0.0, 0.0)), seen)
@@ -153,11 +156,12 @@ def bench_of(
     return Bench(entry, kept, placed)
 
 
-def _sensor(board: Board, station: Station) -> tuple[float, float] | None:
+def _sensor(board: Board, station: Station, drawn: Sheet, shaped: Effect | None) -> tuple[float, float] | None:
     """Where the one sensor stands, as fractions of what vibrates; None where there is none, or there are several."""
     if station.base.sensor is None:
         return None
-    x, y = station.base.sensor
-    start = places_on(board, station.setup, ((0.0, 0.0),))[0]
-    end = places_on(board, station.setup, ((1.0, 1.0),))[0]
-    return (x - start[0]) / (end[0] - start[0]), (y - start[1]) / (end[1] - start[1])
+    ((x, y),) = fractions_on(board, station.setup, (station.base.sensor,))
+    if shaped is not None:
+        x, y = shaped.placed(x, y)
+    low, high = drawn.drawn_at(x, 0.0)[1], drawn.drawn_at(x, 1.0)[1]
+    return x, (y - low) / (high - low)

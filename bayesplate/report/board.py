@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from bayesplate.estimates.sheet import limits_of
+from bayesplate.frequencies.system import System, system_of
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.setup import EDGES, Setup
 from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH, WORDS, Picture, short
@@ -14,11 +18,14 @@ from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH,
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Floats = NDArray[np.float64]
+
 _WIDEST, _TALLEST = 3.1, 3.6
 _LEFT, _ABOVE, _BELOW = 0.85, 0.42, 0.62
 _HATCH = 0.10
 _HEADING = 0.14
 _N_GRAIN = 13
+_N_POINTS = 201
 _LINES = {"clamped": ("-", 1.6), "supported": ((0, (4, 3)), 1.6), "free": ("-", 0.9)}
 _MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p"}
 
@@ -37,7 +44,8 @@ def board_picture(board: Board) -> Picture:
     from matplotlib.figure import Figure
 
     values = board.nominal()
-    length, width = float(values["length_x"]), float(values["length_y"])
+    outlines = [_outline(system_of(board, setup), values) for setup in board.setups]
+    length, width = float(values["length_x"]), max(one.width for one in outlines)
     scale = min(_WIDEST / length, _TALLEST / width)
     above = _ABOVE + (_HEADING if len(board.setups) > 1 else 0.0)
     row = above + width * scale + _BELOW
@@ -45,47 +53,96 @@ def board_picture(board: Board) -> Picture:
     height = row * len(board.setups) + (0.3 if has_legend else 0.0)
     figure = Figure(figsize=(WIDTH, height))
     handles: dict[str, Any] = {}
-    for i, setup in enumerate(board.setups):
+    for i, (setup, outline) in enumerate(zip(board.setups, outlines, strict=True)):
         size = (length * scale, width * scale)
         left = _LEFT + (WIDTH - _LEFT - 0.55 - size[0]) / 2
         bottom = height - i * row - above - size[1]
         panel = figure.add_axes((left / WIDTH, bottom / height, size[0] / WIDTH, size[1] / height))
         panel.set(xlim=(0, length), ylim=(0, width))
         panel.set_axis_off()
-        _draw_board(panel, setup, values, scale)
+        _draw_board(panel, setup, outline, values, scale)
         if len(board.setups) > 1:
             heading = (length / 2, width + 0.3 / scale)
             panel.text(*heading, short(setup.name, 44), ha="center", fontsize=WORDS, weight="bold", parse_math=False)
-        handles |= _draw_items(panel, setup)
+        handles |= _draw_items(panel, setup, outline)
     if handles:
         figure.legend(
             handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL,
             handletextpad=0.4,
         )  # fmt: skip
-    return Picture("board", "The board, drawn to scale", _alt(board, values), _CAPTION, figure)
+    caption = _CAPTION if all(one.is_rectangle for one in outlines) else f"{_CAPTION} {_OUTLINE}"
+    return Picture("board", "The board, drawn to scale", _alt(board, values, outlines), caption, figure)
 
 
 _CAPTION = (
     "Seen from above, drawn to scale. The fine lines run along the grain. Hatched: held by a clamp; dashed: resting on "
     "a support; thin: free."
 )
+_OUTLINE = (
+    "The outline is what the readings of the width make probable. Which edge recedes they do not say: where both are "
+    "free, both are drawn to recede alike."
+)
 
 
-def _draw_board(panel: Axes, setup: Setup, values: Values, scale: float) -> None:
+@dataclass(frozen=True, eq=False)
+class _Outline:
+    """Where a whole board begins and ends along y at points along it, clamped parts included.
+
+    Attributes
+    ----------
+    x, low, high : (n,) array, m
+    is_rectangle : bool
+    """
+
+    x: Floats
+    low: Floats
+    high: Floats
+    is_rectangle: bool
+
+    @property
+    def width(self) -> float:
+        """Widest width, m."""
+        return float(self.high.max())
+
+    def at(self, x: Floats) -> tuple[Floats, Floats]:
+        """Where it begins and ends along y at points along it, m; as at its ends beyond them."""
+        return np.interp(x, self.x, self.low), np.interp(x, self.x, self.high)
+
+    def across(self) -> str:
+        """Its width in words."""
+        narrowest, widest = (f"{end((self.high - self.low) * 1e3):.4g}" for end in (np.min, np.max))
+        return f"{widest} mm across" if self.is_rectangle else f"{narrowest} to {widest} mm across"
+
+
+def _outline(system: System, values: Values) -> _Outline:
+    """The outline of a board as the model of a setup has it."""
+    x = np.linspace(0.0, float(values["length_x"]), _N_POINTS)
+    adjusted = system.adjusted(values)
+    length, width = (float(side) for side in vibrating_lengths(adjusted, system.setup))
+    start = float(values[system.setup.input_name("x0")]) if "x0" in system.setup.clamped else 0.0
+    limits = limits_of(system, (x - start) / length)
+    low, high = limits or (np.zeros_like(x), np.ones_like(x))
+    return _Outline(x, low * width, float(adjusted["length_y"]) - (1.0 - high) * width, limits is None)
+
+
+def _draw_board(panel: Axes, setup: Setup, outline: _Outline, values: Values, scale: float) -> None:
     """Grain, edges and dimensions."""
-    length, width = float(values["length_x"]), float(values["length_y"])
+    length, width = float(values["length_x"]), outline.width
     for y in np.linspace(0, width, _N_GRAIN + 2)[1:-1]:
-        panel.plot([0, length], [y, y], color=LIGHT, lw=0.7, zorder=1)
+        within = (outline.low <= y) & (y <= outline.high)
+        panel.plot(outline.x, np.where(within, y, np.nan), color=LIGHT, lw=0.7, zorder=1)
     covered = {edge: float(values[setup.input_name(edge)]) for edge in setup.clamped}
     low_x, high_x = covered.get("x0", 0.0), length - covered.get("x1", 0.0)
     low_y, high_y = covered.get("y0", 0.0), width - covered.get("y1", 0.0)
     free = (low_x, high_x, low_y, high_y)
     for edge in EDGES:
-        _draw_edge(panel, edge, setup.edges[edge], covered.get(edge, 0.0), free, values, scale)
-    panel.plot([0, length, length, 0, 0], [0, 0, width, width, 0], color=GREY, lw=0.7, clip_on=False, zorder=2)
+        _draw_edge(panel, edge, setup.edges[edge], covered.get(edge, 0.0), free, outline, scale)
+    around = np.concatenate([outline.x, outline.x[::-1], [0.0]])
+    panel.plot(around, np.concatenate([outline.low, outline.high[::-1], outline.low[:1]]), color=GREY, lw=0.7,
+               clip_on=False, zorder=2)  # fmt: skip
     across = 0.34 / scale
     _dimension(panel, (0, -across), (length, -across), f"{length * 1e3:.4g} mm, along the grain", below=True)
-    _dimension(panel, (-across, 0), (-across, width), f"{width * 1e3:.4g} mm across", below=False)
+    _dimension(panel, (-across, 0), (-across, width), outline.across(), below=False)
 
 
 def _draw_edge(
@@ -94,24 +151,32 @@ def _draw_edge(
     word: str,
     covered: float,
     free: tuple[float, float, float, float],
-    values: Values,
+    outline: _Outline,
     scale: float,
 ) -> None:
     """The line where the vibrating part ends, hatching where a clamp holds it, and the word."""
-    from matplotlib.patches import Rectangle
+    from matplotlib.patches import Polygon
 
-    length, width = float(values["length_x"]), float(values["length_y"])
+    length, width = float(outline.x[-1]), outline.width
     low_x, high_x, low_y, high_y = free
     at = {"x0": low_x, "x1": high_x, "y0": low_y, "y1": high_y}[edge]
-    line: Any = ([at, at], [low_y, high_y]) if edge[0] == "x" else ([low_x, high_x], [at, at])
+    along = np.array([at, at]) if edge[0] == "x" else np.unique(np.clip(outline.x, low_x, high_x))
+    low, high = outline.at(along)
+    low, high = low + low_y, high - (width - high_y)
+    line = (along, np.array([low[0], high[0]]) if edge[0] == "x" else low if edge == "y0" else high)
     style, thickness = _LINES[word]
     panel.plot(*line, ls=style, lw=thickness, color="black", clip_on=False, zorder=4, label=f"edge {edge} {word}")
     band = max(covered, _HATCH / scale)
     start = at - band if edge[1] == "0" else at
     if word == "clamped":
-        box: Any = ((start, 0.0), band, width) if edge[0] == "x" else ((0.0, start), length, band)
+        if edge[0] == "x":
+            across = start + band * np.linspace(0.0, 1.0, _N_POINTS)
+            low, high = outline.at(across)
+            corners = np.column_stack([[*across, *across[::-1]], [*low, *high[::-1]]])
+        else:
+            corners = np.array([[0.0, start], [length, start], [length, start + band], [0.0, start + band]])
         panel.add_patch(
-            Rectangle(*box, hatch="/////", facecolor="none", edgecolor=GREY, lw=0.0, clip_on=False, zorder=3)
+            Polygon(corners, hatch="/////", facecolor="none", edgecolor=GREY, lw=0.0, clip_on=False, zorder=3)
         )
     beyond = 0.05 / scale + (0.0 if covered or word != "clamped" else band)
     told = f"{word}, {covered * 1e3:.3g} mm" if covered else word
@@ -138,15 +203,18 @@ def _dimension(panel: Axes, start: tuple[float, float], end: tuple[float, float]
     )  # fmt: skip
 
 
-def _draw_items(panel: Axes, setup: Setup) -> dict[str, Any]:
-    """Hammer and attached items at their places; a handle for the legend by name."""
+def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
+    """Hammer and attached items at their places from the corner of x0 and y0; a handle for the legend by name."""
+    corner = outline.low[0]
     style: Any = {"ls": "none", "ms": 7, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
     handles: dict[str, Any] = {}
     for kind in dict.fromkeys(item.kind for item in setup.attached):
-        places = [place for item in setup.attached if item.kind == kind for place in item.places]
+        places = [(x, y + corner) for item in setup.attached if item.kind == kind for x, y in item.places]
         handles[kind] = _points(panel, places, _MARKERS[kind], kind, mfc=VERMILLION, **style)
     if setup.hammer is not None:
-        handles["hammer"] = _points(panel, [setup.hammer], "X", "hammer", mfc="white", **style)
+        handles["hammer"] = _points(
+            panel, [(setup.hammer[0], setup.hammer[1] + corner)], "X", "hammer", mfc="white", **style
+        )
     return handles
 
 
@@ -155,11 +223,12 @@ def _points(panel: Axes, places: Sequence[tuple[float, float]], marker: str, lab
     return panel.plot(x, y, marker=marker, label=label, **style)[0]
 
 
-def _alt(board: Board, values: Values) -> str:
-    size = f"{float(values['length_x']) * 1e3:.4g} mm along the grain, {float(values['length_y']) * 1e3:.4g} mm across"
+def _alt(board: Board, values: Values, outlines: Sequence[_Outline]) -> str:
+    size = f"{float(values['length_x']) * 1e3:.4g} mm along the grain, {outlines[0].across()}"
     held = []
     for setup in board.setups:
         words = ", ".join(f"{edge} {word}" for edge, word in setup.edges.items())
         free = " by ".join(f"{float(side) * 1e3:.4g}" for side in vibrating_lengths(values, setup))
         held.append(f"setup {setup.name}: {words}; the part that vibrates is {free} mm")
-    return f"A rectangular board, {size}. " + ". ".join(held) + "."
+    kind = "rectangular board" if all(one.is_rectangle for one in outlines) else "board whose width varies"
+    return f"A {kind}, {size}. " + ". ".join(held) + "."

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
+from bayesplate.estimates.sheet import CombinedMode, Limits, Sheet, SheetMode, points
 from bayesplate.report.style import BLUE, GREEN, VERMILLION, drawable
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.words import STIFFNESS
@@ -71,7 +71,7 @@ def layout(n_modes: int, aspect_ratio: float, *, has_combined: bool) -> Layout:
 
 @dataclass(frozen=True)
 class Marks:
-    """What is marked on every figure of a sheet, as fractions of the sides that vibrate.
+    """What is marked on every figure of a sheet, as fractions of the length that vibrates and of the width there.
 
     Attributes
     ----------
@@ -117,9 +117,9 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
         row, column = divmod(i, plan.n_columns)
         in_row = min(plan.n_columns, len(sheet.modes) - row * plan.n_columns)
         panel = _panel(figure, plan, _left(plan, column, in_row), top - row * plan.cell[1], sheet)
-        draw_sand(panel, mode.shape)
+        draw_sand(panel, mode.shape, sheet.limits)
         if marks is not None:
-            _draw_marks(panel, marks)
+            _draw_marks(panel, marks, sheet)
         _caption(panel, *_mode_caption(mode))
     if sheet.combined:
         _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
@@ -133,13 +133,19 @@ def _close(plan: Layout) -> Layout:
     return replace(plan, cell=(plan.cell[0], height))
 
 
-def _draw_marks(panel: Axes, marks: Marks) -> None:
+def _draw_marks(panel: Axes, marks: Marks, sheet: Sheet) -> None:
     """Sensor, hammer, and where to tap."""
     style: Any = {"ls": "none", "clip_on": False, "zorder": 6, "mec": "black"}
     if marks.taps:
-        panel.plot(*np.transpose(marks.taps), ".", ms=4, color=GREEN, **{**style, "mec": GREEN})
-    panel.plot(*marks.sensor, "o", ms=8, color=BLUE, mew=0.8, **style)
-    panel.plot(*marks.hammer, "X", ms=9, color=VERMILLION, mew=0.8, **style)
+        panel.plot(
+            *np.transpose([sheet.drawn_at(*tap) for tap in marks.taps]),
+            ".",
+            ms=4,
+            color=GREEN,
+            **{**style, "mec": GREEN},
+        )
+    panel.plot(*sheet.drawn_at(*marks.sensor), "o", ms=8, color=BLUE, mew=0.8, **style)
+    panel.plot(*sheet.drawn_at(*marks.hammer), "X", ms=9, color=VERMILLION, mew=0.8, **style)
 
 
 def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> None:
@@ -154,7 +160,7 @@ def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> No
     wide = replace(plan, cell=((A4[0] - 2 * _MARGIN) / _N_COMBINED, plan.cell[1]))
     for column, one in enumerate(sheet.combined):
         panel = _panel(figure, wide, _left(wide, column, len(sheet.combined)), top - _BETWEEN + _GAP / 2, sheet)
-        _draw_mixture(panel, one)
+        _draw_mixture(panel, one, sheet.limits)
         _caption(panel, one.name, f"{STIFFNESS[one.modulus]}, {in_figure(one.modulus)}")
 
 
@@ -171,40 +177,60 @@ def _panel(figure: Figure, plan: Layout, left: float, top: float, sheet: Sheet) 
     panel.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
     panel.spines[:].set_visible(False)
     for name, word in sheet.edges.items():
-        draw_edge(panel, name, word, _BAND / width if name[0] == "x" else _BAND / height)
+        draw_edge(panel, name, word, _BAND / width if name[0] == "x" else _BAND / height, sheet.limits)
     return panel
 
 
-def draw_edge(panel: Axes, name: str, word: str, depth: float) -> None:
+def draw_edge(panel: Axes, name: str, word: str, depth: float, limits: Limits | None = None) -> None:
     """One edge: clamped hatched, supported dashed, free thin; `depth` of the hatching as a fraction of the side."""
     from matplotlib.patches import Rectangle
 
     along_y, at_end = name[0] == "x", name[1] == "1"
-    line: Any = ([at_end, at_end], [0, 1]) if along_y else ([0, 1], [at_end, at_end])
+    x, low_y, high_y = _outline(limits)
+    end = -1 if at_end else 0
+    line: Any = ([at_end, at_end], [low_y[end], high_y[end]]) if along_y else (x, high_y if at_end else low_y)
     style = {"clamped": ("-", 1.0), "supported": ((0, (3, 2)), 1.4), "free": ("-", 0.6)}[word]
     panel.plot(*line, ls=style[0], lw=style[1], color="0.25", clip_on=False, zorder=4, label=f"edge {name} {word}")
     if word == "clamped":
         low = 1.0 if at_end else -depth
-        box = ((low, 0.0), depth, 1.0) if along_y else ((0.0, low), 1.0, depth)
+        box = ((low, line[1][0]), depth, line[1][1] - line[1][0]) if along_y else ((0.0, low), 1.0, depth)
         hatched = Rectangle(*box, hatch="//////", facecolor="none", edgecolor="0.45", lw=0.0, clip_on=False)
         panel.add_patch(hatched)
 
 
-def draw_sand(panel: Axes, shape: NDArray[np.float64]) -> None:
+def _outline(limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Points along the length, from end to end, and where the board begins and ends along y there."""
+    if limits is None:
+        return np.array([0.0, 1.0]), np.zeros(2), np.ones(2)
+    x = points(len(limits[0]))
+    x[[0, -1]] = 0.0, 1.0
+    return x, *limits
+
+
+def _places(n: int, limits: Limits | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where a shape of n by n points is drawn: x and y, as it is, (n, n) arrays."""
+    x, y = np.meshgrid(points(n), points(n), indexing="ij")
+    if limits is None:
+        return x, y
+    low, high = (limit[:, None] for limit in limits)
+    return x, low + y * (high - low)
+
+
+def draw_sand(panel: Axes, shape: NDArray[np.float64], limits: Limits | None = None) -> None:
     """Nodal lines in black; the parts that move down while the others move up are grey."""
-    grid = points(len(shape))
-    panel.contourf(grid, grid, shape.T, levels=[-np.inf, 0.0, np.inf], colors=[_LOW, "white"])
-    panel.contour(grid, grid, shape.T, levels=[0.0], colors=_SAND, linewidths=1.8)
+    at = _places(len(shape), limits)
+    panel.contourf(*at, shape, levels=[-np.inf, 0.0, np.inf], colors=[_LOW, "white"])
+    panel.contour(*at, shape, levels=[0.0], colors=_SAND, linewidths=1.8)
 
 
-def _draw_mixture(panel: Axes, one: CombinedMode) -> None:
+def _draw_mixture(panel: Axes, one: CombinedMode, limits: Limits | None) -> None:
     """Nodal lines on a grey ground that is darker the more the board moves."""
-    grid = points()
+    at = _places(len(one.shape), limits)
     largest = np.abs(one.shape).max()
     levels = [0.0, 0.1, 0.3, 0.5, 0.7, 1.0]
     greys = ["1.0", "0.92", "0.82", "0.72", "0.60"]
-    panel.contourf(grid, grid, np.abs(one.shape.T) / largest, levels=levels, colors=greys, extend="max")
-    panel.contour(grid, grid, one.shape.T, levels=[0.0], colors=_SAND, linewidths=1.4)
+    panel.contourf(*at, np.abs(one.shape) / largest, levels=levels, colors=greys, extend="max")
+    panel.contour(*at, one.shape, levels=[0.0], colors=_SAND, linewidths=1.4)
 
 
 def _mode_caption(mode: SheetMode) -> tuple[str, str]:

@@ -53,8 +53,10 @@ def summary_sentences(summary: Summary) -> list[str]:
     else:
         sentences.append(f"{missed}; a mode that it has not seen, by {_cents(left_out)}.")
     share, weakest = max((entry.sd / entry.mean, name) for name, entry in summary.elastic.items())
-    sentences.append(f"Least well known is {constant_name(weakest)}: ± {two_digits(share, 100)} %.")
-    return sentences
+    told = two_digits(share, 100)
+    alike = all(two_digits(entry.sd / entry.mean, 100) == told for _, entry in summary.elastic.items())
+    which = "All three are known equally well" if alike else f"Least well known is {constant_name(weakest)}"
+    return [*sentences, f"{which}: ± {told} %."]
 
 
 def _cents(value: float) -> str:
@@ -159,7 +161,10 @@ def inputs_table(board: Board, summary: Summary) -> Table:
     rows = []
     for one in filter(lambda one: one.is_listed, board.parameters):
         words, factor, unit = input_words(one, board)
-        after = plus_minus(summary.inputs[one.name], factor) if one.name in summary.inputs else MISSING
+        entry = (
+            summary.effects[one.owner.title][one.effect][one.key] if one.is_of_effect else summary.inputs.get(one.name)
+        )
+        after = MISSING if entry is None or one.prior.is_exact else plus_minus(entry, factor)
         rows.append((f"{words}, {unit}" if unit else words, _stated(one.prior, factor), after))
     return Table("Inputs", ("quantity", "as stated", "after the fit"), tuple(rows))
 

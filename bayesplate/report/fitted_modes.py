@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.estimates.sheet import Limits
 from bayesplate.plate.setup import Setup
 from bayesplate.report.chladni import draw_edge, draw_sand
 from bayesplate.report.style import DARK, SMALL, WIDTH, WORDS, Picture
@@ -33,6 +34,7 @@ def fitted_modes_picture(
     shapes: Mapping[str, NDArray[np.float64]],
     aspect_ratio: float,
     name: str = "modes",
+    limits: Limits | None = None,
 ) -> Picture:
     """Draw the fitted modes of one setup in the order of frequency.
 
@@ -44,9 +46,11 @@ def fitted_modes_picture(
     shapes : dict of (n_x, n_y) array
         By label.
     aspect_ratio : float
-        L_x / L_y of the part that vibrates.
+        L_x / L_y of the part that vibrates, L_y where it is widest.
     name : str
         Stem of the picture's files.
+    limits : ((n_x,) array, (n_x,) array), optional
+        Where the board begins and ends along y, as fractions of its widest width.
 
     Returns
     -------
@@ -70,8 +74,8 @@ def fitted_modes_picture(
         panel.set(xlim=(0, 1), ylim=(0, 1))
         panel.set_axis_off()
         for edge, word in setup.edges.items():
-            draw_edge(panel, edge, word, _BAND / size[0] if edge[0] == "x" else _BAND / size[1])
-        draw_sand(panel, shapes[mode.label])
+            draw_edge(panel, edge, word, _BAND / size[0] if edge[0] == "x" else _BAND / size[1], limits)
+        draw_sand(panel, shapes[mode.label], limits)
         _caption(panel, mode)
     told = "; ".join(
         f"{mode.label} measured {mode.measured_hz:.6g} Hz, predicted {mode.predicted_hz.mean:.1f} Hz"

@@ -19,7 +19,8 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.exports import write_before_after, write_known
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.estimates.shapes import labelled_shapes
+from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
+from bayesplate.estimates.sheet import limits_of, points
 from bayesplate.plate.board import vibrating_lengths
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
@@ -161,14 +162,14 @@ def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Pict
 
 
 def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
-    """The picture of the percentile method; none where there are too few or too many, or no estimate is positive."""
+    """The picture of the percentile method; none of one estimate, of too many, or where none is positive."""
     problem = inference.problem
     system = paper_system(problem.board, problem.estimate, compared=False)
     n_modes = system.psi.size
     if n_modes > MOST_MODES_OF_PERCENTILES:
         return []
     found = percentile_estimate(system)
-    if found is None or not np.isfinite(list(found.mean.values())).all():
+    if found is None or found.n_subsets == 1 or not np.isfinite(list(found.mean.values())).all():
         return []
     return [percentiles_picture(found, n_modes, draws.moduli)]
 
@@ -180,11 +181,13 @@ def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list
     shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
     values = board.nominal()
     found = []
-    for setup in board.setups:
-        length_x, length_y = vibrating_lengths(values, setup)
+    for model in problem.posterior.models:
+        setup, system = model.setup, model.system
+        length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
         own = [mode for mode in summary.modes if mode.setup == setup.name]
         name = "modes" if len(board.setups) == 1 else f"modes-{setup.name}"
-        found.append(fitted_modes_picture(setup, own, shapes[setup.name], float(length_x / length_y), name))
+        ratio, limits = float(length_x / length_y), limits_of(system, points(N_POINTS))
+        found.append(fitted_modes_picture(setup, own, shapes[setup.name], ratio, name, limits))
     return found
 
 

@@ -31,7 +31,12 @@ _LEFT, _BOTTOM, _TOP, _RIGHT, _GAP = 0.72, 0.72, 0.08, 0.12, 0.07
 _STRONG = 0.5
 _LARGE = 0.75
 _CHARACTERS_AN_INCH = 17
-_BRIEF = {"length along the grain": "length", "length across the grain": "width", " ratio": "", " profile": ""}
+_BRIEF = {
+    "length along the grain": "length",
+    "length across the grain": "width",
+    " profile": "",
+    "Poisson ratio nu_xy": "ν_xy",
+}
 
 
 def pairs_picture(problem: PosedProblem, draws: Draws) -> Picture:

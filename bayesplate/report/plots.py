@@ -111,7 +111,9 @@ class FitPlots:
 
         found = percentiles_pictures(self.inference, self.draws)
         if not found:
-            raise InputError(Fault("plot.percentiles", "a board of few modes", "too many, or no positive estimate"))
+            raise InputError(
+                Fault("plot.percentiles", "a board of a few modes more than three", "too few, too many, or no estimate")
+            )
         return found[0].figure
 
     def sampler(self) -> Figure:

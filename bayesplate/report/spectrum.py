@@ -78,6 +78,8 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
         "their 90 % intervals: the modes that the fitted plate has, hollow where no peak is likely theirs. A line "
         "joins a peak to a mode that it may be, the thicker the more probable."
     )
+    if any(mode.label == UNNAMED for mode in shown):
+        caption += " A question mark: a mode whose figure fits no label."
     title = "Which mode each peak is" + (f", {spectrum.setup}" if several else "")
     name = f"spectrum_{spectrum.setup}" if several else "spectrum"
     return Picture(name, title, told, caption, figure)

@@ -11,6 +11,7 @@ from bayesplate.results.words import (
     GPA,
     MISSING,
     chances,
+    decimals,
     mode_name,
     narrow_name,
     number,
@@ -32,14 +33,20 @@ METHODS_REMARK = (
     "is no error; linear, exact: posterior under that law, ± its standard deviation"
 )
 _DEFAULT_DIGITS = 3
+_WHOLE_HZ = 100.0
 _NO_MODE, _LEAST_TOLD = "none", 0.005
 
 
 def check_tables(report: CheckReport) -> tuple[Table, ...]:
     """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
     constants = tuple(
-        (narrow_name(name), f"{report.estimate[name] * GPA:.4g}", f"± {two_digits(report.expected_sd_percent[name])} %")
+        (
+            narrow_name(name),
+            number(estimate, decimals(estimate * report.expected_sd_percent[name] / 100 * GPA), factor=GPA),
+            f"± {two_digits(report.expected_sd_percent[name])} %",
+        )
         for name in CONSTANTS
+        for estimate in (report.estimate[name],)
     )
     modes = tuple(
         (
@@ -52,7 +59,11 @@ def check_tables(report: CheckReport) -> tuple[Table, ...]:
         for mode in report.modes
     )
     return (
-        Table(f"What {report.name} can tell, GPa", ("constant", "least squares", "uncertainty to expect"), constants),
+        Table(
+            f"What {report.name} can tell, GPa",
+            ("constant", "weighted least squares", "uncertainty to expect"),
+            constants,
+        ),
         Table("Modes", ("mode", "measured Hz", "error, cents", "energy in D_x/D_y/D_s, %", "leverage"), modes),
         *([_effects_table(report)] if report.signatures else []),
     )
@@ -164,9 +175,11 @@ def _sheet_table(name: str, setup: SheetReport) -> Table:
     )
     energy = "% in D_x/D_y/D_s" + ("/rest" if has_effects else "")
     is_expected = any(mode.likely_hz for mode in setup.modes)
+    is_read = any(mode.measured_hz for mode in setup.modes) or not is_expected
+    read = " or\n".join(["measured"] * is_read + ["likely"] * is_expected) + " Hz"
     return Table(
         f"Lowest modes of {name}, setup {setup.setup}, {setup.theory} plate",
-        ("mode", "Hz", "likely Hz" if is_expected else "measured Hz", energy, "a", "b", "c"),
+        ("mode", "Hz", read, energy, "a", "b", "c"),
         rows,
     )
 
@@ -178,5 +191,5 @@ def _shares(shares: EnergyShares, has_effects: bool) -> list[int]:
 
 def _reading(mode: SheetRow) -> str:
     if mode.likely_hz is not None:
-        return f"{mode.likely_hz[0]:.0f} to {mode.likely_hz[1]:.0f}"
+        return " to ".join(f"{end:.1f}" if end < _WHOLE_HZ else f"{end:.0f}" for end in mode.likely_hz)
     return MISSING if mode.measured_hz is None else f"{mode.measured_hz:.6g}"

@@ -89,7 +89,7 @@ def constants_tex(summary: Summary, title: str) -> str:
         points = [_rounded(estimate[name], digits) for estimate in both]
         spread = rf"${entry.mean * GPA:.{digits}f} \pm {entry.sd * GPA:.{digits}f}$"
         rows.append([symbol, spread, interval(entry, GPA), *points])
-    header = ["GPa", r"mean $\pm$ sd", r"90\,\% interval", "least squares", "weighted"]
+    header = ["GPa", r"mean $\pm$ sd", r"90\,\% interval", "paper's least squares", "weighted"]
     source = f"% Elastic constants of {latex(title)}, seed {summary.seed}, {len(summary.modes)} modes"
     return tabular(source, header, rows)
 

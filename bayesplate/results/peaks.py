@@ -118,10 +118,9 @@ def assigned_peaks(problem: PosedProblem, draws: Draws) -> tuple[tuple[AssignedP
             continue
         every = draws.every_log_frequency[i]
         flat, noise = every.reshape(-1, every.shape[-1]), draws.noise[..., i].ravel()
-        step = max(1, len(flat) // MOST_DRAWS_OF_LABELS)
-        flat, noise = flat[::step], noise[::step]
-        probabilities = likelihood.probabilities(flat, noise)
         predicted = [_predicted(np.exp(column)) for column in flat[:, likelihood.columns].T]
+        step = max(1, len(flat) // MOST_DRAWS_OF_LABELS)
+        probabilities = likelihood.probabilities(flat[::step], noise[::step])
         peaks += _of_setup(setup, likelihood, probabilities, predicted)
         seen = probabilities.sum(axis=0)
         modes = (

@@ -47,7 +47,7 @@ class Table:
 
 
 def constants_table(summary: Summary) -> Table:
-    """The elastic constants of a fit: mean, plus-minus, 90 % interval, beside the least-squares figure."""
+    """The elastic constants of a fit: mean, plus-minus, 90 % interval, beside weighted least squares."""
     rows = []
     for name in CONSTANTS:
         entry = summary.elastic[name]
@@ -56,7 +56,7 @@ def constants_table(summary: Summary) -> Table:
         rows.append((narrow_name(name), plus_minus(entry, GPA), interval(entry, GPA), share, least_squares))
     return Table(
         f"Elastic constants of {summary.name}, GPa",
-        ("constant", "mean ± sd", "90 % interval", "sd, %", "least squares"),
+        ("constant", "mean ± sd", "90 % interval", "sd, %", "weighted"),
         tuple(rows),
     )
 

@@ -12,6 +12,7 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
 from bayesplate.diagnosis.wording.told import alike_sentence, verdict_sentence, warnings
+from bayesplate.effects.words import effect_names
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
@@ -98,9 +99,11 @@ def show_fit(summary: Summary | CampaignSummary) -> Shown:
     tables = (constants_table(summary), modes_table(summary), *([peaks] if peaks else []))
     error, model = summary.error, summary.model
     left_out = error.leave_one_out_rms_cents
-    noise = ", ".join(percent(entry.q50, 2) for entry in summary.noise.values())
+    several = len(summary.noise) > 1
+    noise = ", ".join(percent(one.q50, 2) + f" in {setup}" * several for setup, one in summary.noise.items())
+    effects = f" with {effect_names(model.effects)}" if model.effects else ""
     closing = (
-        f"{model.theory} plate, {model.law} law. Error rms {error.in_sample_rms_cents:.1f} cents in sample, "
+        f"{model.theory} plate{effects}, {model.law} law. Error rms {error.in_sample_rms_cents:.1f} cents in sample, "
         + (f"{left_out:.1f} left out" if left_out is not None else "too few modes to leave one out")
         + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )

@@ -134,8 +134,9 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, make: Callab
     path = tmp_path / "my-board.toml"
     make(path)
     begin = time.monotonic()
-    with refused(f"{path}: wanted a regular file, got {kind}"):
+    with pytest.raises(InputError) as error:
         load_board(path)
+    assert str(error.value) == f"{path}: wanted a regular file, got {kind}"
     assert time.monotonic() - begin < 1
 
 

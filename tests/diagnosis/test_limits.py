@@ -83,6 +83,14 @@ def test_a_size_is_at_its_limit_where_half_a_percent_of_its_prior_lies_beyond(ba
     assert at_limit(weighed, 1) == ("" if not is_limited else f"size = {1000 * float(prior.value(z)):.3g} g")
 
 
+def test_what_rounding_leaves_of_two_effects_looks_like_nothing(base):
+    """Three modes see nothing beside three constants: what is left of a shift is a rounding error, however alike."""
+    shift, left = np.full(6, 10.0), np.full(6, 1e-12)
+    seen = [Signature(name, {}, shift, left, {}, 1.0, base.scales, False) for name in (A, B)]
+
+    assert look_alikes(seen) == {A: (), B: ()}
+
+
 @pytest.mark.parametrize(("likeness", "alike"), [(0.949, False), (0.951, True), (-0.949, False), (-0.951, True)])
 @pytest.mark.parametrize("prior", [HALF_NORMAL, Quantity.from_mean(0.0, 1.0, "normal")])
 def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike, prior):

@@ -190,7 +190,10 @@ def with_sizes(board: Board, **metres: float) -> Board:
 ORIENTATIONS = {
     "lengths": (lambda b: with_sizes(b, length_x=0.2, length_y=0.55), "are length_x_mm and length_y_mm exchanged"),
     "labels": (transposed, "are all labels (m,n) written as (n,m)?"),
-    "grain": (lambda b: transposed(with_sizes(b, length_x=0.2, length_y=0.55)), "is y along the grain? x should be"),
+    "grain": (
+        lambda b: transposed(with_sizes(b, length_x=0.2, length_y=0.55)),
+        "is y along the grain in all of the card? x should be",
+    ),
 }
 
 

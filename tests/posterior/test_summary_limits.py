@@ -162,6 +162,15 @@ def test_a_low_share_is_given_as_the_reason_below_sixty_percent(inference, share
     assert ("because no mode has more than 60 % of its energy in it" in sentence) is is_told
 
 
+@pytest.mark.parametrize(("sd", "told"), [(0.00487, "0.49 %"), (0.027, "2.7 %"), (0.183, "18 %"), (np.inf, "inf %")])
+def test_the_sentence_has_the_digits_of_the_table(inference, sd, told):
+    """Two significant ones, as the table of where the uncertainty comes from."""
+    found = Identifiability(10.0, np.diag([sd**2, 1e-8, 1e-8]), np.full(6, 0.5), np.eye(6, 3))
+    (sentence, *_) = remarks(inference.problem.board, found)
+
+    assert sentence == f"the modes tell E_x least well: the expected noise alone leaves it {told} uncertain"
+
+
 @pytest.mark.parametrize(("at", "is_told"), [(0.049, False), (0.051, True)])
 def test_a_sign_counts_where_the_product_of_the_shape_is_a_twentieth_of_the_largest(inference, at, is_told):
     """A shape w = x between a hammer at x = 1 and a sensor at x = `at`: the product is `at` of its largest."""

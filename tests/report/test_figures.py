@@ -10,10 +10,16 @@ import numpy as np
 import pytest
 from diagnoses import DIAGNOSES
 from made_reports import fitted
+from made_summaries import spread
 from payloads import PAYLOADS
 
+from bayesplate.estimates.sheet import sheet
+from bayesplate.frequencies.system import system_of
 from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
+from bayesplate.report.board import board_picture
+from bayesplate.report.chladni import chladni_sheet
+from bayesplate.report.content import inputs_table
 from bayesplate.report.health import health_picture
 from bayesplate.report.null_control import null_picture
 from bayesplate.report.page import percentiles_pictures, pictures
@@ -22,6 +28,7 @@ from bayesplate.report.percentiles import percentiles_figure
 from bayesplate.report.priors import Compared, compared
 from bayesplate.report.residuals import predictive_picture
 from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
+from bayesplate.results.words import MISSING
 from bayesplate.workflow.prepare import prepare
 from bayesplate.workflow.problem import Problem
 
@@ -103,6 +110,102 @@ def test_the_board_is_to_scale(drawn):
     assert panel.get_xlim() == pytest.approx((0, 0.600))
     assert sum(patch.get_hatch() is not None for patch in panel.patches) == 4
     assert {"600 mm, along the grain", "412 mm across"} <= {text.get_text() for text in panel.texts}
+
+
+TAPERED = """\
+format = 1
+name = "tapered"
+[plate]
+length_x_mm = 550
+length_y_mm = { readings = [220, 210, 200, 190, 180], resolution = 1, at_x_mm = [0, 137.5, 275, 412.5, 550] }
+thickness_mm = { mean = 2.8, sd = 0.03 }
+mass_g = 125
+[material]
+poisson_xy = 0.4
+[[setup]]
+name = "held"
+edges = { x0 = "clamped", x1 = "free", y0 = "supported", y1 = "free" }
+clamped_mm = { x0 = 30 }
+[setup.frequencies_hz]
+"(1,1)" = 70.1
+[[setup.attached]]
+kind = "exciter"
+mass_g = 1
+at_mm = [500, 100]
+[[setup]]
+name = "free"
+edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }
+[setup.frequencies_hz]
+"(1,1)" = 34.71
+"(2,0)" = 50.65
+"(0,2)" = 98.26
+[setup.hammer]
+at_mm = [0, 10]
+"""
+
+
+@pytest.fixture(scope="module")
+def tapered(tmp_path_factory):
+    card = tmp_path_factory.mktemp("boards") / "tapered.toml"
+    card.write_text(TAPERED, encoding="utf-8")
+    return prepare(card).board
+
+
+def test_a_board_that_narrows_is_drawn_so(tapered):
+    """220 mm at x0 (217.8 at the clamp), 180 at x1: two free edges share it; places start at the board's own corner."""
+    picture = board_picture(tapered)
+    held, free = picture.figure.axes
+    ends = {"held": ((0, 217.8), (0, 180)), "free": ((0, 220), (20, 200))}
+    for panel, name in ((held, "held"), (free, "free")):
+        lines = {line.get_label()[5:7]: 1e3 * line.get_xydata() for line in panel.lines if "edge" in line.get_label()}
+        for at, wanted in zip((0, -1), ends[name], strict=True):
+            assert (lines["y0"][at, 1], lines["y1"][at, 1]) == pytest.approx(wanted, abs=1.0), name
+        assert lines["x1"][:, 1] == pytest.approx(ends[name][1], abs=1.0)
+        assert any(text.get_text() == "180.1 to 219.9 mm across" for text in panel.texts)
+    (exciter,) = (line for line in held.lines if line.get_label() == "exciter")
+    (hammer,) = (line for line in free.lines if line.get_label() == "hammer")
+    assert 1e3 * exciter.get_xydata()[0] == pytest.approx([500, 100])
+    assert 1e3 * hammer.get_xydata()[0] == pytest.approx([0, 10], abs=0.1)
+    assert picture.alt.startswith("A board whose width varies, 550 mm along the grain, 180.1 to 219.9 mm across.")
+    assert "both are drawn to recede alike" in picture.caption
+
+
+def test_figures_of_a_board_that_narrows_end_at_its_outline(tapered):
+    """Twist of a free board, symmetric across: its line along stays in the middle, and nothing is drawn beyond."""
+    system = system_of(tapered, tapered.setups[1])
+    values = {**tapered.nominal(), "D_x": 21.0, "D_y": 1.4, "D_s": 5.0}
+    twist = sheet(tapered, system, values, "as given")
+    first = replace(twist, modes=twist.modes[:1], combined=())
+
+    assert first.modes[0].name == "(1,1)"
+    assert first.aspect_ratio == pytest.approx(550 / 219.9, rel=1e-3)
+    assert first.drawn_at(1.0, 1.0)[1] - first.drawn_at(1.0, 0.0)[1] == pytest.approx(180 / 220, abs=0.005)
+    np.testing.assert_allclose(first.modes[0].shape, -first.modes[0].shape[:, ::-1], atol=1e-6)
+    (panel,) = chladni_sheet(first).axes
+    drawn = np.concatenate([path.vertices for one in panel.collections for path in one.get_paths()])
+    low, high = np.array([first.drawn_at(x, y)[1] for y in (0.0, 1.0) for x in drawn[:, 0]]).reshape(2, -1)
+    assert (drawn[:, 1] > low - 0.01).all()
+    assert (drawn[:, 1] < high + 0.01).all()
+
+
+def test_places_on_a_board_that_narrows_are_stated_from_its_own_corner(tapered):
+    """By hand: half the width in from y0 at x1 is 20 + 90 mm on the rectangle, and 110 of the mean 200 as stated."""
+    shaped = system_of(tapered, tapered.setups[1]).shaped
+
+    assert shaped.as_stated(1.0, 0.5) == pytest.approx((1.0, 110 / 200), abs=0.003)
+    assert shaped.placed(*shaped.as_stated(0.7, 0.3)) == pytest.approx((0.7, 0.3))
+
+
+def test_the_table_of_inputs_says_what_became_of_an_effect(clamped):
+    """Beside what the card states of it; what is exact stays so."""
+    board = prepare("finnish-spruce-cantilever", ["clamp_rotation"]).board
+    (own,) = (one for one in board.parameters if one.effect == "clamp_rotation")
+    found = {own.owner.title: {own.effect: {own.key: spread(0.3 * own.prior.mean, 0.1 * own.prior.mean, own.unit)}}}
+    told = {row[0]: row[1:] for row in inputs_table(board, replace(clamped.summary, effects=found)).rows}
+    (after,) = (cells[1] for words, cells in told.items() if "clamp rotation" in words)
+
+    assert after != MISSING
+    assert told["thickness, mm"] == ("3 (taken as exact)", MISSING)
 
 
 def test_the_bars_of_the_constants_hold_ninety_per_cent(drawn, clamped):
@@ -281,7 +384,7 @@ def test_what_the_readings_made_of_each_prior(clamped):
 def test_the_corner_plot_names_a_quantity_in_two_lines():
     assert _broken("thickness, mm", 0.75) == "thickness,\nmm"
     assert _broken("shape 2 of thickness profile", 0.75) == "shape 2,\nthickness"
-    assert _broken("Poisson ratio nu_xy", 1.5) == "Poisson nu_xy\n"
+    assert _broken("Poisson ratio nu_xy", 0.6) == "ν_xy\n"
     assert _broken("compliance of clamp rotation", 0.75) == "compliance,\nclamp rotat…"
 
 
@@ -296,3 +399,13 @@ def test_percentiles_are_of_the_modes_that_the_table_has():
 
     assert len(problem.board.setups[0].readings) == 7
     assert "42" in picture.caption
+
+
+def test_one_estimate_is_no_picture_of_the_percentile_method():
+    """Three modes have one subset of three, and its spread is none."""
+    board = prepare("finnish-spruce-cantilever").board
+    kept = [one for one in board.setups[0].readings if str(one.label) in {"(1,0)", "(1,1)", "(1,2)"}]
+    problem = Problem.from_card(replace(board, setups=(replace(board.setups[0], readings=tuple(kept)),))).posed
+
+    assert len(problem.board.setups[0].readings) == 3
+    assert percentiles_pictures(SimpleNamespace(problem=problem), SimpleNamespace(moduli={})) == []

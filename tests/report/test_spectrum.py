@@ -59,6 +59,15 @@ def test_a_peak_that_is_no_mode_and_a_mode_without_a_peak_look_otherwise(picture
     assert picture.alt == "3 peaks, 2 of them likely a mode of the plate. Modes without a likely peak: (2,0)."
 
 
+def test_a_question_mark_is_explained_where_there_is_one(picture):
+    unnamed = (*MODES, mode("cannot tell", 259.0, 0.2))
+    (other,) = spectrum_pictures(replace(SUMMARY, peaks=PEAKS, spectra=(Spectrum("bench", 0.2, 0.02, unnamed),)))
+
+    assert "?" in [text.get_text() for text in other.figure.axes[0].texts]
+    assert other.caption.endswith("A question mark: a mode whose figure fits no label.")
+    assert "question mark" not in picture.caption
+
+
 def test_no_two_names_overlap(picture):
     (panel,) = picture.figure.axes
     picture.figure.canvas.draw()

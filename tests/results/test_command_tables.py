@@ -58,7 +58,7 @@ THIN = TheoryRow(
 def test_check_shows_what_its_report_holds():
     constants, modes, effects = check_tables(REPORT)
 
-    assert constants.rows[1] == ("E_y, across grain", "0.6743", "± 4.2 %")
+    assert constants.rows[1] == ("E_y, across grain", "0.674", "± 4.2 %")
     assert modes.rows == (("(1,0)", "52", "+20.5", "100 / -0 / 0", "0.62"),)
     assert effects.rows == (
         ("air_loading", "44.1", "10.6 *", "-7.3/-2.4/+0.1", "clamp_rotation\ntension"),
@@ -113,9 +113,11 @@ def test_modes_are_shown_with_their_reading_or_their_range():
     )
     (table,) = sheet_tables(report)
 
-    assert table.columns[2:4] == ("likely Hz", "% in D_x/D_y/D_s")
+    assert table.columns[2:4] == ("measured or\nlikely Hz", "% in D_x/D_y/D_s")
     assert table.rows[0] == ("(1,0)", "51.4", "52", "100 / 0 / 0", "3.232", "-0.3164", "0.01128")
     assert table.rows[1][2] == "800 to 836"
+    low = replace(report, setups=(replace(report.setups[0], modes=(replace(rows[1], likely_hz=(8.84, 9.13)),)),))
+    assert sheet_tables(low)[0].rows[0][2] == "8.8 to 9.1"
     assert show_modes(report).closing == "Frequencies at the estimate; sheet to print: m.png"
     assert as_json(report)["setups"][0]["modes"][1]["likely_hz"] == [800.4, 836.2]
 

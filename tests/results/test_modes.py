@@ -1,18 +1,21 @@
-"""Rows of the labelled modes from draws made by hand: every number of a row belongs to the same prediction."""
+"""Rows of the labelled modes: every number of a row belongs to the same prediction."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import ritz
 from made_boards import setup_of
+from made_reports import fitted
 
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.quantities import Quantity
 from bayesplate.results.modes import mode_rows
 
+CARDS = Path(__file__).parents[2] / "models" / "boards"
 HERTZ = {(0, 0): 57.0, (0, 1): Quantity.from_mean(100.0, 0.5)}
 SETUP = setup_of(ritz.ALL_CLAMPED, HERTZ, name="bench", resolution=1.0)
 
@@ -61,3 +64,18 @@ def test_the_rest_of_a_row(rows):
     assert first.left_out_cents == pytest.approx(1200 * np.log2(1.01))
     assert second.left_out_cents is None
     assert [(row.leverage, row.label_correlation) for row in (first, second)] == [(0.25, 0.99), (0.75, 0.9)]
+
+
+def test_a_peak_of_a_sure_label_is_predicted_as_its_mode_is(tmp_path, monkeypatch):
+    """The same draws stand behind both tables, also where the probabilities of labels are taken from some."""
+    monkeypatch.setattr("bayesplate.results.peaks.MOST_DRAWS_OF_LABELS", 10)
+    card = tmp_path / "doubtful.toml"
+    text = (CARDS / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
+    text = text.replace('name = "finnish-spruce-cantilever"', 'name = "doubtful"')
+    card.write_text(text.replace("[setup]\n", "[setup]\nlabel_confidence = 0.95\n", 1), encoding="utf-8")
+    summary = fitted(str(card)).summary
+    by_label = {mode.label: mode.predicted_hz for mode in summary.modes}
+
+    assert len(summary.peaks) == len(by_label) == 6
+    for peak in summary.peaks:
+        assert peak.predicted_hz.mean == pytest.approx(by_label[peak.assignments[0].label].mean, rel=1e-12)

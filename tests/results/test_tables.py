@@ -9,6 +9,7 @@ import pytest
 from made_summaries import SUMMARY, mode, spread
 
 from bayesplate.report import content
+from bayesplate.results.contract import Elastic
 from bayesplate.results.tables import constants_table, modes_table, peaks_table, rounding_that_decides
 from bayesplate.results.words import decimals, interval, number, percent, plus_minus, rounded, two_digits
 from bayesplate.workflow.prepare import prepare
@@ -23,7 +24,7 @@ def test_constants_beside_their_least_squares():
     table = constants_table(SUMMARY)
 
     assert table.rows[0] == ("E_x, along grain", "10.50 ± 0.25", "10.00 to 11.00", "2.4", "10.25")
-    assert column(table, "least squares") == ["10.25", "1.12", "0.500"]
+    assert column(table, "weighted") == ["10.25", "1.12", "0.500"]
     assert table.title == "Elastic constants of made, GPa"
 
 
@@ -93,9 +94,14 @@ def test_what_fit_prints():
     assert (shown.remarks[:-1], shown.warnings) == (SUMMARY.identifiability, SUMMARY.warnings)
     assert shown.remarks[-1].startswith("draws against a closed form: ")
     assert shown.closing == (
-        "thin plate, exact law. Error rms 7.5 cents in sample, 12.2 left out; noise 0.50 %; the linear law is off by "
-        "0.50 cents."
+        "thin plate with attached mass, exact law. Error rms 7.5 cents in sample, 12.2 left out; noise 0.50 %; the "
+        "linear law is off by 0.50 cents."
     )
+    both = {"bench": SUMMARY.noise["bench"], "free": SUMMARY.noise["bench"]}
+    model = replace(SUMMARY.model, effects=())
+    closing = show_fit(replace(SUMMARY, model=model, noise=both)).closing
+    assert closing.startswith("thin plate, exact law.")
+    assert "noise 0.50 % in bench, 0.50 % in free;" in closing
     few = replace(SUMMARY, error=replace(SUMMARY.error, leave_one_out_rms_cents=None))
     assert "too few modes to leave one out" in show_fit(few).closing
 
@@ -108,6 +114,10 @@ def test_what_a_page_says():
         "The fit misses the frequencies by 7.5 cents (0.43 %); a mode that it has not seen, by 12 cents (0.71 %)."
     )
     assert weakest == "Least well known is G_xy, shear: ± 12 %."
+    alike = Elastic(*(spread(mean, 0.033 * mean, "Pa") for mean in (11e9, 0.75e9, 0.68e9)))
+    assert (
+        content.summary_sentences(replace(SUMMARY, elastic=alike))[-1] == "All three are known equally well: ± 3.3 %."
+    )
     assert content.constants_table(SUMMARY, "Constants").rows == (
         ("E_x, along the grain", "10.50 ± 0.25", "10.00 to 11.00", "10.25", "10.25", "10.00 ± 0.20"),
         ("E_y, across the grain", "1.00 ± 0.12", "0.75 to 1.25", "–", "1.12", "–"),

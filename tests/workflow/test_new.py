@@ -102,6 +102,8 @@ def test_options_ask_nothing():
 
     assert result.exit_code == 0, result.output
     assert card.title == 'a "b" \\ ü'
+    assert "Next: bayesplate check mine.toml" in result.output
+    assert "Next: bayesplate modes bare.toml" in invoke("bare", "--length-x", "253").output
     assert card.setups[0].edges.letters == "CFFF"
     assert card.setups[0].frequencies_hz[Label(1, 0)].mean == 52
 

@@ -36,6 +36,7 @@ LOOK_ALIKE = 0.95
 Below its negative too, if one of them may act either way: a mass that can only lower what a tension can only raise is
 told from it at sight. A remark, no rule: whether the readings tell two apart is said by their probabilities.
 """
+_ROUNDING = 1e-9
 _WITHIN = 3.0
 """Standard deviations of its prior within which a size may lie."""
 
@@ -197,10 +198,11 @@ def _is_within(prior: Quantity, value: float) -> bool:
 
 
 def cosine(one: Signature, other: Signature) -> float:
-    """Cosine of the visible parts of two effects; 0 if one has none."""
+    """Cosine of the visible parts of two effects; 0 if one has none but rounding."""
+    if any(each.visible_rms <= _ROUNDING * each.raw_rms for each in (one, other)):
+        return 0.0
     first, second = one.visible / one.scales, other.visible / other.scales
-    norms = float(np.linalg.norm(first) * np.linalg.norm(second))
-    return float(first @ second) / norms if norms > 0 else 0.0
+    return float(first @ second / (np.linalg.norm(first) * np.linalg.norm(second)))
 
 
 def _bias(problem: PosedProblem, true: Floats, fitted: Floats) -> dict[str, float]:
