@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from importlib.metadata import version
@@ -279,3 +280,30 @@ def test_a_reader_that_stops_early_is_no_error():
         said = process.stderr.read()
         assert process.wait(timeout=60) == 0
     assert said == ""
+
+
+WORK = """
+from bayesplate.errors import InputError
+from bayesplate.posterior.sampling import Progress
+from bayesplate.terminal import progress_line, reporting, say
+with reporting(as_json=False, debug=True):
+    with progress_line(shown=True) as tell:
+        for stage in "first", "second":
+            tell(Progress(0, 0, stage=stage, done=0.5))
+    say("done")
+    raise InputError("refused")
+"""
+
+
+@pytest.mark.parametrize("is_full", [False, True])
+def test_a_run_goes_on_where_its_progress_cannot_be_told(is_full):
+    """`bayesplate diagnose ... 2>&1 | head`, a full disk, or a terminal that was closed: no reason to stop or to lie."""
+    if is_full and not Path("/dev/full").exists():
+        pytest.skip("needs a device that is always full")
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as closed, Path("/dev/full" if is_full else os.devnull).open("w") as full:
+        program, stderr = [sys.executable, "-c", WORK], full if is_full else closed
+        done = subprocess.run(program, stdout=subprocess.PIPE, stderr=stderr, text=True, check=False)
+
+    assert (done.stdout, done.returncode) == ("done\n", 3)
