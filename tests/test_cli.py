@@ -297,7 +297,7 @@ with reporting(as_json=False, debug=True):
 
 @pytest.mark.parametrize("is_full", [False, True])
 def test_a_run_goes_on_where_its_progress_cannot_be_told(is_full):
-    """`bayesplate diagnose ... 2>&1 | head`, a full disk, or a terminal that was closed: no reason to stop or to lie."""
+    """`bayesplate diagnose ... 2>&1 | head`, a full disk or a lost terminal is no reason to stop."""
     if is_full and not Path("/dev/full").exists():
         pytest.skip("needs a device that is always full")
     read, write = os.pipe()

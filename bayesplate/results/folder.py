@@ -253,14 +253,12 @@ def writing(path: Path) -> Iterator[None]:
     Raises
     ------
     UnwritableError
-        In place of an OSError, and of the RuntimeError that HDF5 raises at a full disk.
+        In place of an OSError.
     """
     try:
         yield
-    except (OSError, RuntimeError) as error:
-        if isinstance(error, RuntimeError) and "errno" not in str(error):
-            raise
-        reason = getattr(error, "strerror", None) or str(error)
+    except OSError as error:
+        reason = error.strerror or str(error)
         wanted, remedy = "a file that can be written", "make room, or take another place with --out"
         raise UnwritableError(Fault(str(path), wanted, reason, remedy)) from error
 
