@@ -257,6 +257,34 @@ def test_an_internal_error_is_one_line_without_debug(monkeypatch):
     assert read_json(debug.stdout)["error"] == {"exit_code": 70, "message": plain.stderr[:-1], "faults": []}
 
 
+LONG = "d" * 300
+"""A name that no file system takes; a place that may not be looked into ends in the same way."""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("fit", "fiemme-spruce-clamped", "--out", LONG),
+        ("fit", "fiemme-spruce-clamped", "--out", LONG, "--resume"),
+        ("fit", "spruce-half-tops", "--out", LONG),
+        ("compare", "fiemme-spruce-clamped", "--out", LONG),
+        ("modes", "fiemme-spruce-clamped", "--out", LONG),
+        ("plan", "fiemme-spruce-clamped", "--out", LONG),
+        ("batch", LONG),
+        ("batch", ".", "--out", LONG),
+        ("pick", f"{LONG}.wav"),
+        ("new", LONG, "--mass", "41"),
+    ],
+)
+def test_a_place_that_cannot_be_looked_at_is_refused(arguments):
+    Path("my-board.toml").touch()
+    result = invoke(*arguments)
+
+    assert result.exit_code == 3, result.output
+    assert "internal error" not in result.stderr
+    assert [path.name for path in Path.cwd().iterdir()] == ["my-board.toml"]
+
+
 def test_the_commands_and_exit_codes_of_a_real_process():
     """The same through an interpreter of its own: what click's runner may hide."""
     Path("my-board.toml").write_text(spoiled(*BAD_CARDS["negative"][0]), encoding="utf-8")
