@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 INTERNAL = 70
+_NARROWEST, _USUAL = 20, 80
+"""Columns of a terminal."""
 
 
 def print_shown(shown: Shown) -> None:
@@ -32,11 +34,10 @@ def print_shown(shown: Shown) -> None:
 
     # Laid out apart from the output: rich itself would end the program where a reader like `head` has closed the pipe.
     output, printed = Console(), StringIO()
-    console = Console(
-        file=printed, width=output.width, force_terminal=output.is_terminal, soft_wrap=False, highlight=False
-    )
+    width = output.width if output.width >= _NARROWEST else _USUAL  # COLUMNS=0 is no terminal
+    console = Console(file=printed, width=width, force_terminal=output.is_terminal, soft_wrap=False, highlight=False)
     for table in shown.tables:
-        console.print(laid_out(table, output.width))
+        console.print(laid_out(table, width))
     for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
         console.print(Text(sentence))
     console.print(Text(shown.closing))

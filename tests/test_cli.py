@@ -257,6 +257,15 @@ def test_an_internal_error_is_one_line_without_debug(monkeypatch):
     assert read_json(debug.stdout)["error"] == {"exit_code": 70, "message": plain.stderr[:-1], "faults": []}
 
 
+def test_a_terminal_of_no_width_is_none(monkeypatch):
+    """As some programs set it that run others."""
+    told = invoke("check", "fiemme-spruce-clamped").stdout
+    monkeypatch.setenv("COLUMNS", "0")
+
+    assert "E_x" in told
+    assert invoke("check", "fiemme-spruce-clamped").stdout == told
+
+
 LONG = "d" * 300
 """A name that no file system takes; a place that may not be looked into ends in the same way."""
 
