@@ -10,6 +10,7 @@ import click
 
 from bayesplate.asking import asked_answers, given_answers
 from bayesplate.options import (
+    PATH,
     costs,
     mass_kg,
     names,
@@ -310,7 +311,7 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
 
 
 @main.command()
-@click.argument("files", nargs=-1, required=True, type=click.Path())
+@click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--card", metavar="CARD", help="Board card with sizes and edges: labels are computed for it.")
 @click.option("--rate", type=float, metavar="HZ", help="Samples per second, where a file does not say it.")
 @click.option(
@@ -337,7 +338,7 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
 )
 @click.option("--lowest", type=float, default=20.0, show_default=True, metavar="HZ")
 @click.option("--highest", type=float, default=1000.0, show_default=True, metavar="HZ")
-@click.option("--out", type=click.Path(), default="results/recordings", show_default=True, help="Output folder.")
+@click.option("--out", type=PATH, default="results/recordings", show_default=True, help="Output folder.")
 @shared_options("force", "json", "quiet", "debug")
 def pick(files: tuple[str, ...], out: str, force: bool, as_json: bool, quiet: bool, debug: bool, **given: Any) -> None:
     """Frequencies of the modes in recordings FILES.

@@ -8,11 +8,14 @@ from typing import Any
 
 import click
 
+PATH = click.Path(readable=False)
+"""A path as it is given: what cannot be read is invalid input, told by those who read it, and no fault of usage."""
+
 
 def shared_options(*wanted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """The shared options that a command takes, in one order."""
     known = {
-        "out": click.option("--out", type=click.Path(), help="Output folder (default results/NAME)."),
+        "out": click.option("--out", type=PATH, help="Output folder (default results/NAME)."),
         "seed": click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Random seed."),
         "effects": click.option(
             "--effects",
@@ -20,7 +23,7 @@ def shared_options(*wanted: str) -> Callable[[Callable[..., None]], Callable[...
             help="Declared effects, comma separated, in place of the card's; or none.",
         ),
         "setup": click.option(
-            "--setup", type=click.Path(), help="File with a [setup] that completes the card: what pick writes."
+            "--setup", type=PATH, help="File with a [setup] that completes the card: what pick writes."
         ),
         "linear": click.option("--linear", is_flag=True, help="Force the linear frequency law."),
         "exact": click.option("--exact", is_flag=True, help="Force the exact frequency law."),
@@ -30,14 +33,14 @@ def shared_options(*wanted: str) -> Callable[[Callable[..., None]], Callable[...
             type=click.Choice(["sensitivity", "training", "published"]),
             help="Source of the paper's coefficients (default: the table that the card names, else sensitivity).",
         ),
-        "write_to": click.option("--out", type=click.Path(), help="Folder for compare.json (default: not written)."),
+        "write_to": click.option("--out", type=PATH, help="Folder for compare.json (default: not written)."),
         "force": click.option("--force", is_flag=True, help="Replace the results in the output folder."),
         "report": click.option(
             "--no-report", "report", is_flag=True, default=True, flag_value=False, help="Write no page and no figures."
         ),
         "resume": click.option("--resume", is_flag=True, help="Continue an interrupted run."),
         "repeat": click.option(
-            "--repeat", type=click.Path(), metavar="SUMMARY", help="Fit again what this summary.json is of."
+            "--repeat", type=PATH, metavar="SUMMARY", help="Fit again what this summary.json is of."
         ),
         "json": click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables."),
         "quiet": click.option("--quiet", is_flag=True, help="Print nothing but errors."),

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from io import StringIO
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TextIO, cast
 
 import click
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 INTERNAL = 70
+_NARROWEST, _USUAL = 20, 80
+"""Columns of a terminal."""
 
 
 def print_shown(shown: Shown) -> None:
@@ -32,11 +34,10 @@ def print_shown(shown: Shown) -> None:
 
     # Laid out apart from the output: rich itself would end the program where a reader like `head` has closed the pipe.
     output, printed = Console(), StringIO()
-    console = Console(
-        file=printed, width=output.width, force_terminal=output.is_terminal, soft_wrap=False, highlight=False
-    )
+    width = output.width if output.width >= _NARROWEST else _USUAL  # COLUMNS=0 is no terminal
+    console = Console(file=printed, width=width, force_terminal=output.is_terminal, soft_wrap=False, highlight=False)
     for table in shown.tables:
-        console.print(laid_out(table, output.width))
+        console.print(laid_out(table, width))
     for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
         console.print(Text(sentence))
     console.print(Text(shown.closing))
@@ -73,9 +74,30 @@ def _write(text: str) -> None:
         raise UnwritableError(fault) from None
 
 
-def _close_output() -> None:
-    """Let the rest of the standard output go nowhere: Python would complain of it once more at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _close_output(stream: TextIO | None = None) -> None:
+    """Let the rest of the standard output, or of another stream, go nowhere: Python would complain of it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), (stream or sys.stdout).fileno())
+
+
+class _Told:
+    """The standard error of a run, which goes on where nobody can be told any more: a closed pipe, a lost terminal."""
+
+    def write(self, text: str) -> int:
+        """Write at once; what cannot be written goes nowhere."""
+        if sys.stderr is not None:
+            try:
+                sys.stderr.write(text)
+                sys.stderr.flush()
+            except OSError:
+                _close_output(sys.stderr)
+        return len(text)
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Whether it is a terminal, its encoding."""
+        return getattr(sys.stderr, name)
 
 
 @contextmanager
@@ -86,7 +108,7 @@ def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]
         return
     from rich.console import Console
 
-    console, started, stage = Console(stderr=True), monotonic(), ""
+    console, started, stage = Console(file=cast(IO[str], _Told())), monotonic(), ""
     with console.status("reading the card and solving the plate") as status:
         # Now, and not when first told: Python gives another exit code to a run that is interrupted while it defines
         # classes of an import by executing text.
@@ -98,7 +120,7 @@ def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]
             if console.is_terminal:
                 status.update(text)
             elif progress.stage != stage or (progress.n_steps % 1000 == 0 and progress.n_steps):
-                click.echo(text, err=True)
+                click.echo(text, file=cast(IO[str], _Told()))
             stage = progress.stage
 
         yield tell
@@ -119,7 +141,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
         yield
     except BayesplateError as error:
         if debug:
-            traceback.print_exc()
+            traceback.print_exc(file=cast(IO[str], _Told()))
         _fail(str(error), error.exit_code, as_json, [vars(fault) for fault in error.faults])
     except (KeyboardInterrupt, click.Abort) as stopped:  # at a question both keys that end it abort
         _fail(str(stopped) or "interrupted", INTERRUPTED, as_json)
@@ -128,7 +150,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
         sys.exit(0)
     except Exception as error:
         if debug:
-            traceback.print_exc()
+            traceback.print_exc(file=cast(IO[str], _Told()))
         _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", INTERNAL, as_json)
     finally:
         for heard, handler in before.items():
@@ -136,7 +158,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
 
 
 def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:
-    click.echo("\n".join(plain(line) for line in message.split("\n")), err=True)
+    click.echo("\n".join(plain(line) for line in message.split("\n")), file=cast(IO[str], _Told()))
     if as_json:
         with suppress(UnwritableError):  # the message has been given
             _write(

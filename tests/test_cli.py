@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from importlib.metadata import version
@@ -256,6 +257,43 @@ def test_an_internal_error_is_one_line_without_debug(monkeypatch):
     assert read_json(debug.stdout)["error"] == {"exit_code": 70, "message": plain.stderr[:-1], "faults": []}
 
 
+def test_a_terminal_of_no_width_is_none(monkeypatch):
+    """As some programs set it that run others."""
+    told = invoke("check", "fiemme-spruce-clamped").stdout
+    monkeypatch.setenv("COLUMNS", "0")
+
+    assert "E_x" in told
+    assert invoke("check", "fiemme-spruce-clamped").stdout == told
+
+
+LONG = "d" * 300
+"""A name that no file system takes; a place that may not be looked into ends in the same way."""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("fit", "fiemme-spruce-clamped", "--out", LONG),
+        ("fit", "fiemme-spruce-clamped", "--out", LONG, "--resume"),
+        ("fit", "spruce-half-tops", "--out", LONG),
+        ("compare", "fiemme-spruce-clamped", "--out", LONG),
+        ("modes", "fiemme-spruce-clamped", "--out", LONG),
+        ("plan", "fiemme-spruce-clamped", "--out", LONG),
+        ("batch", LONG),
+        ("batch", ".", "--out", LONG),
+        ("pick", f"{LONG}.wav"),
+        ("new", LONG, "--mass", "41"),
+    ],
+)
+def test_a_place_that_cannot_be_looked_at_is_refused(arguments):
+    Path("my-board.toml").touch()
+    result = invoke(*arguments)
+
+    assert result.exit_code == 3, result.output
+    assert "internal error" not in result.stderr
+    assert [path.name for path in Path.cwd().iterdir()] == ["my-board.toml"]
+
+
 def test_the_commands_and_exit_codes_of_a_real_process():
     """The same through an interpreter of its own: what click's runner may hide."""
     Path("my-board.toml").write_text(spoiled(*BAD_CARDS["negative"][0]), encoding="utf-8")
@@ -279,3 +317,30 @@ def test_a_reader_that_stops_early_is_no_error():
         said = process.stderr.read()
         assert process.wait(timeout=60) == 0
     assert said == ""
+
+
+WORK = """
+from bayesplate.errors import InputError
+from bayesplate.posterior.sampling import Progress
+from bayesplate.terminal import progress_line, reporting, say
+with reporting(as_json=False, debug=True):
+    with progress_line(shown=True) as tell:
+        for stage in "first", "second":
+            tell(Progress(0, 0, stage=stage, done=0.5))
+    say("done")
+    raise InputError("refused")
+"""
+
+
+@pytest.mark.parametrize("is_full", [False, True])
+def test_a_run_goes_on_where_its_progress_cannot_be_told(is_full):
+    """`bayesplate diagnose ... 2>&1 | head`, a full disk or a lost terminal is no reason to stop."""
+    if is_full and not Path("/dev/full").exists():
+        pytest.skip("needs a device that is always full")
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as closed, Path("/dev/full" if is_full else os.devnull).open("w") as full:
+        program, stderr = [sys.executable, "-c", WORK], full if is_full else closed
+        done = subprocess.run(program, stdout=subprocess.PIPE, stderr=stderr, text=True, check=False)
+
+    assert (done.stdout, done.returncode) == ("done\n", 3)

@@ -154,7 +154,7 @@ def write_card(path: Any, name: str, content: str, *, force: bool) -> None:
     shown = plain(str(path))
     if path.name != f"{name}.toml":
         raise InputError(Fault(shown, f"{name}.toml, the name of the card", plain(path.name)))
-    if path.exists() and not force:
+    if os.path.exists(path) and not force:
         raise InputError(Fault(shown, "a new file", "one that exists", "force=True replaces it"))
     partial = path.with_name(path.name + ".partial")
     try:

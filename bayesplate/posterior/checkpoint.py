@@ -198,9 +198,10 @@ def take(folder: Path) -> IO[bytes]:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             stream = path.open("a+b")
+            is_ours = _try_lock(stream)
         except OSError as error:
             raise CheckpointError(f"{folder}: wanted a folder to write to, got: {error.strerror}") from None
-        if not _try_lock(stream):
+        if not is_ours:
             stream.seek(0)
             owner = stream.read().decode(errors="replace").strip()
             stream.close()
@@ -220,7 +221,13 @@ def take(folder: Path) -> IO[bytes]:
 
 
 def _try_lock(stream: IO[bytes]) -> bool:
-    """Lock an open file for as long as it stays open; False if another one holds it."""
+    """Lock an open file for as long as it stays open; False if another one holds it.
+
+    Raises
+    ------
+    OSError
+        If the file system knows no locks; the file is closed then.
+    """
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -231,7 +238,10 @@ def _try_lock(stream: IO[bytes]) -> bool:
             import fcntl
 
             fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+    except OSError as error:
+        if sys.platform != "win32" and not isinstance(error, BlockingIOError):
+            stream.close()
+            raise
         return False
     return True
 

@@ -111,7 +111,7 @@ def _plain(name: str) -> str:
 
 def _require_file(path: Path, shown: str) -> None:
     """A regular file of a known kind and a size that fits into memory; looked at from outside only."""
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(Fault(shown, "a recording", "a folder", f"give the files in it: {shown}/*.wav"))
     if path.suffix.lower() not in READERS:
         got = f'"{_plain(path.suffix)}"' if path.suffix else "no ending"

@@ -19,11 +19,12 @@ from bayesplate.campaigns.tables import (
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.report.campaign_figures import every_picture, pooled_rms_cents
 from bayesplate.report.page import policy, shown_picture, template
-from bayesplate.report.saving import save_pictures
+from bayesplate.report.saving import drawing, save_pictures
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
 from bayesplate.results.words import interval, plus_minus
 
 
+@drawing()
 def write_campaign_report(
     folder: Path, title: str, summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None
 ) -> Path:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.report.saving import save_figure
+from bayesplate.report.saving import drawing, save_figure
 from bayesplate.report.style import BLUE, ORANGE
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def corner_figure(
     return figure
 
 
+@drawing()
 def write_corner_plot(
     path: Path, columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float | None] | None = None
 ) -> None:

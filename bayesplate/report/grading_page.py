@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bayesplate.report.grading_figures import every_grading_picture
 from bayesplate.report.page import policy, shown_picture, template
-from bayesplate.report.saving import save_pictures
+from bayesplate.report.saving import drawing, save_pictures
 from bayesplate.results.batch_summary import BatchSummary
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
 from bayesplate.results.grading import TARGET, Grading
@@ -21,6 +21,7 @@ GRADING_PAGE = "grading.html"
 _TABLES = ("constants", "makers", "limits", "pairs", "doubts")
 
 
+@drawing()
 def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, has_pages: bool) -> Path:
     """Write the page and its figures as PNG and SVG.
 

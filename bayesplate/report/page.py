@@ -34,7 +34,7 @@ from bayesplate.report.pairs import pairs_picture
 from bayesplate.report.percentiles import percentiles_picture
 from bayesplate.report.priors import priors_picture
 from bayesplate.report.residuals import predictive_picture, residuals_picture
-from bayesplate.report.saving import save_pictures
+from bayesplate.report.saving import drawing, save_pictures
 from bayesplate.report.shares import shares_picture
 from bayesplate.report.signatures import before_after_picture, signatures_picture
 from bayesplate.report.spectrum import spectrum_pictures
@@ -72,6 +72,7 @@ def load_libraries() -> None:
     from matplotlib.figure import Figure  # noqa: F401
 
 
+@drawing()
 def write_report(
     folder: Path,
     card: BoardCard,

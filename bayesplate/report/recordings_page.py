@@ -11,7 +11,7 @@ from bayesplate.recordings.responses import averaged
 from bayesplate.recordings.taking import Heard
 from bayesplate.report.page import policy, shown_picture, template
 from bayesplate.report.recordings_figures import every_picture
-from bayesplate.report.saving import save_pictures
+from bayesplate.report.saving import drawing, save_pictures
 from bayesplate.results.folder import FIGURES, write_text
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING, chances, percent, two_digits
@@ -19,6 +19,7 @@ from bayesplate.results.words import MISSING, chances, percent, two_digits
 RECORDINGS_PAGE = "recordings.html"
 
 
+@drawing()
 def write_recordings_page(folder: Path, report: PickReport, picked: Picked, heard: Heard) -> Path:
     """Write the page and its figures as PNG and SVG.
 

@@ -1,4 +1,4 @@
-"""Figures to files: complete or absent, and the same bytes for the same figure."""
+"""Figures to files: complete or absent, and the same bytes whatever style the user has set for figures of his own."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Any, Literal
 
 from bayesplate.report.style import Picture
@@ -20,6 +21,25 @@ _PACKING = 3
 """Of PNG, 0 to 9: beyond this it takes long and saves little."""
 
 
+_drawing = RLock()
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Figures made and written here look as matplotlib comes; to be put above a function, or a context.
+
+    matplotlib reads its settings from the working folder and the home of the user, and a notebook changes them. They
+    are those of a whole process, so that threads draw one after another.
+    """
+    from matplotlib import rc_context, rcdefaults, rcParams
+
+    with _drawing, rc_context():
+        rcdefaults()
+        rcParams["svg.hashsalt"] = "bayesplate"  # names inside an SVG follow from its content
+        yield
+
+
+@drawing()
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure by the ending of its path, PNG or SVG, without a time stamp.
 
@@ -28,12 +48,11 @@ def save_figure(figure: Figure, path: Path) -> None:
     figure : matplotlib.figure.Figure
     path : Path
     """
-    with _salted():
-        write_bytes(path, _bytes_of(figure, path.suffix.removeprefix("."), {}))
+    write_bytes(path, _bytes_of(figure, path.suffix.removeprefix("."), {}))
 
 
 def save_pictures(pictures: Iterable[Picture], folder: Path, ending: Ending) -> dict[str, bytes]:
-    """Write pictures as PNG or SVG files, title and alternative text inside.
+    """Write pictures, made while `drawing`, as PNG or SVG files, title and alternative text inside.
 
     Parameters
     ----------
@@ -48,21 +67,11 @@ def save_pictures(pictures: Iterable[Picture], folder: Path, ending: Ending) -> 
         The content of each file, by the picture's name.
     """
     written = {}
-    with _salted():
-        for picture in pictures:
-            told = {"Title": picture.title, "Description": picture.alt}
-            written[picture.name] = _bytes_of(picture.figure, ending, told)
-            write_bytes(folder / f"{picture.name}.{ending}", written[picture.name])
+    for picture in pictures:
+        told = {"Title": picture.title, "Description": picture.alt}
+        written[picture.name] = _bytes_of(picture.figure, ending, told)
+        write_bytes(folder / f"{picture.name}.{ending}", written[picture.name])
     return written
-
-
-@contextmanager
-def _salted() -> Iterator[None]:
-    """Names inside an SVG follow from its content; entered once for many figures, because entering takes its time."""
-    from matplotlib import rc_context
-
-    with rc_context({"svg.hashsalt": "bayesplate"}):
-        yield
 
 
 def _bytes_of(figure: Figure, ending: str, told: Mapping[str, str]) -> bytes:

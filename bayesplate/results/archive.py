@@ -7,16 +7,17 @@ ArviZ.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayesplate.results.folder import write_bytes
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -84,24 +85,19 @@ def write_archive(path: Path, archive: Archive) -> None:
     ------
     ValueError
         If an array does not fit its dimensions.
+    UnwritableError
+        If the disk is full or the place is not ours.
     """
     import h5netcdf
 
-    path = Path(path)
     axes, groups = archive.placed()
-    partial = path.with_name(path.name + ".partial")
-    try:
-        with h5netcdf.File(partial, "w") as file:
-            for key in sorted(archive.attributes):
-                file.attrs[key] = archive.attributes[key]
-            for name, variables in groups.items():
-                _write_group(file.create_group(name), variables, axes)
-        with partial.open("rb") as stream:
-            os.fsync(stream.fileno())
-        os.replace(partial, path)
-    finally:
-        with suppress(FileNotFoundError):
-            partial.unlink()
+    content = BytesIO()  # for HDF5 ends the process at its end where a disk was full
+    with h5netcdf.File(content, "w") as file:
+        for key in sorted(archive.attributes):
+            file.attrs[key] = archive.attributes[key]
+        for name, variables in groups.items():
+            _write_group(file.create_group(name), variables, axes)
+    write_bytes(Path(path), content.getvalue())
 
 
 def to_arviz(archive: Archive) -> Any:

@@ -51,6 +51,7 @@ class OutputFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
+        self._is_new = False
         self._lock: IO[bytes] | None = None
 
     @property
@@ -73,24 +74,21 @@ class OutputFolder:
         CheckpointError
             If there is nothing to resume.
         """
-        if self.path.exists() and not self.path.is_dir():
-            raise InputError(Fault(f"--out {self.path}", "a folder", "a file", "choose another place"))
-        has_content = self.path.is_dir() and any(_is_of_a_run(file.name) for file in self.path.iterdir())
+        has_content = any(map(_is_of_a_run, _names_in(self.path)))
+        self._is_new = not force and not resume
         if resume:
-            if not self.checkpoint.is_dir():
-                state = "a finished run" if (self.path / SUMMARY).exists() else "nothing to resume"
+            if not os.path.isdir(self.checkpoint):
+                state = "a finished run" if os.path.exists(self.path / SUMMARY) else "nothing to resume"
                 raise CheckpointError(
                     f"{self.path}: wanted the checkpoint of an interrupted run, got {state} (--force runs it anew)"
                 )
         elif has_content and not force:
-            raise InputError(
-                Fault(
-                    f"--out {self.path}",
-                    "a new folder",
-                    "one that exists",
-                    "--force replaces its results, --resume continues an interrupted run, --out takes another place",
-                )
-            )
+            raise self._not_new()
+
+    def _not_new(self) -> InputError:
+        wanted, got = "a new folder", "one that exists"
+        remedy = "--force replaces its results, --resume continues an interrupted run, --out takes another place"
+        return InputError(Fault(f"--out {self.path}", wanted, got, remedy))
 
     def open(self, *, resume: bool) -> None:
         """Make the folder and take it; unless resuming, remove the checkpoint of an earlier run.
@@ -101,7 +99,7 @@ class OutputFolder:
         Raises
         ------
         InputError
-            If the folder cannot be written.
+            If the folder cannot be written, or another run has used it since it was found to be new.
         CheckpointError
             If another run is at work in it; then nothing is removed.
         """
@@ -109,12 +107,11 @@ class OutputFolder:
         self._lock = take(self.checkpoint)
         if (held := _HELD.get()) is not None:
             held.append(self)
+        if self._is_new and (self.has_checkpoint or any(path.exists() for path in self._results())):
+            raise self._not_new()
         try:
             if not resume:
                 self._lay_aside()
-                before = self.path / BEFORE
-                if before.is_dir() and not any(before.iterdir()):
-                    before.rmdir()
                 for path in self.checkpoint.iterdir():
                     if path.is_dir() and path != self.earlier:
                         shutil.rmtree(path)
@@ -131,6 +128,7 @@ class OutputFolder:
             elif path.exists():
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 path.rename(kept)
+            _remove_empty(path.parent, self.path)
 
     def _put_back(self) -> None:
         """Move them back from where a run left nothing in their place."""
@@ -144,14 +142,11 @@ class OutputFolder:
 
     def _results(self) -> list[Path]:
         """Where results and figures of a run are, not what else somebody keeps in the folder."""
-        figures = self.path / FIGURES
-        drawn = [path for path in figures.iterdir() if path.suffix in (".png", ".svg")] if figures.is_dir() else []
-        before = (self.path / BEFORE / name for name in (SUMMARY, ARCHIVE))
-        boards = (
-            path for name in RESULTS for part in (BOARDS, BEFORE) for path in (self.path / part).glob(f"*/{name}")
-        )
+        before, boards = self.path / BEFORE, self.path / BOARDS
+        places = [self.path, before, *before.glob("*/"), *boards.glob("*/")]
+        drawn = (path for place in places for path in (place / FIGURES).glob("*") if path.suffix in (".png", ".svg"))
         priors = self.path.glob(f"*{OF_POPULATION}.toml")
-        return [*(self.path / name for name in RESULTS), *before, *boards, *drawn, *priors]
+        return [*(place / name for place in places for name in RESULTS), *drawn, *priors]
 
     @property
     def has_checkpoint(self) -> bool:
@@ -224,6 +219,32 @@ def _where_the_earlier_are(held: list[OutputFolder]) -> str:
     return "".join(f"\nwhat was there before is in {folder.earlier}" for folder in held if folder.earlier.is_dir())
 
 
+def _names_in(folder: Path) -> list[str]:
+    """What a folder of outputs holds; nothing where there is none yet.
+
+    Raises
+    ------
+    InputError
+        If it is no folder, or the system does not let us look.
+    """
+    try:
+        return os.listdir(folder)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        is_file = os.path.exists(folder) and not os.path.isdir(folder)
+        got = "a file" if is_file else error.strerror or str(error)
+        raise InputError(Fault(f"--out {folder}", "a folder", got, "choose another place")) from None
+
+
+def _remove_empty(folder: Path, above: Path) -> None:
+    """Remove a folder that is empty now, and those that it leaves empty; all of them lie below another one."""
+    with suppress(OSError):  # not there, or not empty
+        while folder != above:
+            folder.rmdir()
+            folder = folder.parent
+
+
 def _is_of_a_run(name: str) -> bool:
     return name not in BESIDE and not (name.startswith(_DRAWN_BESIDE) and name.endswith((".png", ".svg")))
 
@@ -236,10 +257,9 @@ def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Pat
     InputError
         If one is there and `force` is not given, or if the folder is no folder.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(Fault(f"--out {folder}", "a folder", "a file", "choose another place"))
+    found = set(_names_in(folder))
     paths = tuple(folder / name for name in names)
-    there = [path.name for path in paths if path.exists()]
+    there = [path.name for path in paths if path.name in found]
     if there and not force:
         wanted, remedy = "new files", "--force replaces them, --out takes another place"
         raise InputError(Fault(f"--out {folder}", wanted, f"{', '.join(there)} already there", remedy))
@@ -253,14 +273,12 @@ def writing(path: Path) -> Iterator[None]:
     Raises
     ------
     UnwritableError
-        In place of an OSError, and of the RuntimeError that HDF5 raises at a full disk.
+        In place of an OSError.
     """
     try:
         yield
-    except (OSError, RuntimeError) as error:
-        if isinstance(error, RuntimeError) and "errno" not in str(error):
-            raise
-        reason = getattr(error, "strerror", None) or str(error)
+    except OSError as error:
+        reason = error.strerror or str(error)
         wanted, remedy = "a file that can be written", "make room, or take another place with --out"
         raise UnwritableError(Fault(str(path), wanted, reason, remedy)) from error
 

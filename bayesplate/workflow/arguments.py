@@ -102,6 +102,8 @@ def _path(name: str, value: object) -> Iterator[Fault]:
         yield Fault(name, "a name or a path", _shown(value))
     elif not os.fspath(value):
         yield Fault(name, "a name or a path", "an empty text")
+    elif "\0" in str(value):
+        yield Fault(name, "a name or a path", _shown(str(value)))
 
 
 def _path_or_none(name: str, value: object) -> Iterator[Fault]:

@@ -64,7 +64,7 @@ class BatchResult:
 def default_batch_folder(source: str | os.PathLike[str]) -> Path:
     """Where the command line writes a batch unless it is told: results/NAME, of the folder or the table."""
     path = Path(source).resolve()
-    return Path("results") / ((path.name if path.is_dir() else path.stem) or "batch")
+    return Path("results") / ((path.name if os.path.isdir(path) else path.stem) or "batch")
 
 
 @run_of_its_own()
@@ -174,7 +174,7 @@ def _write_grading(folder: Path, graded: Grading, summary: BatchSummary, *, fold
 def _require_usable(folder: OutputFolder, *, force: bool, resume: bool) -> None:
     if not resume:
         folder.require_usable(force=force, resume=False)
-    elif not (folder.path / JOURNAL).is_file():
+    elif not os.path.isfile(folder.path / JOURNAL):
         raise CheckpointError(f"{folder.path}: wanted the {JOURNAL} of an earlier run, got none (--force runs it anew)")
 
 

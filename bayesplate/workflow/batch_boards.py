@@ -147,11 +147,11 @@ def boards_of(source: str | os.PathLike[str], template: str | os.PathLike[str] |
         If there are none, or a template is given with a folder or lacks with a table.
     """
     path = Path(source)
-    if path.is_dir():
+    if os.path.isdir(path):
         if template is not None:
             raise InputError(Fault("--template", "a table of boards beside it", "a folder of cards"))
         return Folder(path)
-    if not path.exists():
+    if not os.path.exists(path):
         got, looked = "nothing there", f"looked in {plain(str(path.absolute().parent))}"
         raise InputError(Fault(plain(str(path)), _WANTED, got, looked))
     if _ending(path) not in (".csv", ".parquet"):

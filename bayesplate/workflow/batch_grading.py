@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from bayesplate.cards.words import did_you_mean, quoted
@@ -125,6 +125,11 @@ def grading_faults(name: str, value: object) -> Iterator[Fault]:
         return
     if not isinstance(value, GradingRequest):
         yield Fault(name, "a GradingRequest or None", type(value).__name__)
+        return
+    both: tuple[object, ...] = (value.match_percent, value.limits)
+    if not all(isinstance(one, Mapping) for one in both):
+        got = " and ".join(type(one).__name__ for one in both)
+        yield Fault(f"{name} match_percent and limits", "dicts by the name of a figure", got)
         return
     for key, percent in value.match_percent.items():
         if key not in _MATCHED:

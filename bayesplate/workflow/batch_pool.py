@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -12,6 +13,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from itertools import chain
+from types import ModuleType
 from typing import Any, TypeAlias, TypeVar
 
 from bayesplate.errors import Fault, InputError
@@ -70,7 +72,8 @@ def processes(n: int) -> Workers:
             with ProcessPoolExecutor(n, mp_context=_context(), initializer=_begin) as executor:
                 try:
                     # All start before any computes: a worker that dies while another starts leaves the pool waiting.
-                    wait([executor.submit(time.sleep, _STARTING) for _ in range(n)])
+                    with _without_script():
+                        wait([executor.submit(time.sleep, _STARTING) for _ in range(n)])
                     yield executor
                 except BaseException:
                     executor.shutdown(wait=False, cancel_futures=True)
@@ -85,6 +88,17 @@ def processes(n: int) -> Workers:
                     os.environ[name] = value
 
     return Workers(opened, n)
+
+
+@contextmanager
+def _without_script() -> Iterator[None]:
+    """Workers that start here do not run the user's script, which would begin the batch again in each of them."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _context() -> Any:

@@ -29,6 +29,7 @@ from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import (
+    BOARDS,
     SUMMARY,
     OutputFolder,
     json_text,
@@ -120,7 +121,7 @@ def fit_boards(campaign: Campaign, seed: int, checkpoints: Path | None, stages: 
     for problem in campaign.problems:
         name = problem.board.name
         stages.begin(f"board {name}", _FIT)
-        own = None if checkpoints is None else checkpoints / name
+        own = None if checkpoints is None else checkpoints / BOARDS / name
         found[name] = fitted(problem, seed, own, _refusing(name), stages.sampled)
     return found
 

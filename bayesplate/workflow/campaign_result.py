@@ -114,8 +114,7 @@ class CampaignFitResult:
         if self.prior is not None:
             write_text(folder / f"{self.prior.name}.toml", self.prior.to_card())
         if self.learnt is not None:
-            with writing(folder / ARCHIVE):
-                write_archive(folder / ARCHIVE, shared_archive(self.learnt, self._attributes))
+            write_archive(folder / ARCHIVE, shared_archive(self.learnt, self._attributes))
         write_text(folder / SUMMARY, json_text(self.summary))
 
     def _repr_html_(self) -> str:

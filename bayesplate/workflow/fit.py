@@ -168,8 +168,7 @@ def fit(
 def write_fit(folder: Path, result: Fitted) -> None:
     """Write summary and archive of a fit into a folder that is there."""
     text = result.problem.prepared.card_text
-    with writing(folder / ARCHIVE):
-        write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, text)
+    write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, text)
     write_text(folder / SUMMARY, json_text(result.summary))
 
 

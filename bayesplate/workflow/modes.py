@@ -21,7 +21,7 @@ from bayesplate.modes.threads import one_thread_each
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
-from bayesplate.results.folder import make_folder, require_new, writing
+from bayesplate.results.folder import make_folder, require_new
 from bayesplate.results.sheets import ModesReport, proposed_labels, sheet_report
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import Card, Prepared, prepare
@@ -174,11 +174,11 @@ def _sheets(
 
 def _draw(sheets: Sequence[Sheet], folder: Path, files: Sequence[Path]) -> None:
     from bayesplate.report.chladni import chladni_sheet
-    from bayesplate.report.saving import save_figure
+    from bayesplate.report.saving import drawing, save_figure
 
     make_folder(folder)
     for i, one in enumerate(sheets):
-        figure = chladni_sheet(one)
-        for path in files[2 * i : 2 * i + 2]:
-            with writing(path):
+        with drawing():
+            figure = chladni_sheet(one)
+            for path in files[2 * i : 2 * i + 2]:
                 save_figure(figure, path)

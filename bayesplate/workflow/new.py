@@ -100,7 +100,7 @@ def new(
 def _free_path(path: str | os.PathLike[str]) -> Path:
     card = Path(path)
     card = card if card.suffix == ".toml" else card.with_name(f"{card.name}.toml")
-    if card.exists():
+    if os.path.exists(card):
         raise InputError(Fault(plain(str(card)), "a new file", "one that exists", "choose another name"))
     return card
 

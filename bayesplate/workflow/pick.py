@@ -160,7 +160,7 @@ def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recordin
     if wrong:
         wanted = "one channel with the response to the sweep"
         raise InputError([Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong])
-    if not Path(sweep).exists():
+    if not os.path.exists(sweep):
         played = read_sweep(sweep)
         return [impulse_response(one, played) for one in recordings]
     ((itself, *_),) = read_recordings([sweep], was_played=True)

@@ -35,7 +35,7 @@ from bayesplate.planning.survivors import asked, surviving
 from bayesplate.plate.board import Board
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import PlanPlots
-from bayesplate.results.folder import DIAGNOSIS, json_text, make_folder, require_new, write_text, writing
+from bayesplate.results.folder import DIAGNOSIS, json_text, make_folder, require_new, write_text
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.prepare import Card, Prepared, prepare
@@ -287,12 +287,12 @@ def _plan_of(
 def _write(made: Plan, drawn: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:
     from bayesplate.report.bench import bench_sheet
     from bayesplate.report.gains import gains_picture
-    from bayesplate.report.saving import save_figure
+    from bayesplate.report.saving import drawing, save_figure
 
     make_folder(folder)
     write_text(files[0], json_text(made))
-    figures = [gains_picture(made).figure, *(bench_sheet(one) for one in drawn)]
-    for i, figure in enumerate(figures):
-        for path in files[1 + 2 * i : 3 + 2 * i]:
-            with writing(path):
+    with drawing():
+        figures = [gains_picture(made).figure, *(bench_sheet(one) for one in drawn)]
+        for i, figure in enumerate(figures):
+            for path in files[1 + 2 * i : 3 + 2 * i]:
                 save_figure(figure, path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -227,6 +228,18 @@ def test_two_writers_are_refused(folder):
 def test_the_lock_of_a_dead_process_is_no_obstacle(folder):
     (folder / "lock").write_text("999999")
     assert n_usable_chunks(folder)[0] == 3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="other locks")
+def test_a_file_system_without_locks_is_not_taken_for_another_run(folder, monkeypatch):
+    import fcntl
+
+    def refused(descriptor, operation):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+    with pytest.raises(CheckpointError, match="wanted a folder to write to, got: No locks available"):
+        n_usable_chunks(folder)
 
 
 def test_a_full_disk_leaves_the_earlier_chunks(folder, monkeypatch, uninterrupted):

@@ -136,6 +136,27 @@ def test_a_dimension_without_labels_is_refused(tmp_path):
         write_archive(tmp_path / "posterior.nc", Archive(**changed))
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit for the size of a file")
+def test_a_disk_that_is_full_in_the_middle_of_it_ends_no_process(tmp_path):
+    """HDF5, writing to the disk itself, ended it with a segmentation fault after all had been said."""
+    program = (
+        "import resource, sys, pathlib, numpy as np\n"
+        "from bayesplate.errors import UnwritableError\n"
+        "from bayesplate.results.archive import Archive, write_archive\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
+        "groups = {'posterior': {'a': np.random.default_rng(1).normal(size=(4, 30_000))}}\n"
+        "try:\n"
+        "    write_archive(pathlib.Path(sys.argv[1]), Archive(groups, {}, {}, {}))\n"
+        "except UnwritableError:\n"
+        "    sys.exit(3)\n"
+    )
+    root = Path(archive_module.__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", program, str(tmp_path / "a.nc")], check=False, cwd=root)
+
+    assert done.returncode == 3
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_writing_imports_neither_arviz_nor_xarray():
     program = (
         "import sys, tempfile, pathlib, numpy as np\n"

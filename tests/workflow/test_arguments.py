@@ -32,6 +32,7 @@ BAD = [
     ({"n_null": 48}, "n_null: wanted a whole number from 49 on, got 48"),  # 1 / 50 is a false alarm's two per cent
     ({"out": 3}, "out: wanted a name or a path, got 3"),
     ({"out": ""}, "out: wanted a name or a path, got an empty text"),
+    ({"out": "a\0b"}, "out: wanted a name or a path, got"),
     ({"card": None}, "card: wanted a name, a path, a Board or a Problem, got None"),
     ({"prior": 3}, "prior: wanted a name, a path or a PriorCard, got 3"),
     ({"resume": True, "out": None}, "resume: wanted the folder of the run that is continued, as out, got no out"),

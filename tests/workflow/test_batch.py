@@ -250,6 +250,23 @@ def test_a_worker_that_dies_takes_no_other_board_with_it():
     assert isinstance(found[3].exception(), ValueError)
 
 
+SCRIPT = """
+from bayesplate.workflow.batch_pool import Call, computed, processes
+print([future.result() for _, future in computed(processes(2), [(0, Call(abs, (-1,)))])])
+"""
+
+
+@pytest.mark.parametrize("is_file", [True, False])
+def test_workers_do_not_run_the_script_that_started_them(is_file, tmp_path):
+    """Without a guard it would begin the batch again in each; that of the standard input is no file at all."""
+    (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
+    program = [sys.executable, "script.py" if is_file else "-"]
+    source = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}}
+    done = subprocess.run(program, input=SCRIPT, capture_output=True, text=True, check=False, **source)
+
+    assert (done.stdout, done.stderr) == ("[1]\n", "")
+
+
 def test_no_worker_starts_for_nothing():
     def opened():
         raise AssertionError("workers were started")

@@ -61,6 +61,7 @@ def test_limits_that_no_board_meets_are_refused_as_they_were_written(ends):
 
 
 BAD = [
+    (GradingRequest(match_percent=3), "dicts by the name of a figure, got int and dict"),
     (GradingRequest(match_percent={"E_z": 1.0}), "grading match_percent: wanted names of E_x, E_y, G_xy, density"),
     (GradingRequest(match_percent={"E_x": -1.0}), "grading match_percent E_x: wanted a positive number"),
     (

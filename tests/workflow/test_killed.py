@@ -6,6 +6,7 @@ import os
 import signal
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +17,11 @@ from made_campaigns import MASS, write_campaign
 from runs import files_in
 
 from bayesplate.cli import main
+from bayesplate.errors import InputError
 from bayesplate.posterior.checkpoint import take
 from bayesplate.results.folder import OutputFolder
+from bayesplate.workflow import campaign_fit
+from bayesplate.workflow.stages import Stages
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a signal that cannot be caught")
 
@@ -154,3 +158,50 @@ def test_a_folder_that_another_run_holds_is_left_as_it_is(tmp_path, arguments):
     assert refused.exit_code == 6
     assert "wanted sole use, got another run" in refused.stderr
     assert after == before
+
+
+def test_a_folder_that_another_run_has_used_meanwhile_is_not_new(tmp_path):
+    folder = OutputFolder(tmp_path / "out")
+    folder.require_usable(force=False, resume=False)
+    folder.path.mkdir()
+    (folder.path / "summary.json").write_text("of the other run")
+
+    with pytest.raises(InputError, match="wanted a new folder, got one that exists"):
+        folder.open(resume=False)
+    folder.release()
+    assert files_in(folder.path) == {"summary.json": b"of the other run"}
+
+
+def test_force_lays_aside_what_a_campaign_left_of_each_board_and_nothing_else(tmp_path):
+    names = [
+        "boards/a/summary.json",
+        "boards/a/figures/modes.svg",
+        "boards/b/figures/modes.svg",
+        "before/a/posterior.nc",
+    ]
+    folder = OutputFolder(tmp_path / "out")
+    for name in (*names, "boards/b/notes.txt"):
+        (folder.path / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder.path / name).write_text(name)
+    before = files_in(folder.path)
+
+    folder.open(resume=False)
+    aside = {f"checkpoint/earlier/{name}" for name in names}
+    assert files_in(folder.path).keys() == aside | {"boards/b/notes.txt", "checkpoint/lock"}
+    assert folders_in(folder.path).isdisjoint({Path("boards/a"), Path("boards/b/figures"), Path("before")})
+    folder.release()
+    assert files_in(folder.path) == before
+
+
+def test_a_board_of_a_campaign_may_have_the_name_of_a_file_of_the_checkpoint(tmp_path, monkeypatch):
+    """Each board has a place for its chunks among those of boards alone."""
+    kept = []
+    monkeypatch.setattr(campaign_fit, "fitted", lambda problem, seed, place, *others: kept.append(place))
+    problems = [SimpleNamespace(board=SimpleNamespace(name=name)) for name in ("lock", "earlier", "before")]
+    campaign_fit.fit_boards(SimpleNamespace(problems=problems), 1, tmp_path, Stages(None, 1.0))
+
+    assert [place.relative_to(tmp_path).as_posix() for place in kept] == [
+        "boards/lock",
+        "boards/earlier",
+        "boards/before",
+    ]
