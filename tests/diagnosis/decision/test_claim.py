@@ -123,14 +123,14 @@ def test_doubled_priors_alone_may_refuse_the_claim():
     assert not told.is_met
 
 
-@pytest.mark.parametrize(("size", "widest"), [(0.15, 2.0), (1.5, 0.5)])
+@pytest.mark.parametrize(("size", "widest"), [(0.15, 2.0), (1.2, 0.5)])
 def test_halved_priors_may_refuse_it_too(size, widest):
     """Of a small effect none is most probable under wide priors, of one beyond its prior under narrow ones."""
-    one = searched(size * (3.0 if size > 1.0 else 1.0))
+    one = searched(size)
     each = {factor: varied(one, width=factor).none for factor in (0.5, 1.0, 2.0)}
     assert max(each, key=each.get) == widest
     told = judge_claim(one, replace(decided(one), index=1), CONTROL).conditions[2]
-    assert told.value == pytest.approx(each[widest], rel=1e-12)
+    assert told.value == pytest.approx(each[widest], rel=1e-9, abs=0.0)
 
 
 def with_a_rival(size: float, alike: float):

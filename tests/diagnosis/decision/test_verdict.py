@@ -255,10 +255,14 @@ def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_i
 
 
 def test_a_name_that_has_no_support_at_all_there_is_turned_by_the_three_best(base):
-    """Of four rivals the three that are most probable there are told, with the support that they usually have."""
+    """Of four rivals the three that are most probable there are told."""
     found = found_with(base, {("a",): 0.9, ("b",): 0.04, ("c",): 0.06})
     told = decided(found, others=[turned(base, {("b",): 0.06, ("c",): 0.30, SWAPPED: 0.33, PAIR: 0.31})])
     assert [one.members for one in told.stands_for] == [("a",), SWAPPED, PAIR, ("c",)]
+    missing = Variant("as it is", found_with(base, {}))  # which does not know of it at all
+    alone = replace(missing.found.ground, hypotheses=missing.found.ground.hypotheses[2:4])
+    other = replace(missing, found=replace(missing.found, ground=alone, probability=np.array([0.2, 0.1])))
+    assert decided(found, others=[other]).word == "indistinguishable group"
 
 
 def test_the_searches_that_a_name_has_to_survive_are_made_only_for_a_name(base):
