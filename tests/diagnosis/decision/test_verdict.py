@@ -67,6 +67,17 @@ def test_one_effect_that_could_be_seen_is_enough_for_none_needed(base):
     assert decided(replace(found, ground=ground)).word == "none needed"
 
 
+@pytest.mark.parametrize(("times", "is_seen"), [(0.95, False), (1.05, True)])
+def test_an_effect_is_seen_from_twice_the_noise_over_root_n_on(base, times, is_seen):
+    """Its visible rms, for the verdict; its trace in units of the noise, for being one of two."""
+    one = candidate(base, "a", np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0])
+    rms = float(np.sqrt(np.mean((one.visible / base.scales) ** 2)))
+    seen = replace(one, visible=one.visible * times * 2.0 / np.sqrt(6.0) / rms)
+    ground = ground_of(base, candidates={"a": seen})
+    assert ground.is_below_detection_limit("a") is not is_seen
+    assert ground.paired == (("a",) if is_seen else ())
+
+
 def test_undetectable_where_three_modes_leave_nothing_to_judge_by():
     few = baseline(np.random.default_rng(1), 3)
     levels = noise_grid(few.board)
@@ -206,7 +217,7 @@ def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
         whole = replace(one, laws=(*one.laws, *other.laws), fine=changed)
         every = bare(base, levels), Hypothesis(("a",), 0.5, changed, levels)
         ground = ground_of(base, *every, candidates={"a": whole})
-        return Found(ground, 1.05 * one.visible, np.zeros(2), np.ones(2))
+        return Found(ground, 1.005 * one.visible, np.zeros(2), np.ones(2))
 
     even = found_by(table.weights / 2.0)
     first, second = (size_posterior(even, 1, 0, form, 0)[0].sum() for form in (0, 1))
