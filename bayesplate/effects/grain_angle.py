@@ -30,13 +30,21 @@ class GrainAngle(Effect):
     All terms keep their form, with weights that are functions of the angle; the coupling of bending with twist (D_16,
     D_26), and of the two shear strains, joins them.
 
-    Where the plate mirrors about a middle line both signs ring alike, and the prior has one of them. A thing at a
-    corner tells them apart: with 3 g on 250 g the signs are up to 50 cents apart at 3 degrees. `notes` says so.
+    Where the plate mirrors about a middle line both signs ring alike, and one stands for both. A thing at a corner, or
+    a thickness that was read at places, tells them apart: with 3 g on 250 g the signs are up to 50 cents apart at 3
+    degrees. A search tries both there, and `notes` says of a fit that it has one.
+
+    Attributes
+    ----------
+    sign : int
+        1 or -1 where each of both is tried, from x towards y or away from it; 0 where one stands for both.
 
     References
     ----------
     Mascia and Lahr (2006): Q' = T^-1 Q R T R^-1.
     """
+
+    sign: int = 0
 
     name: ClassVar[str] = "grain_angle"
     scope: ClassVar[Scope] = "board"
@@ -53,19 +61,34 @@ class GrainAngle(Effect):
         return cls()
 
     @classmethod
+    def candidates(cls, board: Board, setup: Setup) -> tuple[GrainAngle, ...]:
+        """Both signs where they are two boards, in one setup at least."""
+        return tuple(cls(sign=sign) for sign in ((1, -1) if _signs_differ(board) else (0,)))
+
+    @property
+    def detail(self) -> str:
+        """Which way the grain is turned, where that is told."""
+        return {0: "", 1: "from x towards y", -1: "from x away from y"}[self.sign]
+
+    @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
         """That the other sign of the angle is another board, where nothing mirrors."""
-        if cls.name not in board.effects or not any(_mirrors_nowhere(board, setup) for setup in board.setups):
+        are_both_tried = any(one.sign for one in board.chosen if isinstance(one, cls))
+        if cls.name not in board.effects or are_both_tried or not _signs_differ(board):
             return ()
         return (
-            "the sign of the grain angle counts on this board, which its edges and what is attached leave without a "
-            "line to mirror about, and only angles from x towards y are tried: fit it with y0 and y1 exchanged and all "
-            "places mirrored as well, and take the better of the two fits",
+            "the sign of the grain angle counts on this board, which its edges, what is attached and what was read at "
+            "places leave without a line to mirror about, and only angles from x towards y are tried: fit it with y0 "
+            "and y1 exchanged and all places mirrored as well, and take the better of the two fits",
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Angle from the side x to the grain."""
-        return (self.parameter("angle", DEFAULT_ANGLE, "rad", 0.0, _SOURCE),)
+        """Size of the angle between the side x and the grain."""
+        return (self.parameter(self._key, DEFAULT_ANGLE, "rad", 0.0, _SOURCE, self._key.replace("_", " ")),)
+
+    @property
+    def _key(self) -> str:
+        return "angle_away_from_y" if self.sign < 0 else "angle"
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """Neither half mirrors the other; only half a turn leaves the plate as it was."""
@@ -75,7 +98,8 @@ class GrainAngle(Effect):
         """Weights of the plate's own terms turned by the angle, then those of the coupling terms."""
         length_x, length_y = vibrating_lengths(values, setup)
         ratio = length_x / length_y
-        cosine, sine = np.cos(self.value(values, "angle")), np.sin(self.value(values, "angle"))
+        angle = self.value(values, self._key)
+        cosine, sine = np.cos(angle), (-1.0 if self.sign < 0 else 1.0) * np.sin(angle)
         cc, ss, cs = cosine**2, sine**2, cosine * sine
         xx, yy, mix, xy = base.stiffness[:, : len(THIN_TERMS)].T
         # Rigidities over m L_x L_y, with D_66 = D_s / 4.
@@ -97,9 +121,18 @@ class GrainAngle(Effect):
         return Weights(np.stack(np.broadcast_arrays(*turned, *coupling), axis=-1), base.mass)
 
 
+def _signs_differ(board: Board) -> bool:
+    """Whether a plate of the board has no line to mirror about, in one setup at least."""
+    return any(_mirrors_nowhere(board, setup) for setup in board.setups)
+
+
 def _mirrors_nowhere(board: Board, setup: Setup) -> bool:
-    """Whether edges and attached things that are part of the model leave a plate without a line to mirror about."""
-    loads = AttachedMass.name in board.effects and not AttachedMass.refusal(board, setup)
-    things = AttachedMass.of(board, setup).keeps_symmetry() if loads else (True, True)
+    """Whether edges, attached things and profiles that were read leave a plate without a line to mirror about.
+
+    A taper or gradient that nothing was read of may as well be the mirrored one.
+    """
+    from bayesplate.effects import effects_of
+
+    acting = [one for one in effects_of(board, setup) if one.name == AttachedMass.name or one.is_implied(board)]
     edges = (setup.ends_x[0] == setup.ends_x[1], setup.ends_y[0] == setup.ends_y[1])
-    return not any(edge and thing for edge, thing in zip(edges, things, strict=True))
+    return not any(edges[axis] and all(one.keeps_symmetry()[axis] for one in acting) for axis in (0, 1))

@@ -20,6 +20,7 @@ from bayesplate.modes.naming import find
 from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
 
 ANGLE = "grain_angle.angle"
 EXACT = [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]
@@ -103,6 +104,40 @@ def test_a_thing_at_a_corner_tells_the_sign():
     )
     assert np.abs(1200 * np.log2(turned / other)).max() > 30.0
     assert other == pytest.approx(mirrored, rel=1e-6)
+
+
+@pytest.mark.parametrize("degrees", [1.0, 5.0])
+def test_an_angle_away_from_y_is_the_other_sign(degrees):
+    corner = AttachedMass(MADE, (Item(Quantity.exact(3e-3), "", (CORNER,)),))
+    (away,) = (one.name for one in GrainAngle(sign=-1).parameters())
+    angle, mass = np.radians(degrees), {"attached_mass.mass": 3e-3}
+    found = hertz(FREE, [GrainAngle(sign=-1), corner], {away: angle} | mass, 8)
+    assert found == pytest.approx(hertz(FREE, [GrainAngle(), corner], {ANGLE: -angle} | mass, 8), rel=1e-12)
+
+
+BOTH = ["from x towards y", "from x away from y"]
+
+
+@pytest.mark.parametrize(
+    ("place", "edges", "details"),
+    [(CORNER, {}, BOTH), (MIDDLE, {}, [""]), (MIDDLE, {"x0": "clamped", "y0": "clamped"}, BOTH)],
+)
+def test_both_signs_are_tried_where_they_are_two_boards(place, edges, details):
+    """A taper that nothing was read of may as well be the mirrored one."""
+    item = AttachedItem("weight", ((place[0] * FREE.L_x, place[1] * FREE.L_y),), Quantity.exact(3e-3))
+    setup = replace(setup_of(replace(FREE, edges=FREE.edges | edges)), attached=(item,))
+    board = replace(board_of(FREE, [setup]), effects=("attached_mass", "thickness_profile"))
+    found = GrainAngle.forms(board)
+    assert [one.detail for one in found] == details
+    fitted = replace(board, effects=(*board.effects, "grain_angle"), chosen=found[-1].effects)
+    assert GrainAngle.notes(fitted) == ()
+
+
+@pytest.mark.parametrize(("card", "details"), [("spruce-free-1R", BOTH), ("fiemme-spruce-clamped", [""])])
+def test_a_thickness_that_was_read_at_places_tells_the_sign(card, details):
+    """Of 1R the readings say that it varies; without its profile both signs ring alike."""
+    assert [one.detail for one in GrainAngle.forms(prepare(card).board)] == details
+    assert [one.detail for one in GrainAngle.forms(prepare(card, []).board)] == [""]
 
 
 @pytest.mark.parametrize(

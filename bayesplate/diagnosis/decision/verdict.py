@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.diagnosis.evidence.draws import draw_terms, members_of, standard_sizes_of
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.predictive import PASSES
@@ -30,6 +31,8 @@ _MOST_RIVALS = 3
 """Of a name that does not survive another assumption: the best there are told."""
 AT_LIMIT = 0.005
 """Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
+
+_N_DRAWS = 2000
 
 NOTHING_LEFT = "three modes determine the three constants and leave nothing to judge by"
 
@@ -198,24 +201,27 @@ def _without(found: Found, best: Answer | None) -> Verdict:
 def at_limit(found: Found, index: int) -> str:
     """Which size of a hypothesis sits at the limit of its range; empty if none does.
 
-    A size that may be zero is not at a limit there: zero is no effect.
+    A size that may be zero is not at a limit there: zero is no effect. The size is looked at by draws, for a cell of a
+    table may be wider than what counts as the limit.
     """
-    hypothesis = found.ground.hypotheses[index]
-    for place, name in enumerate(hypothesis.members):
-        if name not in found.ground.candidates:
-            continue
-        candidate = found.ground.candidates[name]
-        for law_index, law in enumerate(candidate.laws):
-            for i, free in enumerate(law.form.free):
-                shares, z = size_posterior(found, index, place, law_index, i)
-                if shares.sum() < 0.5:
-                    continue
-                order = np.argsort(z)
-                median = z[order][np.searchsorted(np.cumsum(shares[order]), 0.5 * shares.sum())]
-                if _is_extreme(free.prior, float(median)):
+    drawn = draw_terms(found, index, np.random.default_rng(0), _N_DRAWS)
+    for member in range(len(members_of(found, index))):
+        for law, rows, z in standard_sizes_of(found, drawn, member):
+            if 2 * rows.size < drawn.n_draws:
+                continue
+            for free, column in zip(law.form.free, z.T, strict=True):
+                median = _median_within(free.prior, column)
+                if _is_extreme(free.prior, median):
                     factor, unit = unit_of_people(free.unit)
                     return f"{free.key} = {factor * float(free.prior.value(median)):.3g} {unit}".rstrip()
     return ""
+
+
+def _median_within(prior: Quantity, z: Floats) -> float:
+    """Median of the draws that lie within the bounds of a prior; the bound next to them where none does."""
+    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    inside = z[(low <= z) & (z <= high)]
+    return float(np.median(inside) if inside.size else np.clip(np.median(z), low, high))
 
 
 def size_posterior(found: Found, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:

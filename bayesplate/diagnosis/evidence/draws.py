@@ -143,6 +143,18 @@ def sizes_of(
 
     The sizes are in SI units, by the name of the parameter, within the bounds of their priors.
     """
+    for law, rows, z in standard_sizes_of(found, drawn, member):
+        values = {}
+        for free, column in zip(law.form.free, z.T, strict=True):
+            low, high = (float(free.prior.standard(bound)) for bound in (free.prior.lower, free.prior.upper))
+            values[free.name] = np.asarray(free.prior.value(np.clip(column, low, high)))
+        yield law, rows, values
+
+
+def standard_sizes_of(
+    found: Found, drawn: TermDraws, member: int
+) -> Iterator[tuple[FormLaw, NDArray[np.intp], Floats]]:
+    """The same in standard coordinates, (n, n_parameters) arrays; a cell that ends at a bound reaches beyond it."""
     every = members_of(found, drawn.index)
     candidate = every[member]
     table = candidate.fine if len(every) == 1 else candidate.coarse
@@ -150,13 +162,10 @@ def sizes_of(
     cells = drawn.cells[:, member]
     for index, law in enumerate(candidate.laws):
         rows = np.flatnonzero(table.form[cells] == index)
-        values = {}
-        for i, free in enumerate(law.form.free):
-            z = table.z[cells[rows], i] + table.z_slopes[cells[rows], i] * drawn.within[rows, first + i]
-            low, high = (float(free.prior.standard(bound)) for bound in (free.prior.lower, free.prior.upper))
-            values[free.name] = np.asarray(free.prior.value(np.clip(z, low, high)))
         if rows.size:
-            yield law, rows, values
+            n = len(law.form.free)
+            within = drawn.within[rows, first:][:, :n]
+            yield law, rows, table.z[cells[rows], :n] + table.z_slopes[cells[rows], :n] * within
 
 
 def joint_sizes_of(found: Found, drawn: TermDraws) -> Iterator[tuple[FormLaw, NDArray[np.intp], dict[str, Floats]]]:

@@ -186,15 +186,18 @@ def prepare_search(
     Returns
     -------
     Ground
+        Without effects that leave no plate, whatever their size.
     """
     solve = form_law if solve is None else solve
     candidates = {}
     every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
-    for name, each in every.items():
+    for n_done, (name, each) in enumerate(every.items(), start=1):
         laws = tuple(solve(baseline, form).placed(baseline) for form in each)
-        candidates[name] = _candidate(baseline, name, laws)
+        one = _candidate(baseline, name, laws)
+        if one.fine.n_cells and one.coarse.n_cells:
+            candidates[name] = one
         if tell is not None:
-            tell(len(candidates) / len(every))
+            tell(n_done / len(every))
     ground = Ground(baseline, candidates, ())
     fine = {name: one.fine for name, one in candidates.items()}
     coarse = {name: one.coarse for name, one in candidates.items()}

@@ -99,6 +99,7 @@ def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: tupl
     Returns
     -------
     Table
+        Without any cells where no size of the effect leaves a plate.
     """
     parts = [_of_form(baseline, name, i, law, cells) for i, law in enumerate(laws)]
     n_tangents = max(part.slopes.shape[2] for part in parts)
@@ -217,7 +218,7 @@ def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: tup
     weights = np.where(finite, np.exp(np.where(finite, log_weights, -np.inf)), 0.0)
     table = Table(
         members=(name,),
-        weights=weights / weights.sum(),
+        weights=weights / max(weights.sum(), np.finfo(float).tiny),
         shift=shift,
         slopes=slopes,
         moved=moved,

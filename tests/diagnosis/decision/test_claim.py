@@ -22,6 +22,7 @@ from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.search import search
+from bayesplate.diagnosis.evidence.sensitivity import varied
 
 DIRECTION = 0.05 * np.random.default_rng(2).standard_normal(9)
 CONTROL = NullControl(against=np.linspace(-3.0, 0.0, 101), ratio=np.linspace(0.4, 1.4, 101))
@@ -120,6 +121,16 @@ def test_doubled_priors_alone_may_refuse_the_claim():
     told = judge_claim(one, replace(decided(one), index=1), CONTROL).conditions[2]
     assert one.none < 0.05 < told.value
     assert not told.is_met
+
+
+@pytest.mark.parametrize(("size", "widest"), [(0.15, 2.0), (1.2, 0.5)])
+def test_halved_priors_may_refuse_it_too(size, widest):
+    """Of a small effect none is most probable under wide priors, of one beyond its prior under narrow ones."""
+    one = searched(size)
+    each = {factor: varied(one, width=factor).none for factor in (0.5, 1.0, 2.0)}
+    assert max(each, key=each.get) == widest
+    told = judge_claim(one, replace(decided(one), index=1), CONTROL).conditions[2]
+    assert told.value == pytest.approx(each[widest], rel=1e-9, abs=0.0)
 
 
 def with_a_rival(size: float, alike: float):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, decided, ground_of
 
-from bayesplate.diagnosis.decision.verdict import alternatives, answers, at_limit
+from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, alternatives, answers, at_limit, size_posterior
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl
@@ -60,6 +60,41 @@ def test_none_needed(base):
     assert verdict.best.members == ("a",)
 
 
+def test_one_effect_that_could_be_seen_is_enough_for_none_needed(base):
+    found = found_with(base, {(): 0.5, ("a",): 0.5}, size=1e-4, residual=NOTHING)
+    seen = found_with(base, {}, residual=NOTHING).ground.candidates["b"]
+    ground = replace(found.ground, candidates={**found.ground.candidates, "b": seen})
+    assert decided(replace(found, ground=ground)).word == "none needed"
+
+
+@pytest.mark.parametrize(("times", "is_seen"), [(0.95, False), (1.05, True)])
+def test_an_effect_is_seen_from_twice_the_noise_over_root_n_on(base, times, is_seen):
+    """Its visible rms, for the verdict; its trace in units of the noise, for being one of two."""
+    one = candidate(base, "a", np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0])
+    rms = float(np.sqrt(np.mean((one.visible / base.scales) ** 2)))
+    seen = replace(one, visible=one.visible * times * 2.0 / np.sqrt(6.0) / rms)
+    ground = ground_of(base, candidates={"a": seen})
+    assert ground.is_below_detection_limit("a") is not is_seen
+    assert ground.paired == (("a",) if is_seen else ())
+
+
+def test_undetectable_where_three_modes_leave_nothing_to_judge_by():
+    few = baseline(np.random.default_rng(1), 3)
+    levels = noise_grid(few.board)
+    one = candidate(few, "a", np.zeros(3))
+    ground = ground_of(few, bare(few, levels), Hypothesis(("a",), 0.5, one.fine, levels), candidates={"a": one})
+    verdict = decided(Found(ground, np.zeros(3), np.zeros(2), np.array([0.01, 0.99])))
+    assert (verdict.word, verdict.reason) == ("undetectable", NOTHING_LEFT)
+
+
+def test_what_comes_nearest_is_told_only_where_something_is_needed(base):
+    """The bare model fails, and the best of the answers is as improbable as chance leaves it."""
+    idle = decided(found_with(base, {(): 0.5, ("a",): 0.5}, residual=large(base)))
+    assert (idle.word, idle.nearest, idle.fitted_again) == ("unexplained", None, ())
+    needed = decided(found_with(base, {("a",): 1.0}, residual=large(base)))
+    assert (needed.word, needed.nearest) == ("unexplained", needed.best)
+
+
 def test_undetectable_if_every_effect_is_below_sight(base):
     assert decided(found_with(base, {(): 0.5, ("a",): 0.5}, size=1e-4, residual=NOTHING)).word == "undetectable"
 
@@ -87,8 +122,9 @@ def test_named_from_three_times_the_next_on(base):
     assert (verdict.word, verdict.effects, verdict.index) == ("named", ("a",), 1)
 
 
-def test_a_group_below_three_times_the_next(base):
-    verdict = decided(found_with(base, {("a",): 0.70, ("b",): 0.27, ("c",): 0.03}))
+@pytest.mark.parametrize("second", [0.27, 0.24])
+def test_a_group_below_three_times_the_next(base, second):
+    verdict = decided(found_with(base, {("a",): 0.70, ("b",): second, ("c",): 0.03}))
     assert verdict.word == "indistinguishable group"
     assert verdict.effects == ("a", "b")
     assert verdict.index == 1
@@ -123,9 +159,9 @@ def test_exchanged_labels_can_win(base):
     assert (verdict.word, verdict.effects, verdict.index) == ("named", SWAPPED, 4)
 
 
-@pytest.mark.parametrize(("z", "limited"), [(0.0, False), (2.0, False), (2.6, True), (-2.55, True)])
+@pytest.mark.parametrize(("z", "limited"), [(0.0, False), (2.0, False), (2.4, False), (2.6, True), (-2.55, True)])
 def test_a_size_at_the_limit_of_its_range_is_never_named(base, z, limited):
-    """A Poisson ratio between 0 and 0.9: most probable at 0.4, 0.7, 0.79 and 0.02."""
+    """A Poisson ratio between 0 and 0.9: most probable at 0.4, 0.7, 0.76, 0.79 and 0.02."""
     found = found_with(base, {("a",): 1.0}, size=1.0, prior=BOUNDED)
     of_a = found.ground.candidates["a"]
     cell = int(np.argmin(np.abs(of_a.fine.z[:, 0] - z)))
@@ -146,6 +182,50 @@ def test_a_size_at_its_limit_is_found_in_a_pair_too(base):
     of_b = found.ground.candidates["b"]
     found = replace(found, residual=of_b.coarse.shift[np.argmax(of_b.coarse.z[:, 0])])
     assert at_limit(found, 5) != ""
+
+
+@pytest.mark.parametrize(("size", "limited"), [(1.9, False), (1.98, True), (2.05, True)])
+@pytest.mark.parametrize(("members", "index"), [(("a",), 1), (PAIR, 5)])
+def test_a_cell_may_be_wider_than_what_counts_as_the_limit(base, members, index, size, limited):
+    """An angle of up to two standard deviations: the last of nine cells has three hundredths of its prior.
+
+    A two hundredth lies between 1.956 and the bound.
+    """
+    prior = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0, upper=2.0)
+    found = found_with(base, {members: 1.0}, size=1.0, prior=prior)
+    other = 0.0 if len(members) == 1 else found.ground.candidates["b"].visible
+    found = replace(found, residual=size * found.ground.candidates["a"].visible + other)
+    assert bool(at_limit(found, index)) is limited
+
+
+@pytest.mark.parametrize("share", [0.55, 0.45])
+def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
+    """Two forms of one shift, the second with a bound next to it; told only where it has the larger share."""
+    wide, narrow = (Quantity.from_mean(0.0, 1.0, "normal", lower=0.0, upper=top) for top in (3.0, 1.0))
+    direction = np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0]
+    one, other = (candidate(base, "a", direction, prior=prior) for prior in (wide, narrow))
+    both = {
+        key: np.concatenate([getattr(one.fine, key), getattr(other.fine, key)])
+        for key in ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
+    }
+    both["form"][one.fine.n_cells :] = 1
+    table = replace(one.fine, **both)
+    levels = noise_grid(base.board)
+
+    def found_by(weights):
+        changed = replace(table, weights=weights)
+        whole = replace(one, laws=(*one.laws, *other.laws), fine=changed)
+        every = bare(base, levels), Hypothesis(("a",), 0.5, changed, levels)
+        ground = ground_of(base, *every, candidates={"a": whole})
+        return Found(ground, 1.005 * one.visible, np.zeros(2), np.ones(2))
+
+    even = found_by(table.weights / 2.0)
+    first, second = (size_posterior(even, 1, 0, form, 0)[0].sum() for form in (0, 1))
+    odds = share / (1.0 - share) * first / second
+    weights = np.where(table.form == 1, odds, 1.0) * table.weights
+    found = found_by(weights / weights.sum())
+    assert size_posterior(found, 1, 0, 1, 0)[0].sum() == pytest.approx(share)
+    assert bool(at_limit(found, 1)) is (share > 0.5)
 
 
 def test_without_candidates_there_is_nothing_to_name(base):
@@ -183,6 +263,17 @@ def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_i
     assert told.reason == "if the noise is larger b may be as probable"
     gone = turned(base, {(): 0.2, ("c",): 0.8})
     assert decided(found, others=[gone]).effects == ("a", "c")
+
+
+def test_a_name_that_has_no_support_at_all_there_is_turned_by_the_three_best(base):
+    """Of four rivals the three that are most probable there are told."""
+    found = found_with(base, {("a",): 0.9, ("b",): 0.04, ("c",): 0.06})
+    told = decided(found, others=[turned(base, {("b",): 0.06, ("c",): 0.30, SWAPPED: 0.33, PAIR: 0.31})])
+    assert [one.members for one in told.stands_for] == [("a",), SWAPPED, PAIR, ("c",)]
+    missing = Variant("as it is", found_with(base, {}))  # which does not know of it at all
+    alone = replace(missing.found.ground, hypotheses=missing.found.ground.hypotheses[2:4])
+    other = replace(missing, found=replace(missing.found, ground=alone, probability=np.array([0.2, 0.1])))
+    assert decided(found, others=[other]).word == "indistinguishable group"
 
 
 def test_the_searches_that_a_name_has_to_survive_are_made_only_for_a_name(base):

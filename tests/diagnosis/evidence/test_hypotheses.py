@@ -69,7 +69,8 @@ def test_two_effects_add(base):
 
 def test_only_close_neighbours_of_different_symmetry_may_be_exchanged(base):
     assert {(one.first, one.second) for one in confusable(base)} == {(0, 1), (1, 2), (3, 4), (4, 5)}
-    apart = baseline(np.random.default_rng(1), parities=CLOSE_PAIR, spacing=0.13)
+    near, apart = (baseline(np.random.default_rng(1), parities=CLOSE_PAIR, spacing=one) for one in (0.115, 0.125))
+    assert len(confusable(near)) == 4
     assert confusable(apart) == ()
 
 

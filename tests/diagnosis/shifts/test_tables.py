@@ -10,9 +10,10 @@ import pytest
 from full_refits import full_refit
 from made_searches import baseline
 
+from bayesplate.diagnosis.evidence.search import prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of, weighted_rms
 from bayesplate.diagnosis.shifts.forms import forms, with_forms
-from bayesplate.diagnosis.shifts.laws import form_law
+from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts.signatures import signatures
 from bayesplate.diagnosis.shifts.tables import nominal_shift, refitted, tabulate
 from bayesplate.frequencies.laws import cents
@@ -67,6 +68,25 @@ def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish):
         assert error < CENT, name
         shown += np.abs(cents(exact)).max() > 5.0 * CENT
     assert shown >= 4  # else the comparison would say nothing
+
+
+class NoPlate(FormLaw):
+    """Frequencies of an effect that leaves no plate whatever its size, as a Poisson ratio beyond what D_y allows."""
+
+    def every_log_frequency(self, baseline, log_rigidities, values):
+        return np.full((len(log_rigidities), baseline.every.log_frequency.size), np.nan)
+
+
+def test_an_effect_that_leaves_no_plate_is_not_tried(finnish_few):
+    def solve(base, form):
+        law = form_law(base, form)
+        return NoPlate(form, law.models) if form.effect == "poisson_ratio" else law
+
+    pair = ("poisson_ratio", "density_gradient")
+    for tried, left in ((pair, ["density_gradient"]), (pair[:1], [])):
+        found = search(prepare_search(finnish_few.ground.baseline, solve, tried=tried))
+        assert list(found.ground.candidates) == left
+        assert found.probability.sum() == pytest.approx(1.0)
 
 
 @pytest.mark.slow
