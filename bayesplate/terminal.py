@@ -100,6 +100,9 @@ class _Told:
         return getattr(sys.stderr, name)
 
 
+_TOLD = cast(IO[str], _Told())
+
+
 @contextmanager
 def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]:
     """A status line on the standard error while at work; a line now and then where that is no terminal."""
@@ -108,7 +111,7 @@ def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]
         return
     from rich.console import Console
 
-    console, started, stage = Console(file=cast(IO[str], _Told())), monotonic(), ""
+    console, started, stage = Console(file=_TOLD), monotonic(), ""
     with console.status("reading the card and solving the plate") as status:
         # Now, and not when first told: Python gives another exit code to a run that is interrupted while it defines
         # classes of an import by executing text.
@@ -120,7 +123,7 @@ def progress_line(*, shown: bool) -> Iterator[Callable[[Progress], None] | None]
             if console.is_terminal:
                 status.update(text)
             elif progress.stage != stage or (progress.n_steps % 1000 == 0 and progress.n_steps):
-                click.echo(text, file=cast(IO[str], _Told()))
+                click.echo(text, file=_TOLD)
             stage = progress.stage
 
         yield tell
@@ -141,7 +144,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
         yield
     except BayesplateError as error:
         if debug:
-            traceback.print_exc(file=cast(IO[str], _Told()))
+            traceback.print_exc(file=_TOLD)
         _fail(str(error), error.exit_code, as_json, [vars(fault) for fault in error.faults])
     except (KeyboardInterrupt, click.Abort) as stopped:  # at a question both keys that end it abort
         _fail(str(stopped) or "interrupted", INTERRUPTED, as_json)
@@ -150,7 +153,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
         sys.exit(0)
     except Exception as error:
         if debug:
-            traceback.print_exc(file=cast(IO[str], _Told()))
+            traceback.print_exc(file=_TOLD)
         _fail(f"internal error: {type(error).__name__}: {error} (--debug shows where)", INTERNAL, as_json)
     finally:
         for heard, handler in before.items():
@@ -158,7 +161,7 @@ def reporting(*, as_json: bool, debug: bool) -> Iterator[None]:
 
 
 def _fail(message: str, code: int, as_json: bool, faults: Sequence[Mapping[str, str]] = ()) -> None:
-    click.echo("\n".join(plain(line) for line in message.split("\n")), file=cast(IO[str], _Told()))
+    click.echo("\n".join(plain(line) for line in message.split("\n")), file=_TOLD)
     if as_json:
         with suppress(UnwritableError):  # the message has been given
             _write(

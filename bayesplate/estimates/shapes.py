@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.sheet import limits_of, points, sampled
+from bayesplate.estimates.sheet import points, sampled
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.modes.plate import Parity
 from bayesplate.modes.solve import collect, solve_classes
@@ -39,7 +39,7 @@ def labelled_shapes(models: Sequence[SetupModel], values: Values) -> dict[str, d
             counts[place.parity] = max(counts.get(place.parity, 0), place.rank + 1)
         modes = collect(model.plate, solve_classes(model.plate, model.system.weights(values).at(0), counts))
         where = {place: i for i, place in enumerate(zip(modes.parities, modes.ranks.tolist(), strict=True))}
-        shapes = sampled(modes, limits_of(model.system, grid), grid)
+        shapes = sampled(modes, model.system.limits(grid), grid)
         result[model.setup.name] = {
             str(label): shapes[where[place.parity, place.rank]]
             for label, place in zip(model.setup.labels, model.places, strict=True)

@@ -12,12 +12,10 @@ from bayesplate.estimates.combined import COMBINED, combination, combined_shapes
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.spectrum import NamedMode, spectrum
-from bayesplate.frequencies.system import System
+from bayesplate.frequencies.system import Limits, System
 from bayesplate.modes.solve import Modes
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.material import MODULI, RIGIDITIES
-
-Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 NUMBERS_OF_MODES = (12, 16, 20)
 """The first that holds every measured label; beyond the last the highest are not shown."""
@@ -158,13 +156,6 @@ def points(n: int = _GRID) -> NDArray[np.float64]:
     return np.linspace(1e-3, 1.0 - 1e-3, n)
 
 
-def limits_of(system: System, grid: NDArray[np.float64]) -> Limits | None:
-    """Where the plate of a setup begins and ends along y at points of its length; None where it is a rectangle."""
-    shaped = system.shaped
-    outline = None if shaped is None else shaped.outline()
-    return None if outline is None else outline(grid)
-
-
 def sampled(modes: Modes, limits: Limits | None, grid: NDArray[np.float64]) -> NDArray[np.float64]:
     """Deflections of modes within the outline.
 
@@ -172,7 +163,7 @@ def sampled(modes: Modes, limits: Limits | None, grid: NDArray[np.float64]) -> N
     ----------
     modes : Modes
     limits : ((n,) array, (n,) array) or None
-        `limits_of` the plate at the grid.
+        Of the plate at the grid (`System.limits`).
     grid : (n,) array
         Fractions of the length, and of the width at each of its points.
 
@@ -230,7 +221,7 @@ def sheet(
             break
     found = columns(system, values, modes.coefficients)
     shares = found.shares(np.array([float(values[name]) for name in RIGIDITIES]))
-    limits = limits_of(system, points())
+    limits = system.limits(points())
     shapes = sampled(modes, limits, points())
     length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
     rows = tuple(

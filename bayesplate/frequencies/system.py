@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.effects import effects_of
 from bayesplate.effects.base import Effect, Mass, ProjectedMass, Stiffness, Theory
@@ -27,6 +28,10 @@ from bayesplate.plate.setup import Ends, Setup
 
 _MOST_BYTES = 250_000_000
 """Of the matrices that are kept: those of hundreds of bare plates, or of a few with fields and fine meshes."""
+
+
+Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Where a plate begins and ends along y at some points of its length, (n,) arrays, as fractions of its widest width."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,14 @@ class System:
     def shaped(self) -> Effect | None:
         """The effect that gives the plate its outline, where that is not the whole rectangle."""
         return next((effect for effect in self.effects if effect.outline() is not None), None)
+
+    def limits(self, x: NDArray[np.float64]) -> Limits | None:
+        """Where the plate begins and ends along y at fractions of its length, as fractions of its widest width.
+
+        None where it is a rectangle.
+        """
+        outline = None if self.shaped is None else self.shaped.outline()
+        return None if outline is None else outline(x)
 
     @cached_property
     def _acting(self) -> tuple[Effect, ...]:

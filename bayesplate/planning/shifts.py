@@ -169,7 +169,7 @@ def _beside(found: Found, table: Table, form: Form, cell: int, law: BareLaw) -> 
     constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities + table.moved[cell]), strict=True))
     exact = {name: np.asarray(q.mean) for name, q in form.board.inputs.items() if q.is_exact}
     there = {**exact, **baseline.values, **sizes, **constants}
-    shift = SolvedStation.of(law.station, form.board, there).log_frequency - law.solved
+    shift = SolvedStation.of(law.station, form.board, there).bare_and_added - law.solved
     shift[0] -= law.slopes[:, : len(RIGIDITIES)] @ table.moved[cell]
     shift[:, np.abs(shift[0]) > _TOO_FAR] = np.nan
     return np.asarray(shift.ravel())

@@ -65,7 +65,7 @@ class SolvedStation:
         return cls(station, there, modes, [at.get(label, -1) for label in station.setup.labels], share)
 
     @property
-    def log_frequency(self) -> Floats:
+    def bare_and_added(self) -> Floats:
         """ln f (Hz) of the station's modes, and what a known mass at each of its spots adds: (1 + n_spots, n_modes).
 
         Not a number where a mode has lost its name.
@@ -142,7 +142,7 @@ class BareLaw:
     ----------
     station : Station
     solved : (1 + n_spots, n_modes) array
-        Of `SolvedStation.log_frequency`, at the estimate.
+        Of `SolvedStation.bare_and_added`, at the estimate.
     middle : (n_modes,) array
         ln f (Hz) with the inputs at the middle of their priors.
     slopes : (n_modes, 3 + n_inputs) array
@@ -186,8 +186,8 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
     start = centre[parameters.fitted_columns]
     slopes = sensitivities(Predictor(at, [model], "linear"), start)
     found = SolvedStation.of(station, board, values)
-    log_frequency = found.log_frequency
-    there = log_frequency[0] + model.discrepancies(at(start[None, :]))[0]
+    solved = found.bare_and_added
+    there = solved[0] + model.discrepancies(at(start[None, :]))[0]
     of_inputs, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], start[N_RIGIDITIES:])
     every = np.concatenate([slopes[:, :N_RIGIDITIES], of_inputs], axis=1)
-    return BareLaw(station, log_frequency, there - of_inputs @ inputs, every, found.off_place)
+    return BareLaw(station, solved, there - of_inputs @ inputs, every, found.off_place)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.sheet import limits_of
 from bayesplate.frequencies.system import System, system_of
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.setup import EDGES, Setup
@@ -120,7 +119,7 @@ def _outline(system: System, values: Values) -> _Outline:
     adjusted = system.adjusted(values)
     length, width = (float(side) for side in vibrating_lengths(adjusted, system.setup))
     start = float(values[system.setup.input_name("x0")]) if "x0" in system.setup.clamped else 0.0
-    limits = limits_of(system, (x - start) / length)
+    limits = system.limits((x - start) / length)
     low, high = limits or (np.zeros_like(x), np.ones_like(x))
     return _Outline(x, low * width, float(adjusted["length_y"]) - (1.0 - high) * width, limits is None)
 

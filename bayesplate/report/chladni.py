@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.sheet import CombinedMode, Limits, Sheet, SheetMode, points
+from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
+from bayesplate.frequencies.system import Limits
 from bayesplate.report.style import BLUE, GREEN, VERMILLION, drawable
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.words import STIFFNESS

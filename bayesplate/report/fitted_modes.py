@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.sheet import Limits
+from bayesplate.frequencies.system import Limits
 from bayesplate.plate.setup import Setup
 from bayesplate.report.chladni import draw_edge, draw_sand
 from bayesplate.report.style import DARK, SMALL, WIDTH, WORDS, Picture

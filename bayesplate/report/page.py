@@ -20,7 +20,7 @@ from bayesplate.diagnosis.wording.exports import write_before_after, write_known
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
-from bayesplate.estimates.sheet import limits_of, points
+from bayesplate.estimates.sheet import points
 from bayesplate.plate.board import vibrating_lengths
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
@@ -187,7 +187,7 @@ def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list
         length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
         own = [mode for mode in summary.modes if mode.setup == setup.name]
         name = "modes" if len(board.setups) == 1 else f"modes-{setup.name}"
-        ratio, limits = float(length_x / length_y), limits_of(system, points(N_POINTS))
+        ratio, limits = float(length_x / length_y), system.limits(points(N_POINTS))
         found.append(fitted_modes_picture(setup, own, shapes[setup.name], ratio, name, limits))
     return found
 

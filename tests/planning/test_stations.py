@@ -15,7 +15,7 @@ from bayesplate.cards import load_prior
 from bayesplate.planning.assembled import bench_of
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.modes_read import station_readings
-from bayesplate.planning.station_laws import PLACED, bare_law, known_mass
+from bayesplate.planning.station_laws import PLACED, SolvedStation, bare_law, known_mass
 from bayesplate.planning.stations import stations
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
@@ -53,6 +53,16 @@ def test_a_free_board_is_proposed_as_a_cantilever_and_no_board_as_what_it_was(fr
     assert free[1].setup.edges == {"x0": "clamped", "x1": "free", "y0": "free", "y1": "free"}
     assert [one.setup.name for one in clamped] == ["setup", "free"]
     assert (free[1].n_old, free[1].spots) == (0, ())
+
+
+def test_of_a_mode_that_has_lost_its_name_nothing_is_told(free):
+    """Neither where it is nor what a known mass adds to it; the others stay as they are."""
+    found = SolvedStation.of(free[0], board(FREE), values())
+    lost = replace(found, rows=[-1, *found.rows[1:]])
+
+    assert found.bare_and_added.shape == (1 + len(free[0].spots), len(free[0].setup.labels))
+    assert np.isnan(lost.bare_and_added[:, 0]).all()
+    np.testing.assert_array_equal(lost.bare_and_added[:, 1:], found.bare_and_added[:, 1:])
 
 
 def test_of_several_sessions_only_the_last_goes_on():
