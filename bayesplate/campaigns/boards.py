@@ -18,7 +18,7 @@ from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS, effective_draws
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surrogate
+from bayesplate.posterior.surrogate import Solved, Surrogate, with_surrogate
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,8 @@ N_SOLVED = 2048
 """Draws of a walk, or taken to other shared parameters, at which the law itself is evaluated."""
 _MOST_WALKS = 3
 """On surrogates, each fitted to the law where the one before led."""
+_ALONG_BENT = {3: 6}
+"""Orders of a surrogate fitted on the way to where others lead a board: higher ones are wild beyond its points."""
 _LINE = 19
 _NOTHING = 1e-300
 
@@ -192,9 +194,9 @@ class Member:
                 found.append(drawn)
             if surrogate is None or (found and found[-1].effective(found[-1].weights) >= FEWEST_WEIGHTED_DRAWS):
                 break
-            if np.isfinite(every.log_density).sum() < n_terms(surrogate.columns.size, surrogate.degree):
+            if np.isfinite(every.log_density).sum() < len(surrogate.coefficients):
                 break
-            surrogate = Surrogate.fitted(every, surrogate.columns, surrogate.degree)
+            surrogate = Surrogate.fitted(every, surrogate.columns, _ALONG_BENT)
         if not found:
             return before
         best = max(found, key=lambda one: one.effective(one.weights))

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.definite import definite_solutions
+from bayesplate.modes.definite import definite_pencil_values, definite_solutions
 
 Floats = NDArray[np.float64]
 
@@ -43,9 +43,9 @@ def pencil_eigenvalues(stiffness: Floats, mass: Floats, shift: Floats | float) -
     -------
     (n_draws, r) array, s^-2
     """
-    _, flexibility, is_material = _flexibility(stiffness, mass, shift)
-    values = 1.0 / np.linalg.eigvalsh(flexibility) - np.reshape(shift, (-1, 1))
-    return np.where(is_material[:, None], values[:, ::-1], np.nan)
+    # The stiffness is what is factorised and not the mass, for shear strains have no mass.
+    flexibilities = definite_pencil_values(mass, stiffness + shift * mass)
+    return np.asarray(1.0 / flexibilities[:, ::-1] - np.reshape(shift, (-1, 1)))
 
 
 def _flexibility(stiffness: Floats, mass: Floats, shift: Floats | float) -> tuple[Floats, Floats, NDArray[np.bool_]]:

@@ -1,5 +1,8 @@
 """A law between linear and exact: ln f of each mode as a polynomial of low order in the sampled parameters.
 
+It is of second order in all of them, and of up to fifth along the few directions in which ln f is bent most: of all
+terms of third order in fifteen parameters hardly one matters, and fitted to a thousand points they follow chance.
+
 It is fitted by least squares to the exact law where the posterior is: first at draws of the normal approximation, then
 at draws of its own posterior, until it holds at draws that it was not fitted to. It costs microseconds per draw,
 however many effects the board has. The walkers walk on it and the exact law accepts or rejects where they end
@@ -8,8 +11,10 @@ however many effects the board has. The walkers walk on it and the exact law acc
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import comb
+from functools import lru_cache
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -27,13 +32,16 @@ Floats = NDArray[np.float64]
 
 _WIDER = 1.5
 """Than the normal approximation: the first points, so that the posterior's shoulders are among them."""
-_REACH = 5.0
+_REACH = 7.0
 """Standard deviations of the points beyond which the polynomial goes on level: it knows nothing there."""
+ALONG_BENT = {3: 6, 4: 4, 5: 3}
+"""Orders above the second, and along how many of the directions in which ln f is bent most."""
 _POINTS_PER_TERM = 3
-_MOST_TERMS = 400
 _FEWEST_POINTS = 512
 _FEWEST_ROUNDS, _MOST_ROUNDS = 3, 8
-_TEMPERATURE, _LOWEST = 4.0, -40.0
+_TEMPERATURE, _LOWEST = 4.0, -200.0
+"""Of the weights in a fit, and of the walk to points far out. Lower differences of log densities than the second count
+as that: a law that is wild out there must not bend the polynomial here."""
 _FAR = 15.0
 """Points whose log density is lower than the highest by this and the number of parameters are no part of the posterior:
 of a normal one less than a millionth lies there."""
@@ -42,6 +50,9 @@ _N_ARCHIVED = 128
 _BATCH = 2048
 LEAST_ACCEPTANCE = 0.5
 """Of walks on a surrogate that serves. Below, most evaluations of the exact law would be for steps that are refused."""
+_LEAST_ANYWHERE = 0.25
+"""Of walks from any one point, below which the surrogate is taught on: where it is far too low a walker stays, and a
+few that stay for a hundred steps make the autocorrelation time of all."""
 
 
 class Solved(NamedTuple):
@@ -73,30 +84,55 @@ class Surrogate:
     centre : (n_fitted,) array
     whitening : (n_fitted, n_fitted) array
         Takes parameters less the centre to coordinates u of unit spread.
-    degree : int
-        2 or 3.
+    bent : dict of (n_bent, n_fitted) array
+        For each order above the second directions of u, the one first along which ln f is bent most.
     coefficients : (n_terms, n_modes) array
-        Of 1, u_i, u_i u_j and, in third order, u_i u_j u_k.
+        Of 1, u_i, u_i u_j, and of the products of so many coordinates along `bent`.
     """
 
     columns: NDArray[np.intp]
     centre: Floats
     whitening: Floats
-    degree: int
+    bent: Mapping[int, Floats]
     coefficients: Floats
 
     @classmethod
-    def fitted(cls, points: Solved, columns: NDArray[np.intp], degree: int) -> Surrogate:
-        """By weighted least squares, to the points that are plates."""
+    def fitted(cls, points: Solved, columns: NDArray[np.intp], along_bent: Mapping[int, int] = ALONG_BENT) -> Surrogate:
+        """By weighted least squares, to the points that are plates: first of second order, which tells what is bent.
+
+        Where the points count for too few by their weights it stays at that.
+
+        Parameters
+        ----------
+        points : Solved
+        columns : (n_fitted,) array of int
+        along_bent : dict of int
+            Orders above the second, and along how many of the directions in which ln f is bent most.
+        """
         points = points.where(np.isfinite(points.log_frequency).all(axis=1) & np.isfinite(points.log_density))
         x, weights = points.theta[:, columns], points.weights
         factor = np.linalg.cholesky(np.cov(x.T, aweights=weights))
-        none = np.empty((0, points.log_frequency.shape[1]))
         centre = np.average(x, axis=0, weights=weights)
-        bare = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), degree, none)
-        roots = np.sqrt(weights)[:, None]
-        found = np.linalg.lstsq(roots * bare._terms(points.theta), roots * points.log_frequency, rcond=None)[0]
-        return replace(bare, coefficients=np.asarray(found, dtype=np.float64))
+        none = np.empty((0, points.log_frequency.shape[1]))
+        second = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), {}, none)._fitted_to(points)
+        if weights.sum() ** 2 < _POINTS_PER_TERM * n_terms(columns.size, along_bent) * (weights**2).sum():
+            return second
+        most_bent = second._most_bent()
+        return replace(second, bent={order: most_bent[:n] for order, n in along_bent.items()})._fitted_to(points)
+
+    def _fitted_to(self, points: Solved) -> Surrogate:
+        roots = np.sqrt(points.weights)[:, None]
+        found = np.linalg.lstsq(roots * self._terms(points.theta), roots * points.log_frequency, rcond=None)[0]
+        return replace(self, coefficients=np.asarray(found, dtype=np.float64))
+
+    def _most_bent(self) -> Floats:
+        """Directions by the second derivatives of all modes along them, squared and added up."""
+        n = self.columns.size
+        first, second = np.triu_indices(n)
+        hessians = np.zeros((self.coefficients.shape[1], n, n))
+        hessians[:, first, second] = self.coefficients[-len(first) :].T
+        hessians += np.swapaxes(hessians, 1, 2)
+        return np.asarray(np.linalg.eigh((hessians @ hessians).sum(axis=0))[1].T[::-1])
 
     def log_frequencies(self, theta: Floats) -> Floats:
         """ln f (Hz) of these modes, setup after setup: (n_draws, n_modes) array from (n_draws, n_dim)."""
@@ -116,24 +152,36 @@ class Surrogate:
 
     def _terms(self, theta: Floats) -> Floats:
         u = np.clip(self._whitened(theta), -_REACH, _REACH).T
-        first, second = np.triu_indices(len(u))
-        products = u[first] * u[second]
-        groups = [np.ones((1, u.shape[1])), u, products]
-        if self.degree == 3:
-            groups += [row * products[first >= i] for i, row in enumerate(u)]
+        groups = [np.ones((1, u.shape[1])), u, u[_factors(2, len(u))].prod(axis=1)]
+        groups += [(bent @ u)[_factors(order, len(bent))].prod(axis=1) for order, bent in self.bent.items()]
         return np.concatenate(groups).T
 
 
-def n_terms(n_parameters: int, degree: int) -> int:
-    """How many coefficients a polynomial of that degree has."""
-    return comb(n_parameters + degree, degree)
+@lru_cache(maxsize=64)
+def _factors(order: int, n: int) -> NDArray[np.intp]:
+    """Which of n coordinates each product of so many of them has: (n_products, order) array."""
+    return np.array(list(combinations_with_replacement(range(n), order)), dtype=np.intp)
+
+
+def n_terms(n_parameters: int, along_bent: Mapping[int, int] = ALONG_BENT) -> int:
+    """How many coefficients a surrogate has for each mode."""
+    orders = {0: n_parameters, 1: n_parameters, 2: n_parameters, **along_bent}
+    return sum(len(_factors(order, min(n, n_parameters))) for order, n in orders.items())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SurrogatePosterior(Posterior):
-    """The posterior with frequencies from a surrogate of its law; priors and likelihood are the same."""
+    """The posterior with frequencies from a surrogate of its law, and an end where that knows nothing.
+
+    Priors and likelihood are the same.
+    """
 
     surrogate: Surrogate
+
+    def evaluate(self, theta: Floats) -> tuple[Floats, Floats]:
+        """Log density, and ln f of all modes, as of `bayesplate.posterior.target.Posterior.evaluate`."""
+        log_density, log_frequency = super().evaluate(theta)
+        return log_density + self.surrogate.log_within(theta), log_frequency
 
     def every_log_frequency(self, theta: Floats, values: Values | None = None) -> list[Floats]:
         """ln f of the labelled modes, then of those that peaks may be: one (n_draws, n_every) array per setup."""
@@ -163,8 +211,14 @@ def acceptance(log_ratios: Floats) -> float:
     if not finite.size:
         return 0.0
     starts = np.exp(finite - finite.max())
+    return float(starts @ accepted_from(log_ratios) / starts.sum())
+
+
+def accepted_from(log_ratios: Floats) -> Floats:
+    """The same for walks from each of the draws where both densities are above zero: (n_finite,) array."""
+    finite = log_ratios[np.isfinite(log_ratios)]
     gains = np.minimum(finite[None, :] - finite[:, None], 0.0)
-    return float(starts @ np.exp(gains).sum(axis=1) / starts.sum()) / log_ratios.size
+    return np.asarray(np.exp(gains).sum(axis=1) / log_ratios.size)
 
 
 def find_surrogate(
@@ -172,9 +226,9 @@ def find_surrogate(
 ) -> Surrogate | None:
     """Fit a surrogate to the law of a posterior, or find that none serves.
 
-    Each round fits it anew, walks on it, and compares it with the law where the walkers then are; those places join the
-    points of the next rounds. The degree rises from 2 to 3 once there are points enough for its coefficients: the
-    better the surrogate, the more ends of walks are accepted.
+    Each round fits it anew, walks on it, and compares it with the law where the walkers then are. Those places join the
+    points of the next rounds, and so do others from a walk that is tempered, and such as steps of the chain will
+    propose: a surrogate that is too low in a tail of the posterior would hold a walker there for long.
 
     Parameters
     ----------
@@ -190,26 +244,26 @@ def find_surrogate(
         None if no walk on one would be accepted half of the time, within a few rounds.
     """
     columns, bounds = posterior.parameters.fitted_columns, posterior.parameters.fitted_bounds
-    n_of = {degree: _POINTS_PER_TERM * n_terms(columns.size, degree) for degree in (2, 3)}
-    n_points = max(_FEWEST_POINTS, n_of[2])
-    highest_degree = next(n for n in (3, 2) if n_terms(columns.size, n) <= _MOST_TERMS or n == 2)
+    n_points = max(_FEWEST_POINTS, _POINTS_PER_TERM * n_terms(columns.size))
     rng = np.random.default_rng(0)
     theta = rng.multivariate_normal(centre, _WIDER**2 * covariance, n_points)
     theta[:, columns] = np.clip(theta[:, columns], bounds.lower, bounds.upper)
     points, found = _solved(posterior, coordinates, theta), None
     for n_rounds in range(1, _MOST_ROUNDS + 1):
-        degree = highest_degree if n_of[highest_degree] <= len(points.theta) else 2
-        surrogate = Surrogate.fitted(points, columns, degree)
-        last = points.theta[-n_points:]
+        surrogate = Surrogate.fitted(points, columns)
         density = coordinates.density(with_surrogate(posterior, surrogate))
-        walked = _solved(posterior, coordinates, _walked(density, coordinates, last, rng))
+        walked = _solved(posterior, coordinates, _walked(density, 1.0, coordinates, theta, rng))
         held_out = walked.where(walked.log_density > points.log_density.max() - _FAR - theta.shape[1])
         log_ratios = held_out.log_density - density(coordinates.y(held_out.theta))
-        if 2 * len(log_ratios) > len(walked.theta) and acceptance(log_ratios) >= LEAST_ACCEPTANCE:
+        if 2 * len(log_ratios) > n_points and acceptance(log_ratios) >= LEAST_ACCEPTANCE:
             found = surrogate
-            if degree == highest_degree and n_rounds >= _FEWEST_ROUNDS:
+            if n_rounds >= _FEWEST_ROUNDS and accepted_from(log_ratios).min() >= _LEAST_ANYWHERE:
                 return found
-        points = Solved(*(np.concatenate(parts) for parts in zip(points, walked, strict=True)))
+        further_out = _solved(posterior, coordinates, _walked(density, _TEMPERATURE, coordinates, theta, rng))
+        proposal = Proposal.fitted(coordinates.y(walked.theta))
+        proposed = _solved(posterior, coordinates, coordinates.theta(proposal.points(n_points, rng)))
+        points = Solved(*(np.concatenate(parts) for parts in zip(points, walked, further_out, proposed, strict=True)))
+        theta = walked.theta
     return found
 
 
@@ -221,13 +275,19 @@ def _solved(posterior: Posterior, coordinates: TailCoordinates, theta: Floats) -
     return Solved(theta, np.concatenate(by_setup, axis=1), log_density)
 
 
-def _walked(density: LogPosterior, coordinates: TailCoordinates, theta: Floats, rng: np.random.Generator) -> Floats:
+def _walked(
+    density: LogPosterior, temperature: float, coordinates: TailCoordinates, theta: Floats, rng: np.random.Generator
+) -> Floats:
     """As many points, walked to where a surrogate's posterior is, which has that density in the walk's coordinates."""
+
+    def tempered(points: Floats) -> Floats:
+        return density(points) / temperature
+
     n_walkers = -(-len(theta) // _N_TAKEN)
     coords = coordinates.y(theta)
     start = coords[:n_walkers]
     archive, proposal = coords[None, :_N_ARCHIVED], Proposal.one_fitted(coords)
-    steps = Steps(density, proposal, archive, "ID" * (_N_STEPS // 2), n_walkers, [rng])
-    draws = advance(steps, start[None], density(start)[None], _N_STEPS).draws
+    steps = Steps(tempered, proposal, archive, "ID" * (_N_STEPS // 2), n_walkers, [rng])
+    draws = advance(steps, start[None], tempered(start)[None], _N_STEPS).draws
     taken = draws[0, -1 :: -(_N_STEPS // (2 * _N_TAKEN))][:_N_TAKEN]
     return coordinates.theta(taken.reshape(-1, coords.shape[1])[: len(theta)])

@@ -7,9 +7,9 @@ import time
 
 import numpy as np
 import pytest
-from scipy.linalg import lapack
+from scipy.linalg import eigh, lapack
 
-from bayesplate.modes.definite import definite_solutions
+from bayesplate.modes.definite import definite_pencil_values, definite_solutions
 
 N_DRAWS, R, N = 5, 30, 7
 
@@ -72,3 +72,20 @@ def test_other_threads_run_while_it_computes(solve, is_kept):
     longest = max(longest, time.perf_counter() - last)
 
     assert (longest > 0.5 * taken[0]) == is_kept
+
+
+def test_eigenvalues_of_pencils_are_those_of_scipy_and_what_is_not_definite_gives_no_numbers():
+    forms, matrices = definite(R, N_DRAWS, 2) - 40.0 * np.eye(R), definite(R, N_DRAWS)
+    given = forms.copy(), matrices.copy()
+    expected = np.stack([eigh(form, matrix, eigvals_only=True) for form, matrix in zip(forms, matrices, strict=True)])
+    found = definite_pencil_values(forms, matrices)
+
+    assert expected.min() < 0.0  # the forms need not be definite
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
+    np.testing.assert_array_equal(forms, given[0])
+    np.testing.assert_array_equal(matrices, given[1])
+    matrices[1] *= -1.0
+    matrices[2, 0, 0] = np.nan
+    found = definite_pencil_values(forms, matrices)
+    assert np.isnan(found[[1, 2]]).all()
+    np.testing.assert_allclose(found[[0, 3, 4]], expected[[0, 3, 4]], rtol=1e-10, atol=1e-12)

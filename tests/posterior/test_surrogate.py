@@ -18,6 +18,7 @@ from bayesplate.posterior.surrogate import (
     Surrogate,
     acceptance,
     find_surrogate,
+    n_terms,
     with_surrogate,
 )
 from bayesplate.posterior.tails import TailCoordinates
@@ -90,18 +91,65 @@ def test_points_that_are_no_plate_are_left_out_of_the_fit(problem):
     whole = Solved(theta, log_frequency, problem.posterior(theta))
     holed = Solved(theta, log_frequency.copy(), whole.log_density.copy())
     holed.log_frequency[3], holed.log_density[3] = np.nan, -np.inf
-    expected = Surrogate.fitted(whole.where(np.arange(80) != 3), columns, 2)
-    assert np.array_equal(Surrogate.fitted(holed, columns, 2).coefficients, expected.coefficients)
+    expected = Surrogate.fitted(whole.where(np.arange(80) != 3), columns)
+    assert np.array_equal(Surrogate.fitted(holed, columns).coefficients, expected.coefficients)
+
+
+def bowl(n_points):
+    """Points of a normal density of six parameters, and a law that is of fifth order along one direction of them."""
+    rng = np.random.default_rng(3)
+    theta = rng.standard_normal((n_points, 6))
+    along = theta @ np.array([0.6, 0.0, 0.8, 0.0, 0.0, 0.0])
+    log_frequency = np.stack([0.1 * theta[:, 1] + 0.02 * along**2 + 1e-3 * along**5, 0.05 * theta[:, 3]], axis=1)
+    return Solved(theta, log_frequency, -0.5 * (theta**2).sum(axis=1))
+
+
+def test_it_is_of_fifth_order_along_the_direction_in_which_the_law_is_bent():
+    """Its error is a fifth of that of third order along all six, which has more coefficients."""
+    points, fresh = bowl(1500), bowl(1600)
+    columns = np.arange(6)
+    fitted = Surrogate.fitted(points, columns)
+    cubic = Surrogate.fitted(points, columns, {3: 6})
+    errors, of_cubic = (np.abs(one.log_frequencies(fresh.theta) - fresh.log_frequency).max() for one in (fitted, cubic))
+    assert errors < 0.2 * of_cubic
+    assert np.abs(fitted.bent[5][0] @ fitted.whitening.T @ np.array([0.6, 0.0, 0.8, 0.0, 0.0, 0.0])) > 0.9
+
+
+def test_of_few_points_it_stays_of_second_order():
+    """Three points for each coefficient, by their weights; of normal points they are half of their number and more."""
+    columns = np.arange(6)
+    n_wanted = 3 * n_terms(6)
+    few, many = (Surrogate.fitted(bowl(n), columns) for n in (n_wanted - 1, 3 * n_wanted))
+    assert not few.bent
+    assert len(few.coefficients) == 1 + 6 + 21
+    assert len(many.coefficients) == n_terms(6)
+
+
+def test_it_is_taught_on_while_it_would_hold_a_walker_somewhere(problem, monkeypatch):
+    """A place in ten whose density is too low by 2.5: most walks are accepted, yet a walker would stay there."""
+    n_fitted = []
+    fitted, density = Surrogate.fitted.__func__, TailCoordinates.density
+    monkeypatch.setattr(Surrogate, "fitted", classmethod(lambda *args: n_fitted.append(1) or fitted(*args)))
+    assert found(problem) is not None
+    assert len(n_fitted) == 3
+
+    def too_low(self, posterior):
+        right = density(self, posterior)
+        return lambda y: right(y) - 2.5 * (np.floor(1e7 * y[:, 0]) % 10 == 0)
+
+    monkeypatch.setattr(TailCoordinates, "density", too_low)
+    assert found(problem) is not None
+    assert len(n_fitted) == 3 + 8
 
 
 def test_within_reach_its_weight_is_one_and_beyond_it_ends(inference):
-    """A normal density of unit spread has fallen so much from five to six standard deviations, and to seven."""
+    """A normal density of unit spread has fallen so much from seven to eight standard deviations, and to nine."""
     found = inference.surrogate
     steps = np.zeros((5, found.centre.size))
-    steps[:, 0] = [0.0, -4.9, 4.9, 6.0, -7.0]
+    steps[:, 0] = [0.0, -6.9, 6.9, 8.0, -9.0]
     theta = np.zeros((5, 1 + found.columns.max()))
     theta[:, found.columns] = found.centre + steps @ np.linalg.inv(found.whitening)
-    assert found.log_within(theta) == pytest.approx([0.0, 0.0, 0.0, -0.5 * (36 - 25), -0.5 * (49 - 25)])
+    assert found.log_within(theta) == pytest.approx([0.0, 0.0, 0.0, -0.5 * (64 - 49), -0.5 * (81 - 49)])
 
 
 def test_ends_without_a_density_are_refused():
