@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict, most_likely, sensitivities
+from bayesplate.modes.threads import in_threads
 
 _FEWEST = 4
 
@@ -73,8 +74,12 @@ def prediction_errors(
         def slopes(x: NDArray[np.float64]) -> NDArray[np.float64]:
             return there if np.array_equal(x, whole) else sensitivities(predict, x)
 
-        for mode in map(list, modes):
+        def without(mode: list[int]) -> NDArray[np.float64]:
             start = best(starts, np.delete(squares, mode, axis=1))
             fitted = most_likely(predict, misfit, start, bounds, mode, slopes)
-            left_out[mode] = (target - predict(fitted[None, :])[0])[mode]
+            return np.asarray((target - predict(fitted[None, :])[0])[mode])
+
+        every = [list(mode) for mode in modes]
+        for mode, errors in zip(every, in_threads(without, every), strict=True):
+            left_out[mode] = errors
     return Errors(in_sample, left_out)
