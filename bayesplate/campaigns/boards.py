@@ -18,7 +18,7 @@ from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS, effective_draws
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-from bayesplate.posterior.surrogate import Solved, Surrogate, with_surrogate
+from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surrogate
 
 Floats = NDArray[np.float64]
 
@@ -194,7 +194,7 @@ class Member:
                 found.append(drawn)
             if surrogate is None or (found and found[-1].effective(found[-1].weights) >= FEWEST_WEIGHTED_DRAWS):
                 break
-            if np.isfinite(every.log_density).sum() < len(surrogate.coefficients):
+            if np.isfinite(every.log_density).sum() < n_terms(surrogate.columns.size, {}):
                 break
             surrogate = Surrogate.fitted(every, surrogate.columns, _ALONG_BENT)
         if not found:

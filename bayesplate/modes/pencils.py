@@ -33,6 +33,8 @@ _NEAREST = 0.1
 def pencil_eigenvalues(stiffness: Floats, mass: Floats, shift: Floats | float) -> Floats:
     """All eigenvalues, increasing; not a number where the weights are those of no material.
 
+    They are one over those of the mass where the shifted stiffness is one, for shear strains have no mass.
+
     Parameters
     ----------
     stiffness, mass : (n_draws, r, r) arrays
@@ -43,7 +45,6 @@ def pencil_eigenvalues(stiffness: Floats, mass: Floats, shift: Floats | float) -
     -------
     (n_draws, r) array, s^-2
     """
-    # The stiffness is what is factorised and not the mass, for shear strains have no mass.
     flexibilities = definite_pencil_values(mass, stiffness + shift * mass)
     return np.asarray(1.0 / flexibilities[:, ::-1] - np.reshape(shift, (-1, 1)))
 

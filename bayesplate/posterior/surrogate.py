@@ -1,7 +1,7 @@
 """A law between linear and exact: ln f of each mode as a polynomial of low order in the sampled parameters.
 
-It is of second order in all of them, and of up to fifth along the few directions in which ln f is bent most: of all
-terms of third order in fifteen parameters hardly one matters, and fitted to a thousand points they follow chance.
+It is of second order in all of them, and of up to fifth along the few directions in which ln f is bent most: of the
+hundreds of terms of third order few matter, and fitted to a thousand points the others follow chance.
 
 It is fitted by least squares to the exact law where the posterior is: first at draws of the normal approximation, then
 at draws of its own posterior, until it holds at draws that it was not fitted to. It costs microseconds per draw,

@@ -95,9 +95,9 @@ def test_points_that_are_no_plate_are_left_out_of_the_fit(problem):
     assert np.array_equal(Surrogate.fitted(holed, columns).coefficients, expected.coefficients)
 
 
-def bowl(n_points):
+def bowl(n_points, seed=3):
     """Points of a normal density of six parameters, and a law that is of fifth order along one direction of them."""
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(seed)
     theta = rng.standard_normal((n_points, 6))
     along = theta @ np.array([0.6, 0.0, 0.8, 0.0, 0.0, 0.0])
     log_frequency = np.stack([0.1 * theta[:, 1] + 0.02 * along**2 + 1e-3 * along**5, 0.05 * theta[:, 3]], axis=1)
@@ -105,8 +105,11 @@ def bowl(n_points):
 
 
 def test_it_is_of_fifth_order_along_the_direction_in_which_the_law_is_bent():
-    """Its error is a fifth of that of third order along all six, which has more coefficients."""
-    points, fresh = bowl(1500), bowl(1600)
+    """Third order leaves the fifth out, which is the negative control: of its error a fifth at most is there.
+
+    That much is for the direction, which a fit of second order to 1500 points tells but nearly.
+    """
+    points, fresh = bowl(1500), bowl(1500, seed=4)
     columns = np.arange(6)
     fitted = Surrogate.fitted(points, columns)
     cubic = Surrogate.fitted(points, columns, {3: 6})
