@@ -36,7 +36,7 @@ def definite_solutions(matrices: Floats, loads: Floats) -> Floats:
     factors = np.array(matrices, order="C")  # LAPACK writes over them
     solutions = np.array(np.swapaxes(loads, 1, 2), order="C")  # and over these, column by column
     size, n_loads = (ctypes.byref(ctypes.c_int(number)) for number in (r, n))
-    fault, solve = ctypes.c_int(), _lapack("dposv")
+    fault, solve = ctypes.c_int(), lapack("dposv")
     for i, (factor, solution) in enumerate(zip(_addresses(factors), _addresses(solutions), strict=True)):
         solve(b"L", size, n_loads, factor, size, solution, size, ctypes.byref(fault))
         if fault.value:
@@ -61,7 +61,7 @@ def definite_pencil_values(forms: Floats, definite: Floats) -> Floats:
     """
     factors, reduced = np.array(definite, order="C"), np.array(forms, order="C")
     size, kind = (ctypes.byref(ctypes.c_int(number)) for number in (factors.shape[1], 1))
-    fault, factorise, reduce = ctypes.c_int(), _lapack("dpotrf"), _lapack("dsygst")
+    fault, factorise, reduce = ctypes.c_int(), lapack("dpotrf"), lapack("dsygst")
     is_definite = np.ones(len(factors), dtype=np.bool_)
     for i, (factor, form) in enumerate(zip(_addresses(factors), _addresses(reduced), strict=True)):
         factorise(b"L", size, factor, size, ctypes.byref(fault))
@@ -79,15 +79,23 @@ def _addresses(matrices: Floats) -> range:
     return range(first, first + len(matrices) * step, step)
 
 
-_ARGUMENTS = {"dposv": "sppppppp", "dpotrf": "spppp", "dsygst": "pspppppp"}
+_ARGUMENTS = {
+    "dpbtrf": "sppppp",
+    "dpbtrs": "spppppppp",
+    "dposv": "sppppppp",
+    "dpotrf": "spppp",
+    "dsygst": "pspppppp",
+}
 """Strings and pointers of the functions of LAPACK, in their order: everything is given by reference.
 
-dposv(uplo, n, nrhs, a, lda, b, ldb, info), dpotrf(uplo, n, a, lda, info), dsygst(itype, uplo, n, a, lda, b, ldb, info).
+dposv(uplo, n, nrhs, a, lda, b, ldb, info), dpotrf(uplo, n, a, lda, info), dsygst(itype, uplo, n, a, lda, b, ldb, info);
+dpbtrf(uplo, n, kd, ab, ldab, info), dpbtrs(uplo, n, kd, nrhs, ab, ldab, b, ldb, info).
 """
 
 
 @lru_cache(maxsize=len(_ARGUMENTS))
-def _lapack(name: str) -> Callable[..., None]:
+def lapack(name: str) -> Callable[..., None]:
+    """A function of LAPACK that gives Python's lock away while it computes."""
     from scipy.linalg import cython_lapack
 
     name_of = ctypes.PYFUNCTYPE(ctypes.c_char_p, ctypes.py_object)(("PyCapsule_GetName", ctypes.pythonapi))

@@ -5,7 +5,7 @@ It is checked against full solves that it has not seen.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.naming import Place, beam_parts
+from bayesplate.modes.nearby import BESIDE, modes_nearby
 from bayesplate.modes.plate import Block, Parity, PlateMatrices, Weights
 from bayesplate.modes.reduced import SPARE, WHOLE, ReducedBlock, ReducedOrderModel
 from bayesplate.modes.solve import ClassModes, solve_class
@@ -87,15 +88,16 @@ def _reduce(
 ) -> tuple[ReducedBlock, float]:
     block = plate.block(parity)
 
-    def solved(points: Sequence[Weights]) -> tuple[list[Weights], list[ClassModes]]:
-        found = list(zip(points, in_threads(lambda one: _modes_of(block, one, n_modes + SPARE), points), strict=True))
-        kept = [(weights, modes) for weights, modes in found if modes is not None]
-        return [weights for weights, _ in kept], [modes for _, modes in kept]
-
     n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
-    first = solve_class(block, training[0], n_modes + SPARE)
-    trained = [first, *solved(training[1:n_first])[1]]
-    held_out, checks = solved(held_out)
+    known = solve_class(block, training[0], n_modes + SPARE + BESIDE)
+    first = known.of(range(min(n_modes + SPARE, known.eigenvalues.size)))
+
+    def near(points: Sequence[Weights]) -> list[ClassModes]:
+        return _of_plates(lambda one: modes_nearby(block, one, known, n_modes + SPARE), points)[1]
+
+    trained = [first, *near(training[1:n_first])]
+    # Where the model is judged each plate is solved by itself: a mode that the known ones lack would be missed there.
+    held_out, checks = _of_plates(lambda one: solve_class(block, one, n_modes + SPARE), held_out)
     if not checks:
         raise np.linalg.LinAlgError("none of the points that were held out is a plate")
     # A second mass or a support lets elastic modes carry some rigid motion; otherwise they are orthogonal to it.
@@ -107,7 +109,7 @@ def _reduce(
     n_solved = n_first
     rounds = (n_first, 0), (len(training), 0), (len(training), len(held_out) // 2)
     for n_trained, n_joined in dict.fromkeys(rounds):
-        trained += solved(training[n_solved:n_trained])[1]
+        trained += near(training[n_solved:n_trained])
         n_solved = max(n_solved, n_trained)
         elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
         vectors = _orthonormal(block, rigid, elastic, first, training[0], is_steady)
@@ -124,15 +126,23 @@ def _reduce(
     return replace(best.block, stiffness=block.project(block.terms, vectors @ best.turn)), best.cents
 
 
-def _modes_of(block: Block, weights: Weights, n_modes: int) -> ClassModes | None:
-    """The modes at one point; None where it is no plate.
+def _of_plates(
+    solve: Callable[[Weights], ClassModes], points: Sequence[Weights]
+) -> tuple[list[Weights], list[ClassModes]]:
+    """The points that are plates, and their modes.
 
     An expansion to second order in fields need not be positive where several of them are far out at once.
     """
-    try:
-        return solve_class(block, weights, n_modes)
-    except np.linalg.LinAlgError:
-        return None
+
+    def modes_of(weights: Weights) -> ClassModes | None:
+        try:
+            return solve(weights)
+        except np.linalg.LinAlgError:
+            return None
+
+    found = zip(points, in_threads(modes_of, points), strict=True)
+    kept = [(weights, modes) for weights, modes in found if modes is not None]
+    return [weights for weights, _ in kept], [modes for _, modes in kept]
 
 
 def _is_supported(block: Block, solution: ClassModes) -> bool:

@@ -70,10 +70,7 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
     stiffness, mass = block.stiffness(weights), block.mass(weights)
-    # A shift below zero keeps a free plate's rigid motions from making the shifted matrix singular. Its scale is the
-    # lowest Rayleigh quotient of a single unknown: the lowest modes lie far below it, so the shift stays small, and
-    # stiff shear or short elements cannot raise it.
-    shift = -1e-6 * float((stiffness.diagonal() / mass.diagonal()).min()) if block.n_rigid else 0.0
+    shift = shift_below(block, stiffness.diagonal(), mass.diagonal())
     factors = splu(
         stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
@@ -95,6 +92,21 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
     return ClassModes(
         block, values[block.n_rigid : n_last], vectors[:, block.n_rigid : n_last], vectors[:, : block.n_rigid]
     )
+
+
+def shift_below(block: Block, stiffness: NDArray[np.float64], mass: NDArray[np.float64]) -> float:
+    """A shift below zero that keeps rigid motions from making the shifted matrix singular, s^-2; 0 if there are none.
+
+    Its scale is the lowest Rayleigh quotient of a single unknown: the lowest modes lie far below it, so the shift stays
+    small, and stiff shear or short elements cannot raise it.
+
+    Parameters
+    ----------
+    block : Block
+    stiffness, mass : (n_dof,) arrays
+        The diagonals.
+    """
+    return -1e-6 * float((stiffness / mass).min()) if block.n_rigid else 0.0
 
 
 def _ritz(
