@@ -126,7 +126,7 @@ class LineProducts(Products):
         """The matrix of two orders, (n_unknowns, n_unknowns)."""
         n = 2 * (self.n_elements + 1)
         matrix = np.zeros(n * n)
-        matrix[_line_pattern(self.n_elements)[0]] = self.stored[ORDERS.index(orders)]
+        matrix[line_places(self.n_elements)] = self.stored[ORDERS.index(orders)]
         return matrix.reshape(n, n)
 
     def __iter__(self) -> Iterator[tuple[int, int]]:
@@ -144,6 +144,11 @@ def assembled(local: Floats) -> LineProducts:
     """Element matrices (n_elements, 9, 4, 4) summed on the functions of the free line."""
     stored_at = _line_pattern(len(local))[1]
     return LineProducts(len(local), np.stack([np.bincount(stored_at, local[:, k].ravel()) for k in range(len(ORDERS))]))
+
+
+def line_places(n_elements: int) -> NDArray[np.intp]:
+    """Places of a line's matrices, row by row, that hold anything: (n_stored,) array."""
+    return _line_pattern(n_elements)[0]
 
 
 @lru_cache(maxsize=32)
