@@ -65,9 +65,11 @@ def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:
     outline = None if shaped is None else shaped.outline()
     if outline is None:
         return np.asarray(np.max(np.abs(modes.displacement(_GRID, _GRID)), axis=(1, 2)))
-    limits = zip(_GRID, *outline(_GRID), strict=True)
-    across = [modes.displacement(np.array([x]), low + (high - low) * _GRID) for x, low, high in limits]
-    return np.asarray(np.max(np.abs(np.concatenate(across, axis=1)), axis=(1, 2)))
+    low, high = (limit[:, None] for limit in outline(_GRID))
+    places = low + (high - low) * _GRID
+    along = modes.plate.line_x.shapes(_GRID).toarray() @ modes.shapes
+    across = modes.plate.line_y.shapes(places.ravel()).toarray().reshape(*places.shape, -1)
+    return np.asarray(np.max(np.abs(np.einsum("min,ijn->mij", along, across)), axis=(1, 2)))
 
 
 def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.modes.plate import PlateMatrices, Weights
 from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, assemble_shear_flexible
-from bayesplate.modes.thin import assemble, thin_masses, thin_terms
+from bayesplate.modes.thin import assemble
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.setup import Ends, Setup
@@ -176,11 +176,7 @@ def _assembled(
     added = contributions_of(effects)
     stiffness = tuple(one.matrix(x, y) for one in added.stiffness)
     masses = tuple(one.matrix(x, y) for one in added.masses)
-    fabric = fabric_of(effects)
-    if is_sheared:
-        return assemble_shear_flexible(x, y, stiffness, masses, fabric)
-    own_stiffness, own_mass = thin_terms(x, y, fabric), thin_masses(x, y, fabric)
-    return assemble(x, y, (*own_stiffness, *stiffness), (*own_mass, *masses))
+    return (assemble_shear_flexible if is_sheared else assemble)(x, y, stiffness, masses, fabric_of(effects))
 
 
 def _held(ends: Ends, effects: tuple[Effect, ...]) -> Holds:

@@ -82,8 +82,8 @@ def element_products(nodes: Floats, points: Floats, weights: Floats) -> Floats:
     Parameters
     ----------
     nodes : (n_elements + 1,) array
-    points, weights : (..., n_elements, n_points) arrays
-        They broadcast: the functions are evaluated once for many weights.
+    points : (n_elements, n_points) array
+    weights : (..., n_elements, n_points) array
 
     Returns
     -------
@@ -92,9 +92,36 @@ def element_products(nodes: Floats, points: Floats, weights: Floats) -> Floats:
     """
     lengths = np.diff(nodes)[:, None]
     functions = np.moveaxis(hermite_functions((points - nodes[:-1, None]) / lengths, lengths), 1, -1)
-    return np.stack(
-        [np.einsum("...g,...gi,...gj->...ij", weights, functions[i], functions[j]) for i, j in ORDERS], axis=-3
-    )
+    both = np.stack([functions[i][..., None] * functions[j][..., None, :] for i, j in ORDERS], axis=-3)
+    # Element by element one product of matrices for all weights.
+    by_element = np.moveaxis(weights, -2, 0).reshape(len(points), -1, points.shape[-1])
+    summed = by_element @ both.reshape(*points.shape, -1)
+    return np.moveaxis(summed, 0, 1).reshape(*weights.shape[:-1], *both.shape[2:])
+
+
+def moved_weights(t: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Weights at seven points of an element that sum the product of two cubics as given ones do at points elsewhere.
+
+    Its degree is six, so that no more can be told of weights anywhere than seven numbers an element.
+
+    Parameters
+    ----------
+    t : (..., n_points) array
+        Points, as fractions of the element.
+    weights : (..., n_points) array
+
+    Returns
+    -------
+    points : (7,) array
+        As fractions of the element.
+    weights : (..., 7) array
+    """
+    from numpy.polynomial.legendre import legvander
+
+    degrees = np.arange(7)
+    points, own = gauss_rule(degrees.size)
+    moments = np.einsum("...g,...gn->...n", weights, legvander(2.0 * t - 1.0, degrees[-1]))
+    return points, own * ((2 * degrees + 1) * moments @ legvander(2.0 * points - 1.0, degrees[-1]).T)
 
 
 def uniform_products(lengths: Floats) -> Floats:
@@ -126,7 +153,7 @@ class LineProducts(Products):
         """The matrix of two orders, (n_unknowns, n_unknowns)."""
         n = 2 * (self.n_elements + 1)
         matrix = np.zeros(n * n)
-        matrix[_line_pattern(self.n_elements)[0]] = self.stored[ORDERS.index(orders)]
+        matrix[line_places(self.n_elements)] = self.stored[ORDERS.index(orders)]
         return matrix.reshape(n, n)
 
     def __iter__(self) -> Iterator[tuple[int, int]]:
@@ -142,8 +169,22 @@ class LineProducts(Products):
 
 def assembled(local: Floats) -> LineProducts:
     """Element matrices (n_elements, 9, 4, 4) summed on the functions of the free line."""
-    stored_at = _line_pattern(len(local))[1]
-    return LineProducts(len(local), np.stack([np.bincount(stored_at, local[:, k].ravel()) for k in range(len(ORDERS))]))
+    return each_assembled(local[None])[0]
+
+
+def each_assembled(local: Floats) -> list[LineProducts]:
+    """The same of each of (n, n_elements, 9, 4, 4)."""
+    n_elements = local.shape[1]
+    places, stored_at = _line_pattern(n_elements)
+    values = np.moveaxis(local, 2, 1).reshape(-1, stored_at.size)
+    at = np.arange(len(values))[:, None] * places.size + stored_at
+    stored: Floats = np.bincount(at.ravel(), values.ravel(), len(values) * places.size).astype(np.float64)
+    return [LineProducts(n_elements, one) for one in stored.reshape(-1, len(ORDERS), places.size)]
+
+
+def line_places(n_elements: int) -> NDArray[np.intp]:
+    """Places of a line's matrices, row by row, that hold anything: (n_stored,) array."""
+    return _line_pattern(n_elements)[0]
 
 
 @lru_cache(maxsize=32)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.element import LineProducts, assembled, element_products, gauss_points
+from bayesplate.modes.element import LineProducts, each_assembled, element_products, gauss_points, moved_weights
 from bayesplate.modes.hermite import products
 from bayesplate.modes.line import Line
 
@@ -58,7 +58,7 @@ _N_KEPT = 128
 """Measures that are kept: candidates of a search share those of the fields that the board has anyway."""
 _POINTS = 6
 """Gauss points per element: a product of two cubics with a field of degree five is exact."""
-_NEGLIGIBLE = 1e-12
+_NEGLIGIBLE = 1e-13
 
 _GHOST: dict[Group, float] = {"along": 1e-5, "bending": 1e-5, "shear": 1e-5, "mass": 1e-8, "rotary": 1e-8}
 """What is left of the plate outside its outline: soft enough to carry nothing, far lighter still than it is soft."""
@@ -147,7 +147,7 @@ def _over_rectangle(nodes_x: Nodes, nodes_y: Nodes, factor: Field) -> Measure:
     left, right = _products_of(factor(at_x.reshape(-1, 1), at_y.ravel()))
     along_x = element_products(x, at_x, ahead * left.reshape(-1, *at_x.shape))
     along_y = element_products(y, at_y, across * right.reshape(-1, *at_y.shape))
-    return tuple((assembled(one), assembled(other)) for one, other in zip(along_x, along_y, strict=True))
+    return tuple(zip(each_assembled(along_x), each_assembled(along_y), strict=True))
 
 
 @lru_cache(maxsize=_N_KEPT)
@@ -161,14 +161,15 @@ def _inside(nodes_x: Nodes, nodes_y: Nodes, factor: Field | None, outline: Outli
     at_y, across = gauss_points(starts, np.clip(y[1:], low, high) - starts, _POINTS)
     if factor is not None:
         across = across * factor(at_x[..., None, None], at_y)
-    local = element_products(y, at_y, across)
-    # Every entry counts alike: what an outline leaves of a small element is small, and must not drown in rounding.
-    scales = np.abs(local).max(axis=(0, 1))
+    lengths = np.diff(y)[:, None]
+    points, moved = moved_weights((at_y - y[:-1, None]) / lengths, across)
+    # Every element counts alike: what an outline leaves of a small one is small, and must not drown in rounding.
+    scales = np.abs(moved).max(axis=(0, 1, 3))[:, None]
     scales[scales == 0.0] = 1.0
-    left, right = _products_of((local / scales).reshape(at_x.size, -1))
+    left, right = _products_of((moved / scales).reshape(at_x.size, -1))
     along_x = element_products(x, at_x, ahead * left.reshape(-1, *at_x.shape))
-    along_y = scales * right.reshape(-1, *scales.shape)
-    return tuple((assembled(one), assembled(other)) for one, other in zip(along_x, along_y, strict=True))
+    along_y = element_products(y, y[:-1, None] + lengths * points, scales * right.reshape(-1, *moved.shape[2:]))
+    return tuple(zip(each_assembled(along_x), each_assembled(along_y), strict=True))
 
 
 def _products_of(matrix: Floats) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.element import LineProducts, Products, assembled, uniform_products
+from bayesplate.modes.element import ORDERS, LineProducts, assembled, line_places, uniform_products
 from bayesplate.plate.setup import Ends
 
 Hold = Literal["clamped", "supported", "guided", "free"]
@@ -126,7 +126,7 @@ def even_and_odd(ends: Ends, n_elements: int, kept: NDArray[np.intp]) -> tuple[A
     return tuple(parts)
 
 
-def end_products(n_elements: int, at: tuple[bool, bool]) -> Products:
+def end_products(n_elements: int, at: tuple[bool, bool]) -> LineProducts:
     """Products of derivatives, up to the first, at the ends of the free line, summed over the ends asked for.
 
     Parameters
@@ -137,11 +137,14 @@ def end_products(n_elements: int, at: tuple[bool, bool]) -> Products:
 
     Returns
     -------
-    dict of (n_unknowns, n_unknowns) array
-        By (i, j).
+    LineProducts
+        Those of second derivatives, which no edge holds, are zero.
     """
     nodes = np.array([0, n_elements])[list(at)]
-    found = {(i, j): np.zeros((2 * (n_elements + 1),) * 2) for i in range(2) for j in range(2)}
-    for (i, j), matrix in found.items():
-        matrix[2 * nodes + i, 2 * nodes + j] = 1.0
-    return found
+    rows, columns = np.divmod(line_places(n_elements), 2 * (n_elements + 1))
+    # The unknowns of a node are the value and the first derivative there.
+    stored = np.zeros((len(ORDERS), rows.size))
+    for held, (i, j) in zip(stored, ORDERS, strict=True):
+        if max(i, j) < 2:
+            held[np.isin(rows, 2 * nodes + i) & (columns - rows == j - i)] = 1.0
+    return LineProducts(n_elements, stored)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bayesplate.modes.banded import Band
 from bayesplate.modes.line import Line, rigid_degrees
-from bayesplate.modes.sparse import mirrored, sum_of_krons
+from bayesplate.modes.sparse import mirrored
 from bayesplate.modes.threads import in_threads
 from bayesplate.plate.setup import Ends
 
@@ -42,12 +42,6 @@ class EdgeTurn(NamedTuple):
 
     axis: int
     at: tuple[bool, bool]
-
-    def on_slopes(self, x: Line, y: Line) -> KronSum:
-        """The term of a thin plate."""
-        if self.axis == 0:
-            return ((x.at_ends(self.at, 1), y.mass),)
-        return ((x.mass, y.at_ends(self.at, 1)),)
 
 
 Term = KronSum | EdgeTurn
@@ -286,8 +280,3 @@ def count_rigid(parity: Parity, x: Line, y: Line) -> int:
         for j in range(2)
         if (i % 2 if x.is_symmetric else 0, j % 2 if y.is_symmetric else 0) == parity
     )
-
-
-def kron_sum(term: KronSum, part_x: Any, part_y: Any) -> Any:
-    """A term on the functions of one class, as a sparse matrix."""
-    return sum_of_krons(term, (part_x, part_x), (part_y, part_y))

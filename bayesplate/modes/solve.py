@@ -177,8 +177,8 @@ class Modes:
 
     def displacement(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Shapes on a grid: (n_modes, n_x, n_y) array; x and y are fractions of the sides in [0, 1]."""
-        along_x, along_y = self.plate.line_x.shapes(x), self.plate.line_y.shapes(y)
-        return np.stack([(along_y @ (along_x @ shape).T).T for shape in self.shapes])
+        along_x, along_y = self.plate.line_x.shapes(x).toarray(), self.plate.line_y.shapes(y).toarray()
+        return np.asarray(along_x @ self.shapes @ along_y.T)
 
 
 def solve(plate: PlateMatrices, weights: Weights, n_modes: int) -> Modes:

@@ -1,18 +1,99 @@
-"""Several sparse matrices on one pattern, so that weighted sums of them are sums of stored values."""
+"""Several symmetric sparse matrices on one pattern, so that weighted sums of them are sums of stored values.
+
+Each is a sum of Kronecker products of small matrices along x with small ones along y.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 
-def on_one_pattern(
-    matrices: list[Any],
+class Entries(NamedTuple):
+    """Several matrices of one shape, of which only some places hold anything: the same ones in all.
+
+    Attributes
+    ----------
+    values : (n_matrices, n_places) array
+    rows, columns : (n_places,) array of int
+        None of the places twice.
+    shape : tuple of int
+        Of each matrix.
+    """
+
+    values: NDArray[np.float64]
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, matrices: Sequence[Any]) -> Entries:
+        """Those of matrices, sparse or not, at places that are not zero in all of them."""
+        whole = np.stack([matrix if isinstance(matrix, np.ndarray) else matrix.toarray() for matrix in matrices])
+        rows, columns = np.nonzero(whole.any(axis=0))
+        return cls(whole[:, rows, columns], rows, columns, whole.shape[1:])
+
+    def some(self, which: slice) -> Entries:
+        """Some of the matrices, at places that are not zero in all of these."""
+        values = self.values[which]
+        held = values.any(axis=0)
+        return Entries(values[:, held], self.rows[held], self.columns[held], self.shape)
+
+    def between(self, left: Any, right: Any) -> Entries:
+        """The matrices left' A right of all A, for sparse (n_rows, n_left) and (n_columns, n_right)."""
+        from scipy.sparse import csr_array, kron
+
+        onto = csr_array(kron(left, right, format="csr"))[self.rows * self.shape[1] + self.columns]
+        places = np.flatnonzero(np.bincount(onto.indices, minlength=1))
+        rows, columns = np.divmod(places, right.shape[1])
+        values = self.values @ onto[:, places]
+        return Entries(values, rows, columns, (left.shape[1], right.shape[1])).some(slice(None))
+
+
+class Kron(NamedTuple):
+    """A part of a matrix: the sum of the Kronecker products of each matrix along x with its own along y.
+
+    Attributes
+    ----------
+    along_x, along_y : Entries
+        As many matrices.
+    start : tuple of int
+        The row and the column of the whole where the part begins.
+    """
+
+    along_x: Entries
+    along_y: Entries
+    start: tuple[int, int] = (0, 0)
+
+    @property
+    def pattern(self) -> tuple[Any, ...]:
+        """What tells its places from those of other parts."""
+        sides = (self.along_x, self.along_y)
+        return self.start, *((side.shape, side.rows.tobytes(), side.columns.tobytes()) for side in sides)
+
+    @property
+    def places(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Row and column of each product: (n_along_x, n_along_y) arrays."""
+        x, y = self.along_x, self.along_y
+        rows = self.start[0] + x.rows[:, None] * y.shape[0] + y.rows
+        columns = self.start[1] + x.columns[:, None] * y.shape[1] + y.columns
+        return rows, columns
+
+
+def lower_triangles(
+    matrices: Sequence[Sequence[Kron]], size: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
-    """Lower triangles of several symmetric sparse matrices on the union of their patterns.
+    """Lower triangles of several symmetric matrices, each the sum of its parts, on the union of their patterns.
+
+    Parameters
+    ----------
+    matrices : sequence of sequences of Kron
+        What parts have above the diagonal is left out, so that a part wholly above it need not be given.
+    size : int
+        Rows and columns of each matrix.
 
     Returns
     -------
@@ -21,19 +102,40 @@ def on_one_pattern(
     indices, indptr : arrays
         The pattern, in compressed columns.
     """
-    from scipy.sparse import csc_array, tril
+    # Most parts have their places in common with those of other matrices, and these are worked out once.
+    by_pattern = [_by_pattern(matrix) for matrix in matrices]
+    reached, lower, keys = {}, {}, {}
+    for pattern, (part, *_) in {pattern: parts for each in by_pattern for pattern, parts in each.items()}.items():
+        rows, columns = part.places
+        is_lower = rows >= columns
+        reached[pattern] = np.flatnonzero(is_lower.any(axis=1))
+        lower[pattern] = np.flatnonzero(is_lower[reached[pattern]])
+        keys[pattern] = columns[is_lower] * size + rows[is_lower]
+    union = _united(list(keys.values()))
+    places = {pattern: np.searchsorted(union, each) for pattern, each in keys.items()}
+    stored = np.zeros((len(matrices), union.size))
+    for row, each in zip(stored, by_pattern, strict=True):
+        for pattern, parts in each.items():
+            along_x = np.concatenate([part.along_x.values[:, reached[pattern]] for part in parts])
+            along_y = np.concatenate([part.along_y.values for part in parts])
+            row[places[pattern]] += (along_x.T @ along_y).ravel()[lower[pattern]]
+    columns, rows = np.divmod(union, size)
+    starts = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=size))])
+    return stored, rows.astype(np.int32), starts.astype(np.int32)
 
-    entries = [csc_array(tril(matrix)) for matrix in matrices]
-    shape = csc_array(entries[0].shape)
-    for entry in entries:
-        entry.sum_duplicates()
-        shape = shape + csc_array((np.ones(entry.nnz), entry.indices, entry.indptr), shape=shape.shape)
-    shape.sort_indices()
-    pattern = _keys(shape)
-    stored = np.zeros((len(matrices), pattern.size))
-    for row, entry in zip(stored, entries, strict=True):
-        row[np.searchsorted(pattern, _keys(entry))] = entry.data
-    return stored, shape.indices, shape.indptr
+
+def _by_pattern(parts: Sequence[Kron]) -> dict[tuple[Any, ...], list[Kron]]:
+    """Parts that have all their places in common."""
+    found: dict[tuple[Any, ...], list[Kron]] = {}
+    for part in parts:
+        found.setdefault(part.pattern, []).append(part)
+    return found
+
+
+def _united(sets: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:
+    """All numbers of some sets, increasing; `numpy.unique` takes many times as long as sorting."""
+    every = np.sort(np.concatenate(sets))
+    return every[np.append(True, every[1:] != every[:-1])]
 
 
 def mirrored(indices: NDArray[np.int32], indptr: NDArray[np.int32]) -> tuple[NDArray[np.intp], Any, Any]:
@@ -59,47 +161,3 @@ def mirrored(indices: NDArray[np.int32], indptr: NDArray[np.int32]) -> tuple[NDA
     whole = csc_array(coo_array(lower) + tril(lower, -1).T)
     whole.sort_indices()
     return whole.data.astype(np.intp) - 1, whole.indices, whole.indptr
-
-
-def sum_of_krons(pairs: Sequence[tuple[Any, Any]], onto_x: tuple[Any, Any], onto_y: tuple[Any, Any]) -> Any:
-    """The sum of the Kronecker products of pairs of matrices along x and along y, each on other functions.
-
-    Parameters
-    ----------
-    pairs : sequence of (array, array)
-        Sparse or not; all first ones and all second ones of one shape.
-    onto_x, onto_y : (sparse array, sparse array)
-        Functions of the rows and of the columns, as columns: of a pair (A, B) it takes left' A right and the same of B.
-
-    Returns
-    -------
-    sparse array
-        By coordinates, none of them twice.
-    """
-    from scipy.sparse import coo_array
-
-    # Small matrices: with all of one side on one pattern the sum is one product of their stored values.
-    first, rows_x, columns_x = _stored_together([pair[0] for pair in pairs], *onto_x)
-    second, rows_y, columns_y = _stored_together([pair[1] for pair in pairs], *onto_y)
-    n_rows, n_columns = (matrix.shape[1] for matrix in onto_y)
-    rows = (rows_x[:, None] * n_rows + rows_y).ravel()
-    columns = (columns_x[:, None] * n_columns + columns_y).ravel()
-    shape = tuple(a.shape[1] * b.shape[1] for a, b in zip(onto_x, onto_y, strict=True))
-    return coo_array(((first.T @ second).ravel(), (rows, columns)), shape=shape)
-
-
-def _stored_together(
-    matrices: Sequence[Any], left: Any, right: Any
-) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
-    """Values that are not zero in all of left' M right, (n_matrices, n_stored), with the row and column of each."""
-    whole = [matrix if isinstance(matrix, np.ndarray) else matrix.toarray() for matrix in matrices]
-    dense = left.T.toarray() @ np.stack(whole) @ right.toarray()
-    rows, columns = np.nonzero(dense.any(axis=0))
-    return dense[:, rows, columns], rows, columns
-
-
-def _keys(matrix: Any) -> NDArray[np.int64]:
-    """One number for each place that is stored in compressed columns, increasing."""
-    n = matrix.shape[0]
-    columns = np.repeat(np.arange(n, dtype=np.int64), np.diff(matrix.indptr))
-    return columns * n + matrix.indices

@@ -12,34 +12,37 @@ from functools import lru_cache
 
 import numpy as np
 
-from bayesplate.modes.fields import UNIFORM, Fabric, Floats, Group, Measure, Outline, layout
+from bayesplate.modes.energies import Derivative, Kinematics, Piece, assembled_plate, deflected
+from bayesplate.modes.fields import UNIFORM, Fabric, Floats, Group, Outline
 from bayesplate.modes.line import Line, line
-from bayesplate.modes.plate import (
-    Beams,
-    Block,
-    EdgeTurn,
-    KronSum,
-    Parity,
-    PlateMatrices,
-    Term,
-    count_rigid,
-    kron_sum,
-)
-from bayesplate.modes.sparse import on_one_pattern
+from bayesplate.modes.plate import Beams, KronSum, PlateMatrices, Term
 from bayesplate.plate.setup import Ends
 
 THIN_TERMS = ("xx", "yy", "mix", "xy")
 
-_DERIVATIVES: tuple[tuple[Beams, Beams, float], ...] = (
-    ((2, 0), (2, 0), 1.0),
-    ((0, 2), (0, 2), 1.0),
-    ((2, 0), (0, 2), 1.0),
-    ((1, 1), (1, 1), 1.0),
-    ((2, 0), (1, 1), 2.0),
-    ((0, 2), (1, 1), 2.0),
+_DEFLECTION = (Derivative(1.0, "w", 0, 0),)
+_SLOPE_X = (Derivative(1.0, "w", 1, 0),)
+_SLOPE_Y = (Derivative(1.0, "w", 0, 1),)
+_BEND_X = (Derivative(1.0, "w", 2, 0),)
+_BEND_Y = (Derivative(1.0, "w", 0, 2),)
+_TWIST = (Derivative(1.0, "w", 1, 1),)
+_TWICE_TWIST = (Derivative(2.0, "w", 1, 1),)
+
+_THIN = Kinematics(
+    fields={"w": (Piece("w", "deflected", "deflected"),)},
+    # The last two couple bending with twist.
+    stiffnesses=(
+        (_BEND_X, _BEND_X),
+        (_BEND_Y, _BEND_Y),
+        (_BEND_X, _BEND_Y),
+        (_TWIST, _TWIST),
+        (_BEND_X, _TWICE_TWIST),
+        (_BEND_Y, _TWICE_TWIST),
+    ),
+    masses=((_DEFLECTION, _DEFLECTION),),
+    turns=(_SLOPE_X, _SLOPE_Y),
+    functions=lambda side, parity: {"deflected": deflected(side, parity)},
 )
-"""Two derivatives of the deflection, orders along x and y, whose product each term integrates, and a factor; twice
-where they differ, so that the matrix is symmetric. The last two couple bending with twist."""
 
 
 @lru_cache(maxsize=16)
@@ -62,8 +65,7 @@ def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> PlateMatrices:
     ----------
     Ducceschi et al., eq. (1) and (2), as energies.
     """
-    x, y = line(ends_x, n_x), line(ends_y, n_y)
-    return assemble(x, y, thin_terms(x, y), thin_masses(x, y))
+    return assemble(line(ends_x, n_x), line(ends_y, n_y))
 
 
 def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
@@ -74,46 +76,14 @@ def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group
     return (("along",) * 6 if is_turned else ("along", "bending", "bending", "bending")), ("mass",)
 
 
-def thin_terms(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
-    """The bending terms of the thin plate.
-
-    Parameters
-    ----------
-    x, y : Line
-    fabric : Fabric
-        Varying properties repeat the terms in the order of `bayesplate.modes.fields.layout`.
-
-    Returns
-    -------
-    tuple of KronSum
-        The four of `THIN_TERMS`; 4 int w_xx w_xy and 4 int w_yy w_xy follow where the grain runs at an angle.
-    """
-    stiffness, _ = thin_groups(fabric.is_turned)
-    measures = fabric.measures(set(stiffness), x, y)
-    counts = {group: len(each) for group, each in measures.items()}
-
-    def own(term: int, measure: Measure) -> KronSum:
-        a, b, factor = _DERIVATIVES[term]
-        once = _integral(measure, x, y, a, b, factor)
-        return once if a == b else (*once, *_integral(measure, x, y, b, a, factor))
-
-    return tuple(own(term, measures[stiffness[term]][k]) for term, k in layout(stiffness, counts))
-
-
-def thin_masses(x: Line, y: Line, fabric: Fabric = UNIFORM) -> tuple[KronSum, ...]:
-    """The board's own mass, once for each field that it takes."""
-    return tuple(_integral(measure, x, y, (0, 0), (0, 0)) for measure in fabric.measures(("mass",), x, y)["mass"])
-
-
-def _integral(measure: Measure, x: Line, y: Line, a: Beams, b: Beams, factor: float = 1.0) -> KronSum:
-    """Integral of one derivative of the deflection (orders along x and y; rows) times another (columns)."""
-    kept_x, kept_y = (np.ix_(side.kept, side.kept) for side in (x, y))
-    return tuple((factor * along_x[a[0], b[0]][kept_x], along_y[a[1], b[1]][kept_y]) for along_x, along_y in measure)
-
-
 def within_outline(x: Line, y: Line, a: Beams, b: Beams, outline: Outline | None) -> KronSum:
-    """Integral of two derivatives of the deflection, orders along x and y, within an outline; None: everywhere."""
-    return _integral(Fabric(outline=outline).inside(x, y), x, y, a, b)
+    """Integral of two derivatives of the deflection, orders along x and y, within an outline; None: everywhere.
+
+    The first one is that of the rows, the second one that of the columns.
+    """
+    kept_x, kept_y = (np.ix_(side.kept, side.kept) for side in (x, y))
+    measure = Fabric(outline=outline).inside(x, y)
+    return tuple((along_x[a[0], b[0]][kept_x], along_y[a[1], b[1]][kept_y]) for along_x, along_y in measure)
 
 
 def mean_deflections(x: Line, y: Line, deflections: Floats, outline: Outline | None) -> Floats:
@@ -122,29 +92,28 @@ def mean_deflections(x: Line, y: Line, deflections: Floats, outline: Outline | N
     return np.asarray(sum(np.einsum("i,kij,j->k", x.load(a), deflections, y.load(b)) for a, b in measure))
 
 
-def assemble(x: Line, y: Line, stiffness: Sequence[Term], masses: Sequence[KronSum]) -> PlateMatrices:
-    """A thin plate from any terms, class by class.
+def assemble(
+    x: Line,
+    y: Line,
+    stiffness: Sequence[Term] = (),
+    masses: Sequence[KronSum] = (),
+    fabric: Fabric = UNIFORM,
+) -> PlateMatrices:
+    """The thin plate on two lines, joined by further terms.
 
     Parameters
     ----------
     x, y : Line
-        Unsplit along a side on which a term is not symmetric.
+        Unsplit along a side on which a further term is not symmetric.
     stiffness : sequence of Term
     masses : sequence of KronSum
-        The first is the board's own.
+        Further terms; they come after the plate's own.
+    fabric : Fabric
+        Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`: the four of
+        `THIN_TERMS`, then 4 int w_xx w_xy and 4 int w_yy w_xy where the grain runs at an angle.
 
     Returns
     -------
     PlateMatrices
     """
-    blocks = []
-    terms = [*(term.on_slopes(x, y) if isinstance(term, EdgeTurn) else term for term in stiffness), *masses]
-    for i, part_x in enumerate(x.parts):
-        for j, part_y in enumerate(y.parts):
-            matrices = [kron_sum(term, part_x, part_y) for term in terms]
-            stored, indices, indptr = on_one_pattern(matrices)
-            n = len(stiffness)
-            parity = Parity(i, j)
-            rigid = count_rigid(parity, x, y)
-            blocks.append(Block(parity, stored[:n], stored[n:], indices, indptr, part_x, part_y, rigid))
-    return PlateMatrices(x, y, tuple(blocks))
+    return assembled_plate(_THIN, thin_groups(fabric.is_turned), x, y, stiffness, masses, fabric)

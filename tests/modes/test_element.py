@@ -13,6 +13,7 @@ from bayesplate.modes.element import (
     gauss_points,
     gauss_rule,
     hermite_functions,
+    moved_weights,
 )
 from bayesplate.modes.hermite import products
 from bayesplate.modes.line import line
@@ -87,6 +88,18 @@ def test_products_are_those_of_gauss_points_on_each_element(n_elements):
     for orders, matrix in products(tuple(nodes)).items():
         expected = direct[orders]
         np.testing.assert_allclose(matrix, expected, rtol=1e-10, atol=1e-13 * np.abs(expected).max())
+
+
+def test_moved_weights_sum_products_of_cubics_and_nothing_of_higher_degree():
+    """Points in a corner of the element, of which some weights are negative."""
+    rng = np.random.default_rng(3)
+    t, weights = 0.9 + 0.1 * rng.uniform(size=(2, 5, 9)), rng.standard_normal((2, 5, 9))
+    points, moved = moved_weights(t, weights)
+
+    for degree in range(8):
+        wanted = (weights * t**degree).sum(axis=-1)
+        error = np.abs((moved * points**degree).sum(axis=-1) - wanted).max()
+        assert (error < 1e-13) == (degree < 7)
 
 
 def test_neighbours_cancel_exactly():
