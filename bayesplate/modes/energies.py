@@ -13,6 +13,7 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.modes.element import ORDERS, LineProducts, line_places
 from bayesplate.modes.fields import Fabric, Group, Measure, layout
@@ -196,9 +197,9 @@ def _block(
     pairs = [pair for measure in measures.values() for pair in measure]
     along_x = _Integrals.of([pair[0] for pair in pairs], functions_x)
     along_y = _Integrals.of([pair[1] for pair in pairs], functions_y)
-    own = (pieces[0] for pieces in kinematics.fields.values())
-    sizes = [functions_x[piece.along_x].shape[1] * functions_y[piece.along_y].shape[1] for piece in own]
-    starts = dict(zip(kinematics.fields, np.cumsum([0, *sizes]).tolist(), strict=False))
+    own = [(functions_x[pieces[0].along_x], functions_y[pieces[0].along_y]) for pieces in kinematics.fields.values()]
+    nodes = [(_nodes(on_x)[:, None] * (y.n_elements + 1) + _nodes(on_y)).ravel() for on_x, on_y in own]
+    starts = dict(zip(kinematics.fields, np.cumsum([0, *(each.size for each in nodes)]).tolist(), strict=False))
     spread_x, spread_y = x.parts[parity.x], y.parts[parity.y]
 
     def parts(term: Energy | KronSum) -> list[Kron]:
@@ -207,9 +208,17 @@ def _block(
         on_x, on_y = (Entries.of(each) for each in zip(*term, strict=True))
         return [Kron(on_x.between(spread_x, spread_x), on_y.between(spread_y, spread_y))]
 
-    stored, indices, indptr = lower_triangles([parts(term) for term in terms], sum(sizes))
+    stored, indices, indptr = lower_triangles([parts(term) for term in terms], np.concatenate(nodes))
     stiff, inert = stored[: len(stiffness)], stored[len(stiffness) :]
     return Block(parity, stiff, inert, indices, indptr, spread_x, spread_y, count_rigid(parity, x, y))
+
+
+def _nodes(functions: Any) -> NDArray[np.intp]:
+    """Where along a side each function begins: a node of the line has two functions, of a value and of a slope."""
+    rows, columns = functions.nonzero()
+    first = np.full(functions.shape[1], functions.shape[0])
+    np.minimum.at(first, columns, rows)
+    return first // 2
 
 
 def _parts(

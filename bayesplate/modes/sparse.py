@@ -84,16 +84,19 @@ class Kron(NamedTuple):
 
 
 def lower_triangles(
-    matrices: Sequence[Sequence[Kron]], size: int
+    matrices: Sequence[Sequence[Kron]], nodes: NDArray[np.intp]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
-    """Lower triangles of several symmetric matrices, each the sum of its parts, on the union of their patterns.
+    """Lower triangles of several symmetric matrices, each the sum of its parts, on one pattern of whole nodes.
+
+    Where two nodes have anything in common in any matrix, each of their unknowns has a place with each, so that the
+    rows of a node hold the same columns. A few of these values are zero.
 
     Parameters
     ----------
     matrices : sequence of sequences of Kron
         What parts have above the diagonal is left out, so that a part wholly above it need not be given.
-    size : int
-        Rows and columns of each matrix.
+    nodes : (size,) array of int
+        Node of the mesh that each unknown, which is a row and a column of each matrix, belongs to.
 
     Returns
     -------
@@ -102,6 +105,7 @@ def lower_triangles(
     indices, indptr : arrays
         The pattern, in compressed columns.
     """
+    size = nodes.size
     # Most parts have their places in common with those of other matrices, and these are worked out once.
     by_pattern = [_by_pattern(matrix) for matrix in matrices]
     reached, lower, keys = {}, {}, {}
@@ -111,7 +115,7 @@ def lower_triangles(
         reached[pattern] = np.flatnonzero(is_lower.any(axis=1))
         lower[pattern] = np.flatnonzero(is_lower[reached[pattern]])
         keys[pattern] = columns[is_lower] * size + rows[is_lower]
-    union = _united(list(keys.values()))
+    union = _of_whole_nodes(_united(list(keys.values())), nodes)
     places = {pattern: np.searchsorted(union, each) for pattern, each in keys.items()}
     stored = np.zeros((len(matrices), union.size))
     for row, each in zip(stored, by_pattern, strict=True):
@@ -136,6 +140,19 @@ def _united(sets: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:
     """All numbers of some sets, increasing; `numpy.unique` takes many times as long as sorting."""
     every = np.sort(np.concatenate(sets))
     return every[np.append(True, every[1:] != every[:-1])]
+
+
+def _of_whole_nodes(places: NDArray[np.intp], nodes: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Places below the diagonal, column by column, of all unknowns of all pairs of nodes that have one of some."""
+    from scipy.sparse import csc_array, tril
+
+    size = nodes.size
+    columns, rows = np.divmod(places, size)
+    of_nodes = csc_array((np.ones(size), (np.arange(size), nodes)))
+    pairs = csc_array((np.ones(places.size), (nodes[rows], nodes[columns])), shape=(of_nodes.shape[1],) * 2)
+    every = csc_array(tril(of_nodes @ (pairs + pairs.T) @ of_nodes.T))
+    every.sort_indices()
+    return np.repeat(np.arange(size), np.diff(every.indptr)) * size + every.indices
 
 
 def mirrored(indices: NDArray[np.int32], indptr: NDArray[np.int32]) -> tuple[NDArray[np.intp], Any, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations, pairwise
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_array, csr_array
@@ -28,7 +30,8 @@ def test_matrices_between_other_functions(n_matrices, held_as):
     assert found.values.any(axis=0).all()
 
 
-def test_triangles_of_sums_of_kronecker_products_are_whole_matrices_again():
+@pytest.mark.parametrize("per_node", [1, 2])
+def test_triangles_of_sums_of_kronecker_products_are_whole_matrices_again(per_node):
     """Of one, two and three parts, some in the same place, one wholly above the diagonal's block of its columns."""
     rng = np.random.default_rng(5)
     shapes = (3, 4), (2, 5)
@@ -55,10 +58,14 @@ def test_triangles_of_sums_of_kronecker_products_are_whole_matrices_again():
                 whole[columns, rows] += block.T
         matrices.append(parts)
         expected.append(whole)
-    stored, indices, indptr = lower_triangles(matrices, n)
+    nodes = np.arange(n) // per_node
+    stored, indices, indptr = lower_triangles(matrices, nodes)
     places, rows, starts = mirrored(indices, indptr)
 
-    assert stored.shape[1] < len(places) < n * n
+    assert stored.shape[1] < len(places)
+    columns = [rows[start:end].tolist() for start, end in pairwise(starts)]
+    assert all(columns[i] == columns[j] for i, j in combinations(range(n), 2) if nodes[i] == nodes[j])
+    assert per_node > 1 or len(places) < n * n
     for values, whole in zip(stored, expected, strict=True):
         found = csc_array((values[places], rows, starts), shape=(n, n))
         assert found.has_canonical_format
