@@ -158,3 +158,9 @@ def test_a_peak_that_no_mode_explains_stands_alone() -> None:
     one = Told((np.full((1, 2, 1), -np.inf),), (np.log([0.1]),), np.full((2, 1), 0.5))
     assert one.assignments.log_sum() + one.log_of_all_alone == pytest.approx(np.log(0.1 * 0.25))
     assert found_pairs(one)[0].sum() == 0.0
+
+
+def test_a_peak_of_either_sign_counts_with_both_where_no_mode_explains_it() -> None:
+    nothing = np.full((1, 2, 1), -np.inf)
+    one = Told((nothing, nothing), (np.log([0.1]), np.log([0.1])), np.full((2, 1), 0.5), ((0, 0),))
+    assert one.assignments.log_sum() + one.log_of_all_alone == pytest.approx(np.log(2 * 0.1 * 0.25))
