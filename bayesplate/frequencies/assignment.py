@@ -211,12 +211,14 @@ class Assignments:
             if met is not None:
                 met.append((log_scale, [gain.copy() for gain in gains]))
             for along, gain in zip(alongs, gains, strict=True):
-                _cumulate(gain)
                 n_near = len(gain)
-                near, after = along[:n_near], along[n_near:]
-                near += gain
-                if len(after):
-                    after += gain[-1]
+                if n_near > 1:
+                    _cumulate(gain)
+                here = along[:n_near]
+                here += gain
+                if len(along) > n_near:
+                    beyond = along[n_near:]
+                    beyond += gain[-1]
             for which in passage.closing:
                 table = table.sum(axis=2 + passage.doubtful.index(which))
         return np.asarray(np.log(table[self._last]) + log_scale + self._log_untold)

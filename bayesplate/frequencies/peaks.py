@@ -22,7 +22,7 @@ Rows = NDArray[np.intp]
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""
 _DRAWS_AT_ONCE = 512
-"""Enough for the arithmetic to be done in compiled code; thousands at once would hold gigabytes."""
+"""Enough for the arithmetic to be done in compiled code; of more, what is at work leaves the fast memory."""
 _LEAST_MISSED = 1e-3
 """Probability that a mode left no peak, at least: no ratio is beyond all numbers then."""
 _FAR_BELOW = 9.0
@@ -159,6 +159,9 @@ class PeakLikelihood:
         there = every_log_frequency[:, self.columns]
         has_all = np.flatnonzero(np.isfinite(there).all(axis=1))
         result = np.full(len(there), -np.inf)
+        if has_all.size > _DRAWS_AT_ONCE:  # those that are alike together, so that fewer pairs are near at any of them
+            most_spread = there[has_all].std(axis=0).argmax()
+            has_all = has_all[np.argsort(there[has_all, most_spread])]
         for start in range(0, has_all.size, _DRAWS_AT_ONCE):
             some = has_all[start : start + _DRAWS_AT_ONCE]
             result[some] = self._log_sum(there[some], noise[some])
