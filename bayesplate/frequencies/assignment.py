@@ -5,18 +5,22 @@ their order of frequency; a mode is one peak of one row or leaves none, and a pe
 says of mode j, s_i what it says where it is no mode, and m_j the probability that mode j left no peak, an assignment is
 a set of pairs (i, j) that rises in both within a row, and weighs the product of the e_ij of its pairs, and of the s_i
 and m_j that stand in no pair: the product of all s_i and m_j, times that of r_ij = e_ij / (s_i m_j) over its pairs. The
-sum of the latter over all assignments of the first j modes of which a and b are the last peaks of both rows that stand
-in a pair (0: none) runs forward over the modes,
+sum of the latter over all assignments of the first j modes, the first a peaks of one row and the first b of the other
+runs forward over the modes,
 
-    F_0[0, 0] = 1,    F_j[a, b] = F_(j-1)[a, b] + r_aj sum over i < a of F_(j-1)[i, b]
-                                                + r_bj sum over i < b of F_(j-1)[a, i].
+    S_0[a, b] = 1,    S_j[a, b] = S_(j-1)[a, b] + sum over i <= a of r_ij S_(j-1)[i - 1, b]
+                                                + sum over i <= b of r_ij S_(j-1)[a, i - 1].
 
 This is a pair hidden Markov model in which each assignment has one path: the peaks and modes that stand alone between
-two pairs are not counted once for every way to interleave them. A run backward gives the probability of each pair.
+two pairs are not counted once for every way to interleave them. A run backward through the same sums gives the
+derivatives of the last by each r_ij, and with them the probability of each pair.
 
-Peaks lie near a few modes each. Once no mode to come is near the first peaks of a row it matters no more which of them
-stood in the last pair, so that their sums become one; and sums of peaks that no mode was near yet are zero. Of the
-table F_j a small window is left, which moves along the peaks with the modes.
+Peaks lie near a few modes each. Sums of fewer peaks than come before all those that are near a mode to come are not
+asked for again; those that differ in peaks that no mode was near yet are equal. Of the table S_j a small window is
+left, which moves along the peaks with the modes.
+
+A peak of unknown sign stands in both rows and is a mode in one of them at most. The sum over both its signs is taken
+where it matters: from the first mode that it is near to the last there is a table for each sign.
 
 References
 ----------
@@ -25,23 +29,104 @@ Durbin, Eddy, Krogh and Mitchison, Biological Sequence Analysis, 1998, chapter 4
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
-_LEAST = 1e-3
-"""Probability that a mode left no peak, at least: no ratio is beyond all numbers then."""
-_MANY = 1e30
-"""A draw's sums are divided by the largest once one exceeds this: times one more ratio it is a number still."""
-_LOG_NOTHING = float(np.log(1e-18))
+LOG_NOTHING = float(np.log(1e-18))
 """Of a ratio that changes no sum of one and more; smaller ones come to numbers that processors are slow with."""
+_LOG_MOST = 300.0
+"""Sums are divided by the largest before they can exceed e to this: times as much again they are numbers still."""
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Which peaks of a row are near each mode.
+
+    Attributes
+    ----------
+    n_peaks : int
+    first, end : lists of n_modes int
+        The first of these peaks, and the one after the last: none where the end is not beyond the first.
+    low : list of n_modes int
+        The first of them and of those near the modes to come.
+    """
+
+    n_peaks: int
+    first: list[int]
+    end: list[int]
+    low: list[int]
+
+    @classmethod
+    def of(cls, is_near: NDArray[np.bool_]) -> Near:
+        """From which peaks any draw has near which modes: an (n_peaks, n_modes) array."""
+        # Every mode is near a peak after all others, then to one before them: so one is found for each.
+        near = np.ones((len(is_near) + 1, is_near.shape[1]), dtype=np.bool_)
+        near[:-1] = is_near
+        first = near.argmax(axis=0).tolist()
+        near[1:] = is_near
+        near[0] = True
+        end = (len(is_near) - near[::-1].argmax(axis=0)).tolist()
+        low = list(accumulate(reversed(first), min))[::-1]
+        return cls(len(is_near), first, end, low)
+
+    @cached_property
+    def starts(self) -> list[int]:
+        """Where the pairs of each mode begin among those of the row, and where the last ones end: n_modes + 1 int."""
+        counts = (end - first if end > first else 0 for first, end in zip(self.first, self.end, strict=True))
+        return list(accumulate(counts, initial=0))
+
+    def pairs(self) -> tuple[list[int], list[int]]:
+        """Peaks and modes of the pairs, mode after mode: two lists of n_pairs int."""
+        found = enumerate(zip(self.first, self.end, strict=True))
+        pairs = [(peak, mode) for mode, (first, end) in found for peak in range(first, end)]
+        return [peak for peak, _ in pairs], [mode for _, mode in pairs]
+
+    def modes(self, peak: int) -> list[int]:
+        """Those that a peak is near."""
+        ends = zip(self.first, self.end, strict=True)
+        return [mode for mode, (first, end) in enumerate(ends) if first <= peak < end]
+
+
+class _Passage(NamedTuple):
+    """What a mode does that peaks are near, and where in the table.
+
+    Attributes
+    ----------
+    rows : list of (int, slice, slice)
+        Rows of these peaks; in each which peaks they are, and which pairs with the mode.
+    tops : (int, int)
+        The most peaks of each row of which the table had sums before.
+    window : (slice, slice)
+        The part of the table that this mode and those to come ask for.
+    log_growth : float
+        ln of the number by which the mode multiplies a sum, at most.
+    doubtful : tuple of int
+        Which peaks of unknown sign have an axis of the table, one after the other between its two and the draws.
+    opening, closing : list of int
+        Those that have it from this mode on, and up to it.
+    """
+
+    rows: list[tuple[int, slice, slice]]
+    tops: tuple[int, int]
+    window: tuple[slice, slice]
+    log_growth: float
+    doubtful: tuple[int, ...]
+    opening: list[int]
+    closing: list[int]
+
+    def along(self, table: Floats, row: int) -> Floats:
+        """The part of a table that is asked for, up to the most peaks of a row: these along the first axis."""
+        if row == 0:
+            return table[: self.window[0].stop, self.window[1]]
+        return table[self.window[0], : self.window[1].stop].swapaxes(0, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,207 +137,171 @@ class Assignments:
 
     Attributes
     ----------
-    log_pair : one or two (n_peaks, n_modes, n_draws) arrays
-        ln e_ij of each row of peaks.
-    log_alone : as many (n_peaks,) arrays
-        ln s_i.
-    missed : (n_modes, n_draws) array
-        m_j, 0 to 1.
+    near : sequence of Near
+        One for each row.
+    ratios : sequence of (n_pairs, n_draws) array
+        r_ij of the pairs of each.
+    unsigned : tuple of (int, int)
+        The places in both rows of each peak of unknown sign.
     """
 
-    log_pair: tuple[Floats, ...]
-    log_alone: tuple[Floats, ...]
-    missed: Floats
+    near: Sequence[Near]
+    ratios: Sequence[Floats]
+    unsigned: Sequence[tuple[int, int]] = ()
 
-    def log_sums(self, taking: Sequence[Bools]) -> Floats:
-        """ln of the sum over all assignments of some of the peaks, the others not there.
+    def log_sum(self) -> Floats:
+        """ln of the sum of the products of r_ij over all assignments and all signs that peaks may have: (n_draws,)."""
+        return self._forward(None)
 
-        Parameters
-        ----------
-        taking : for each row of peaks an (n_subsets, n_peaks) array of bool
-            The peaks of each subset.
-
-        Returns
-        -------
-        (n_subsets, n_draws) array
-        """
-        taken = np.concatenate(taking, axis=1)
-        rows = self._rows(taking)
-        *_, (sums, log_scale) = _forward(rows, (len(taken), self.missed.shape[1]))
-        found = np.log(sums[0, 0]) + log_scale
-        return found + (taken @ np.concatenate(self.log_alone))[:, None] + self._log_missed.sum(axis=0)
-
-    def of(self, taken: Sequence[Bools]) -> Assignments:
-        """The same of some of the peaks, the others not there: for each row an (n_peaks,) array of bool."""
-        log_pair, log_alone = (
-            tuple(each[own] for each, own in zip(rows, taken, strict=True)) for rows in (self.log_pair, self.log_alone)
-        )
-        return Assignments(log_pair, log_alone, self.missed)
-
-    def pairs(self) -> tuple[Floats, ...]:
-        """Probability that each peak is each mode: arrays of the shapes of `log_pair`; the rest: it is none."""
-        rows = self._rows([np.ones((1, len(each)), dtype=np.bool_) for each in self.log_pair])
-        forward = list(_forward(rows, (1, self.missed.shape[1])))
-        sums, log_scale = forward[-1]
-        log_total = np.log(sums[0, 0]) + log_scale
-        result = tuple(np.zeros(each.shape) for each in self.log_pair)
-        behind, log_behind = np.ones_like(sums), np.zeros_like(log_total)
-        for j in range(len(self.missed) - 1, -1, -1):
-            sums, log_scale = forward[j]
+    def pairs(self) -> list[Floats]:
+        """Probability of each of the pairs: arrays of the shapes of `ratios`."""
+        met: list[tuple[Floats, list[Floats]]] = []
+        log_total = self._forward(met)
+        result = [np.zeros(each.shape) for each in self.ratios]
+        behind = np.zeros((*self._shape, log_total.size))  # derivatives of the last sum by those before it
+        behind[self._last] = 1.0
+        log_behind, log_most = np.full_like(log_total, self._log_untold), 0.0
+        for passage, (log_scale, added) in zip(reversed(self._passages), reversed(met), strict=True):
+            for which in reversed(passage.closing):
+                behind = np.stack((behind, behind), axis=2 + passage.doubtful.index(which))
+            if log_most + passage.log_growth > _LOG_MOST:
+                log_behind, log_most = log_behind + _scale_down(behind[passage.window]), 0.0
+            log_most += passage.log_growth
             scale = np.exp(log_scale + log_behind - log_total)
-            for axis, row in enumerate(rows):
-                behind = row.parted(behind, j, axis)
-            before = behind[: sums.shape[0], : sums.shape[1]].copy()
-            for axis, row in enumerate(rows):
-                if not row.is_near(j):
-                    continue
-                first, end = row.first[j], row.end[j]
-                at = first - row.low[j]
-                onward = row.says(j) * behind.swapaxes(0, axis)[at + 1 : at + 1 + end - first, : sums.shape[1 - axis]]
-                reached = row.reached(sums.swapaxes(0, axis), j)
-                result[axis][first:end, j] = ((reached * onward).sum(axis=1) * scale)[:, 0]
-                gained = _cumulated(onward[::-1])[::-1]
-                changed = before.swapaxes(0, axis)
-                changed[:at] += gained[0]
-                changed[at : at + end - first] += gained[: len(changed) - at]
-            behind, log_behind = _scaled(before, log_behind)
+            led = []
+            for (row, peaks, own), gain in zip(passage.rows, added, strict=True):
+                along = passage.along(behind, row)
+                onward = along[peaks.start + 1 : peaks.stop + 1].copy()
+                onward[-1] += along[peaks.stop + 1 :].sum(axis=0)
+                _cumulate(onward[::-1])
+                result[row][own] = (gain * onward).reshape(len(gain), -1, scale.size).sum(axis=1) * scale
+                led.append(self._times_ratios(onward, passage, row, peaks, own))
+            for (row, peaks, _), each in zip(passage.rows, led, strict=True):
+                passage.along(behind, row)[peaks] += each
+            (a, b), (top_a, top_b) = passage.window, passage.tops
+            behind[a, top_b] += behind[a, top_b + 1 : b.stop].sum(axis=1)
+            held = slice(min(b.start, top_b), top_b + 1)
+            behind[top_a, held] += behind[top_a + 1 : a.stop, held].sum(axis=0)
+            for which in reversed(passage.opening):
+                behind = behind.sum(axis=2 + passage.doubtful.index(which))
         return result
 
+    def _forward(self, met: list[tuple[Floats, list[Floats]]] | None) -> Floats:
+        """`log_sum`; for each passage ln of what the table was divided by, and what each peak adds, go to a list."""
+        n_draws = self.ratios[0].shape[1]
+        table, log_scale, log_most = np.zeros((*self._shape, n_draws)), np.zeros(n_draws), 0.0
+        table[0, 0] = 1.0
+        for passage in self._passages:
+            for _ in passage.opening:
+                table = np.stack((table, table), axis=-2)
+            (a, b), (top_a, top_b) = passage.window, passage.tops
+            if a.stop > top_a + 1:
+                held = slice(min(b.start, top_b), top_b + 1)
+                table[top_a + 1 : a.stop, held] = table[top_a, held]
+            if b.stop > top_b + 1:
+                table[a, top_b + 1 : b.stop] = table[a, top_b : top_b + 1]
+            if log_most + passage.log_growth > _LOG_MOST:
+                log_scale, log_most = log_scale + _scale_down(table[a, b]), 0.0
+            log_most += passage.log_growth
+            alongs, gains = [], []
+            for row, peaks, own in passage.rows:
+                along = passage.along(table, row)
+                gains.append(self._times_ratios(along[peaks], passage, row, peaks, own))
+                alongs.append(along[peaks.start + 1 :])
+            if met is not None:
+                met.append((log_scale, [gain.copy() for gain in gains]))
+            for along, gain in zip(alongs, gains, strict=True):
+                n_near = len(gain)
+                if n_near > 1:
+                    _cumulate(gain)
+                here = along[:n_near]
+                here += gain
+                if len(along) > n_near:
+                    beyond = along[n_near:]
+                    beyond += gain[-1]
+            for which in passage.closing:
+                table = table.sum(axis=2 + passage.doubtful.index(which))
+        return np.asarray(np.log(table[self._last]) + log_scale + self._log_untold)
+
+    def _times_ratios(self, sums: Floats, passage: _Passage, row: int, peaks: slice, own: slice) -> Floats:
+        """Sums of each peak of a row that is near a mode times r_ij, 0 where the peak has the other row's sign."""
+        ratios = self.ratios[row][own]
+        if not passage.doubtful:
+            return sums * ratios[:, None]
+        result = sums * ratios.reshape(len(ratios), *[1] * (sums.ndim - 2), -1)
+        for at, which in enumerate(passage.doubtful):
+            peak = self.unsigned[which][row] - peaks.start
+            if 0 <= peak < len(result):
+                result[(peak, slice(None), *(slice(None) for _ in range(at)), 1 - row)] = 0.0
+        return result
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        """Numbers of peaks of which there may be a sum, none among them."""
+        a, *b = (near.n_peaks + 1 for near in self.near)
+        return a, b[0] if b else 1
+
+    @property
+    def _last(self) -> tuple[int, int]:
+        """Where in the table the sum over all is."""
+        a, b = self._passages[-1].window if self._passages else (slice(1), slice(1))
+        return a.stop - 1, b.stop - 1
+
     @cached_property
-    def _log_missed(self) -> Floats:
-        """ln m_j, none of them infinite: (n_modes, n_draws) array."""
-        return np.log(np.maximum(self.missed, _LEAST))
+    def _spans(self) -> list[tuple[int, int] | None]:
+        """The first and the last mode that each peak of unknown sign is near."""
+        each = (
+            [j for near, peak in zip(self.near, peaks, strict=True) for j in near.modes(peak)]
+            for peaks in self.unsigned
+        )
+        return [(min(modes), max(modes)) if modes else None for modes in each]
 
-    def _rows(self, taking: Sequence[Bools]) -> list[_Row]:
-        """The rows of peaks, and which of them are there in each subset."""
-        per_row = zip(self.log_pair, self.log_alone, taking, strict=True)
-        return [
-            _Row.of(log_pair - log_alone[:, None, None], self._log_missed, own) for log_pair, log_alone, own in per_row
-        ]
+    @property
+    def _log_untold(self) -> float:
+        """ln of how many signs those of them have together that are near no mode."""
+        return self._spans.count(None) * float(np.log(2.0))
 
-
-@dataclass(frozen=True, eq=False)
-class _Row:
-    """A row of peaks, and which of its sums differ on the way along the modes: those of a window.
-
-    Attributes
-    ----------
-    log_told : (n_peaks, n_modes, n_draws) array
-        ln of e_ij / s_i.
-    log_missed : (n_modes, n_draws) array
-        ln m_j.
-    taken : (n_peaks, n_subsets, 1) array
-        1 for a peak that is there.
-    first, end : lists of n_modes int
-        The peaks that are near each mode, the end not among them.
-    low : list of n_modes + 1 int
-        Before each mode, and after the last: the last peak but for which it does not matter which peaks stand in pairs,
-        as no mode to come is near one before it. Its sum holds theirs.
-    top : list of n_modes + 1 int
-        The last peak that may stand in a pair by then.
-    """
-
-    log_told: Floats
-    log_missed: Floats
-    taken: Floats
-    first: list[int]
-    end: list[int]
-    low: list[int]
-    top: list[int]
-
-    @classmethod
-    def of(cls, log_told: Floats, log_missed: Floats, taking: Bools) -> _Row:
-        """Of what the peaks tell, and an (n_subsets, n_peaks) array of those of each subset."""
-        n_peaks = len(log_told)
-        highest: Floats = log_told.max(axis=2, initial=-np.inf) - log_missed.min(axis=1, initial=0.0)
-        highest[np.logical_not(taking).all(axis=0)] = -np.inf
-        near: Bools = np.greater(highest, _LOG_NOTHING)
-        first, end = np.full(log_told.shape[1], n_peaks), np.zeros(log_told.shape[1], dtype=np.intp)
-        peaks, modes = np.nonzero(near)
-        np.minimum.at(first, modes, peaks)
-        np.maximum.at(end, modes, peaks + 1)
-        low = np.minimum.accumulate([n_peaks, *first[::-1]])[::-1]
-        top = np.maximum(np.maximum.accumulate([0, *end]), low)
-        taken = taking.T[:, :, None].astype(np.float64)
-        return cls(log_told, log_missed, taken, first.tolist(), end.tolist(), low.tolist(), top.tolist())
-
-    def is_near(self, mode: int) -> bool:
-        """Whether a peak is near a mode."""
-        return self.end[mode] > self.first[mode]
-
-    def n_reached(self, mode: int) -> int:
-        """Sums of a window before a mode and of the peaks near it."""
-        return max(self.top[mode], self.end[mode]) - self.low[mode] + 1
-
-    def says(self, mode: int) -> Floats:
-        """r_ij of the peaks near a mode, 0 where they are not there: (n_near, 1, n_subsets, n_draws) array."""
-        near = slice(self.first[mode], self.end[mode])
-        ratios = np.exp(np.maximum(self.log_told[near, mode] - self.log_missed[mode], _LOG_NOTHING))
-        return (ratios[:, None] * self.taken[near])[:, None]
-
-    def reached(self, along: Floats, mode: int) -> Floats:
-        """For each peak near a mode the sum over those before it: from a window's sums, this row along the first axis.
-
-        An (n_near, n_other, n_subsets, n_draws) array.
-        """
-        at = self.first[mode] - self.low[mode]
-        there = np.zeros((self.end[mode] - self.first[mode], *along.shape[1:]))
-        own = along[at : at + len(there)]
-        there[: len(own)] = own
-        if at:
-            there[0] += along[:at].sum(axis=0)
-        return _cumulated(there)
-
-    def gathered(self, sums: Floats, mode: int, axis: int) -> Floats:
-        """Sums after a mode, those in one of which the modes to come see no difference any more."""
-        along = sums.swapaxes(0, axis)
-        n_gathered = min(self.low[mode + 1] - self.low[mode], len(along) - 1)
-        if n_gathered:
-            along[n_gathered] += along[:n_gathered].sum(axis=0)
-        return along[n_gathered:].swapaxes(0, axis)
-
-    def parted(self, behind: Floats, mode: int, axis: int) -> Floats:
-        """What is behind each peak after a mode, from what is behind those that differ for the modes to come."""
-        at = np.arange(self.n_reached(mode)) + (self.low[mode] - self.low[mode + 1])
-        return behind.take(np.maximum(at, 0), axis=axis) if len(at) > behind.shape[axis] else behind
+    @cached_property
+    def _passages(self) -> list[_Passage]:
+        """The way along all modes that peaks are near."""
+        passages: list[_Passage] = []
+        tops, windows = [0, 0], [slice(0, 1), slice(0, 1)]
+        spans = [(*span, which) for which, span in enumerate(self._spans) if span is not None]
+        ends = [(last, which) for _, last, which in spans]
+        doubtful: tuple[int, ...] = ()
+        log_growths = [np.log1p(ratios.max(axis=1, initial=0.0)).tolist() for ratios in self.ratios]
+        rows = (zip(near.first, near.end, near.low, near.starts[:-1], strict=True) for near in self.near)
+        for mode, at in enumerate(zip(*rows, strict=True)):
+            (top_a, top_b), log_growth, found = tops, 0.0, []
+            for row, (first, end, low, start) in enumerate(at):
+                if first < end:
+                    own = slice(start, start + end - first)
+                    found.append((row, slice(first, end), own))
+                    log_growth += sum(log_growths[row][own])
+                    if end > tops[row]:
+                        tops[row] = end
+                windows[row] = slice(min(low, tops[row]), tops[row] + 1)
+            if not found:
+                continue
+            opening = [which for first, _, which in spans if first == mode]
+            doubtful = (*doubtful, *opening)
+            closing = [which for which in reversed(doubtful) if (mode, which) in ends]
+            passages.append(
+                _Passage(found, (top_a, top_b), (windows[0], windows[1]), log_growth, doubtful, opening, closing)
+            )
+            if closing:
+                doubtful = tuple(which for which in doubtful if which not in closing)
+        return passages
 
 
-def _forward(rows: Sequence[_Row], shape: tuple[int, int]) -> Iterator[tuple[Floats, Floats]]:
-    """The windows of F_0, F_1 and so on, and the logarithms of what they were divided by, one per draw.
-
-    Of one or two rows; windows are (n_a, n_b, n_subsets, n_draws) arrays, after the last mode of the one sum of all.
-    """
-    sums, log_scale = np.ones((1, 1, *shape)), np.zeros(shape)
-    yield sums, log_scale
-    for j in range(len(rows[0].first)):
-        if not any(row.is_near(j) for row in rows):
-            yield sums, log_scale
-            continue
-        n_a, n_b = (*(row.n_reached(j) for row in rows), 1)[:2]
-        after = np.zeros((n_a, n_b, *shape))
-        after[: sums.shape[0], : sums.shape[1]] = sums
-        for axis, row in enumerate(rows):
-            if row.is_near(j):
-                at = row.first[j] + 1 - row.low[j]
-                own = after.swapaxes(0, axis)[at : at + row.end[j] - row.first[j], : sums.shape[1 - axis]]
-                own += row.says(j) * row.reached(sums.swapaxes(0, axis), j)
-        for axis, row in enumerate(rows):
-            after = row.gathered(after, j, axis)
-        sums, log_scale = _scaled(after, log_scale)
-        yield sums, log_scale
-
-
-def _cumulated(rows: Floats) -> Floats:
-    """Sums from the first row to each, in place: rows of draws are added in compiled code, one after another."""
+def _cumulate(rows: Floats) -> None:
+    """Add to each row all those before it: rows of draws are added in compiled code, one after another."""
     for before, here in pairwise(rows):
         here += before
-    return rows
 
 
-def _scaled(sums: Floats, log_scale: Floats) -> tuple[Floats, Floats]:
-    """Sums over their largest at the draws where that is large; the others do not depend on it."""
-    if sums.max(initial=1.0) < _MANY:
-        return sums, log_scale
-    largest = sums.max(axis=(0, 1))
-    scale = np.where(largest < _MANY, 1.0, largest)
-    return sums / scale, log_scale + np.log(scale)
+def _scale_down(sums: Floats) -> Floats:
+    """Divide sums by their largest at each draw, in place; ln of that: (n_draws,) array."""
+    largest = sums.max(axis=tuple(range(sums.ndim - 1)))
+    sums /= largest
+    return np.log(largest)

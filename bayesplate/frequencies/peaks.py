@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.assignment import Assignments
+from bayesplate.frequencies.assignment import LOG_NOTHING, Assignments, Near
 from bayesplate.frequencies.model import SetupModel, every_label
 from bayesplate.frequencies.residues import share_seen, sign_probabilities
 from bayesplate.labels import Label
@@ -21,8 +21,12 @@ Rows = NDArray[np.intp]
 
 _MOST_UNSIGNED = 6
 """Peaks of unknown sign up to which each is tried with both."""
-_DRAWS_AT_ONCE = 1024
-"""Enough for the arithmetic to be done in compiled code; thousands at once would hold gigabytes."""
+_DRAWS_AT_ONCE = 512
+"""Enough for the arithmetic to be done in compiled code; of more, what is at work leaves the fast memory."""
+_LEAST_MISSED = 1e-3
+"""Probability that a mode left no peak, at least: no ratio is beyond all numbers then."""
+_FAR_BELOW = 9.0
+"""Standard deviations below the highest peak from which on no mode can be above it: one in 1e19 of a normal error."""
 _SIGNS = {"+": 1, "-": -1, "": 0}
 
 
@@ -35,13 +39,10 @@ class Order:
     peaks : (n_own,) array of int
     log_sign : (n_own, n_modes) array
         ln of the probability that a mode has the sign of a peak.
-    taking : (n_tried, n_own) array of bool
-        Which of the peaks are of this sign, for every sign that those of unknown sign may have.
     """
 
     peaks: Rows
     log_sign: Floats
-    taking: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class PeakLikelihood:
     missed : (n_modes,) array
         Probability that a mode below the highest peak left none.
     orders : tuple of Order
-        One of all, or one per sign.
+        One of all, or one per sign, which share the peaks of unknown sign.
     log_highest : float
         ln of the highest frequency that was read, Hz.
     """
@@ -158,18 +159,18 @@ class PeakLikelihood:
         there = every_log_frequency[:, self.columns]
         has_all = np.flatnonzero(np.isfinite(there).all(axis=1))
         result = np.full(len(there), -np.inf)
-        step = max(1, _DRAWS_AT_ONCE // len(self.orders[0].taking))
-        for start in range(0, has_all.size, step):
-            some = has_all[start : start + step]
+        if has_all.size > _DRAWS_AT_ONCE:  # those that are alike together, so that fewer pairs are near at any of them
+            most_spread = there[has_all].std(axis=0).argmax()
+            has_all = has_all[np.argsort(there[has_all, most_spread])]
+        for start in range(0, has_all.size, _DRAWS_AT_ONCE):
+            some = has_all[start : start + _DRAWS_AT_ONCE]
             result[some] = self._log_sum(there[some], noise[some])
         return result
 
     def _log_sum(self, there: Floats, noise: Floats) -> Floats:
-        """`log_likelihood` of a few draws that have all modes: each takes peaks times modes times orders of memory."""
-        from scipy.special import logsumexp
-
-        _, assignments = self._assignments(there, noise)
-        return np.asarray(logsumexp(assignments.log_sums([order.taking for order in self.orders]), axis=0))
+        """`log_likelihood` of a few draws that have all modes."""
+        _, log_missed, assignments = self._assignments(there, noise)
+        return np.asarray(assignments.log_sum() + log_missed.sum(axis=0) + self.log_alone.sum())
 
     def probabilities(self, every_log_frequency: Floats, noise: Floats) -> Floats:
         """Probability that each peak is each mode, averaged over draws: (n_peaks, n_modes) array; the rest: it is none.
@@ -188,18 +189,11 @@ class PeakLikelihood:
 
     def probabilities_of_each(self, every_log_frequency: Floats, noise: Floats) -> Floats:
         """The same at each draw: (n_peaks, n_modes, n_draws) array."""
-        from scipy.special import softmax
-
-        there = every_log_frequency[:, self.columns]
-        modes, assignments = self._assignments(there, noise)
-        taking = [order.taking for order in self.orders]
-        weights = softmax(assignments.log_sums(taking), axis=0)
+        modes, _, assignments = self._assignments(every_log_frequency[:, self.columns], noise)
         result = np.zeros((*self.log_prior.shape, len(noise)))
-        for *taken, weight in zip(*taking, weights, strict=True):
-            for order, own, pairs in zip(self.orders, taken, assignments.of(taken).pairs(), strict=True):
-                by_mode = np.empty(pairs.shape)
-                np.put_along_axis(by_mode, modes[None], pairs, axis=1)
-                result[order.peaks[own]] += by_mode * weight
+        for row, (order, pairs) in enumerate(zip(self.orders, assignments.pairs(), strict=True)):
+            peaks, at = assignments.near[row].pairs()
+            result[order.peaks[peaks][:, None], modes[at], np.arange(len(noise))] += pairs
         return result
 
     def log_density_alone(self, reading: int) -> float:
@@ -209,25 +203,92 @@ class PeakLikelihood:
         width = errors.resolution[0] / errors.frequency[0] if errors.rounded[0] else 1.0
         return float(self.log_alone[at] - np.log(width))
 
-    def _assignments(self, there: Floats, noise: Floats) -> tuple[Rows, Assignments]:
-        """The modes in the order of each draw, an (n_modes, n_draws) array, and what the peaks say of them."""
-        modes = np.ascontiguousarray(np.argsort(there, axis=1).T)
-        missed = self._missed(there, noise)
-        ordered, lonely = (np.take_along_axis(np.ascontiguousarray(each.T), modes, axis=0) for each in (there, missed))
-        log_pair, log_alone = [], []
-        for order in self.orders:
-            own = self.errors.at(order.peaks).log_likelihood_of_each(ordered, noise)
-            own += np.take(self.log_prior[order.peaks] + order.log_sign, modes, axis=1)
-            log_pair.append(own)
-            log_alone.append(self.log_alone[order.peaks])
-        return modes, Assignments(tuple(log_pair), tuple(log_alone), lonely)
+    def _assignments(self, there: Floats, noise: Floats) -> tuple[Rows, Floats, Assignments]:
+        """What the peaks say of the modes in the order of each draw.
 
-    def _missed(self, there: Floats, noise: Floats) -> Floats:
-        """Probability that each mode left no peak: (n_draws, n_modes) array."""
+        Pairs that are near each other at no draw are left out.
+
+        Returns
+        -------
+        modes : (n_modes, n_draws) array of int, or (n_modes, 1) where all draws have one order
+            That order.
+        log_missed : (n_modes, n_draws) array
+            ln of the probability that each left no peak.
+        assignments : Assignments
+        """
+        log_missed = self._log_missed(there.T, noise)
+        modes = np.argsort(there[0])[:, None]
+        ordered, log_missed = there.T[modes[:, 0]], log_missed[modes[:, 0]]
+        is_near = self._most(ordered, log_missed, noise) + self._known[:, modes[:, 0]] > LOG_NOTHING
+        n_first = len(self.orders[0].peaks)
+        rows = [is_near[:n_first], is_near[n_first:]][: len(self.orders)]
+        by_row = [ordered[row.any(axis=0)] for row in rows]
+        if any((each[1:] < each[:-1]).any() for each in by_row):
+            # Where modes cross that have a row in common, each draw has its own order.
+            again = np.ascontiguousarray(np.argsort(ordered, axis=0, kind="stable"))
+            ordered, log_missed = (np.take_along_axis(each, again, axis=0) for each in (ordered, log_missed))
+            stands = np.zeros((len(modes), len(modes)), dtype=np.bool_)
+            stands[again, np.arange(len(modes))[:, None]] = True
+            is_near = (is_near @ stands) & (self._most(ordered, log_missed, noise) + self._known_at_most > LOG_NOTHING)
+            modes = modes[:, 0][again]
+        near = [Near.of(row) for row in (is_near[:n_first], is_near[n_first:])[: len(self.orders)]]
+        own, at = [], []
+        for row, each in enumerate(near):
+            peaks, places = each.pairs()
+            own += [row * n_first + peak for peak in peaks]
+            at += places
+        log_ratios = self.errors.log_likelihood_of_pairs(self._peaks[own], ordered[at], noise)
+        log_ratios += self._known[np.array(own, dtype=np.intp)[:, None], modes[at]]
+        log_ratios -= log_missed[at]
+        ratios = np.exp(np.maximum(log_ratios, LOG_NOTHING))
+        n_pairs = near[0].starts[-1]
+        return modes, log_missed, Assignments(near, [ratios[:n_pairs], ratios[n_pairs:]][: len(near)], self._unsigned)
+
+    def _most(self, ordered: Floats, log_missed: Floats, noise: Floats) -> Floats:
+        """The most that peaks say of modes at any draw, but for what is known beforehand: an (n_own, n_modes) array."""
+        most = self.errors.log_most(ordered.min(axis=1), ordered.max(axis=1), noise.min(), noise.max())
+        return np.asarray((most - log_missed.min(axis=1))[self._peaks])
+
+    def _log_missed(self, log_frequency: Floats, noise: Floats) -> Floats:
+        """ln of the probability that each mode left no peak, none of them infinite: (n_modes, n_draws) array.
+
+        Parameters
+        ----------
+        log_frequency : (n_modes, n_draws) array
+            ln f (Hz).
+        noise : (n_draws,) array
+        """
         from scipy.special import ndtr
 
-        sd = self.errors.sd(noise).mean(axis=1, keepdims=True)
-        return np.asarray(self.missed + (1.0 - self.missed) * ndtr((there - self.log_highest) / sd))
+        missed = np.repeat(self.missed[:, None], noise.size, axis=1)
+        sd = self.errors.sd(noise).mean(axis=1)
+        some = log_frequency.max(axis=1) > self.log_highest - _FAR_BELOW * sd.max()
+        missed[some] += (1.0 - missed[some]) * ndtr((log_frequency[some] - self.log_highest) / sd)
+        return np.asarray(np.log(np.maximum(missed, _LEAST_MISSED)))
+
+    @cached_property
+    def _peaks(self) -> Rows:
+        """Peaks of one order after the other."""
+        return np.concatenate([order.peaks for order in self.orders])
+
+    @cached_property
+    def _unsigned(self) -> list[tuple[int, int]]:
+        """Places of each peak of unknown sign in both orders."""
+        if len(self.orders) == 1:
+            return []
+        plus, minus = (order.peaks.tolist() for order in self.orders)
+        return [(plus.index(peak), minus.index(peak)) for peak in plus if peak in minus]
+
+    @cached_property
+    def _known(self) -> Floats:
+        """What is known of each pair beforehand, over the peak as no mode, one order after the other: ln of it."""
+        parts = [(self.log_prior - self.log_alone[:, None])[order.peaks] + order.log_sign for order in self.orders]
+        return np.concatenate(parts)
+
+    @cached_property
+    def _known_at_most(self) -> Floats:
+        """The most of it for any mode: an (n_own, 1) array."""
+        return np.asarray(self._known.max(axis=1, keepdims=True))
 
 
 def takes_part(setup: Setup) -> bool:
@@ -240,7 +301,7 @@ def _signs(setup: Setup, doubtful: Rows) -> list[str]:
 
 
 def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Order]:
-    """Those that may be of one sign, for every sign of the peaks of which it is not known; or all together."""
+    """Those that may be of one sign, peaks of which it is not known among both; or all together."""
     unsigned = np.flatnonzero(signs == 0)
     log_sign = np.zeros((3, n_modes))
     is_known = residues is not None and not np.isnan(residues).any()
@@ -248,13 +309,11 @@ def _orders(signs: Rows, n_modes: int, residues: Floats | None) -> Iterator[Orde
         with np.errstate(divide="ignore"):
             log_sign[[1, -1]] = np.log(sign_probabilities(residues))
     if unsigned.size > _MOST_UNSIGNED or unsigned.size == signs.size or not is_known:
-        yield Order(np.arange(signs.size), log_sign[signs], np.ones((1, signs.size), dtype=np.bool_))
+        yield Order(np.arange(signs.size), log_sign[signs])
         return
-    tried = np.repeat(signs[None], 2**unsigned.size, axis=0)
-    tried[:, unsigned] = list(product((1, -1), repeat=unsigned.size))
     for sign in (1, -1):
         own = np.flatnonzero((signs == sign) | (signs == 0))
-        yield Order(own, np.repeat(log_sign[sign][None], own.size, axis=0), tried[:, own] == sign)
+        yield Order(own, np.repeat(log_sign[sign][None], own.size, axis=0))
 
 
 def _log_labels(setup: Setup, readings: Rows, labels: Sequence[Label | None]) -> Floats:

@@ -128,27 +128,46 @@ class ReadingErrors:
         result[..., rounded] = self._density.log_between(low[..., rounded], high[..., rounded])
         return np.where(np.isnan(predicted), -np.inf, result)
 
-    def log_likelihood_of_each(self, predicted: Floats, noise: Floats) -> Floats:
-        """Logarithm of the probability of each reading if it were of each mode.
+    def log_likelihood_of_pairs(self, readings: NDArray[np.intp], predicted: Floats, noise: Floats) -> Floats:
+        """Logarithm of the probability of some readings, each if it were of the mode that it is paired with.
 
         Parameters
         ----------
-        predicted : (n_modes, n_draws) array
-            ln f (Hz).
+        readings : (n_pairs,) array of int
+        predicted : (n_pairs, n_draws) array
+            ln f (Hz) of their modes.
         noise : (n_draws,) array
 
         Returns
         -------
-        (n_readings, n_modes, n_draws) array
+        (n_pairs, n_draws) array
         """
-        scale = _join(noise, self.own_sd).T[:, None, :]
-        if not self.rounded.any():
-            z = (self.log_frequency[:, None, None] - predicted) / scale
-            return np.asarray(self._density.log(z) - np.log(scale))
-        n_modes, n_draws = predicted.shape
-        each = np.repeat(predicted.reshape(-1, 1), self.frequency.size, axis=1)
-        found = self.log_likelihood(each, np.tile(noise, n_modes))
-        return np.ascontiguousarray(found.T.reshape(-1, n_modes, n_draws))
+        if self.rounded.any():
+            return np.ascontiguousarray(self.at(readings).log_likelihood(predicted.T, noise).T)
+        scale = np.ascontiguousarray(_join(noise, self.own_sd).T)
+        z = self.log_frequency[readings, None] - predicted
+        z /= scale[readings]
+        return np.asarray(self._density.log(z) - np.log(scale)[readings])
+
+    def log_most(self, lowest: Floats, highest: Floats, least_noise: float, most_noise: float) -> Floats:
+        """The most that `log_likelihood_of_pairs` may be, or somewhat more, where it is known within ranges.
+
+        Parameters
+        ----------
+        lowest, highest : (n_modes,) array
+            ln f (Hz).
+        least_noise, most_noise : float
+
+        Returns
+        -------
+        (n_readings, n_modes) array
+        """
+        away = np.maximum(lowest - self.log_high[:, None], self.log_low[:, None] - highest)
+        z = np.maximum(away, 0.0) / _join(most_noise, self.own_sd)[:, None]
+        result = self._density.log(z) - np.log(_join(least_noise, self.own_sd))[:, None]
+        if self.rounded.any():  # the interval is a part of what lies beyond its nearer end, on either side
+            result[self.rounded] = np.log(2.0) + self._density.log_below(-z[self.rounded])
+        return np.asarray(result)
 
     def deviance_residuals(self, predicted: Floats, noise: ArrayLike) -> tuple[Floats, Floats]:
         """Signed roots of the deviances, and how they change with the prediction.
