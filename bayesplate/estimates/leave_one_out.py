@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict, most_likely, sensitivities
-from bayesplate.modes.threads import in_threads
+from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict
+from bayesplate.estimates.side_by_side import most_likely_of_each
 
 _FEWEST = 4
 
@@ -63,23 +63,14 @@ def prediction_errors(
         return misfit(predict(x))[0] ** 2
 
     squares = squared(starts)
-    whole = most_likely(predict, misfit, best(starts, squares), bounds)
+    (whole,) = most_likely_of_each(predict, misfit, best(starts, squares)[None], [()], bounds)
     in_sample = np.asarray(target - predict(whole[None, :])[0])
     left_out = np.full(target.size, np.nan)
     modes = [(reading,) for reading in range(target.size)] if modes is None else modes
     if len(modes) >= _FEWEST:
         starts, squares = (np.concatenate(both) for both in ((starts, whole[None]), (squares, squared(whole[None]))))
-        there = sensitivities(predict, whole)  # most of the fits begin here: its slopes are found once
-
-        def slopes(x: NDArray[np.float64]) -> NDArray[np.float64]:
-            return there if np.array_equal(x, whole) else sensitivities(predict, x)
-
-        def without(mode: list[int]) -> NDArray[np.float64]:
-            start = best(starts, np.delete(squares, mode, axis=1))
-            fitted = most_likely(predict, misfit, start, bounds, mode, slopes)
-            return np.asarray((target - predict(fitted[None, :])[0])[mode])
-
-        every = [list(mode) for mode in modes]
-        for mode, errors in zip(every, in_threads(without, every), strict=True):
-            left_out[mode] = errors
+        without = np.stack([best(starts, np.delete(squares, list(mode), axis=1)) for mode in modes])
+        fitted = most_likely_of_each(predict, misfit, without, modes, bounds)
+        for mode, predicted in zip(map(list, modes), predict(fitted), strict=True):
+            left_out[mode] = (target - predicted)[mode]
     return Errors(in_sample, left_out)

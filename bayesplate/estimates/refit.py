@@ -86,7 +86,6 @@ def most_likely(
     start: Floats,
     bounds: Bounds | None = None,
     left_out: Sequence[int] = (),
-    slopes: Callable[[Floats], Floats] | None = None,
 ) -> Floats:
     """Parameters that minimise the squares of a misfit.
 
@@ -101,8 +100,6 @@ def most_likely(
     bounds : Bounds, optional
     left_out : sequence of int, optional
         Readings that are not used.
-    slopes : callable, optional
-        What `sensitivities` finds at a point, where some of it is known already.
 
     Returns
     -------
@@ -111,14 +108,13 @@ def most_likely(
     from scipy.optimize import least_squares
 
     def without(rows: Floats) -> Floats:
-        return np.delete(rows, left_out, axis=0) if left_out else rows
+        return np.delete(rows, left_out, axis=0) if len(left_out) else rows
 
     def residuals(x: Floats) -> Floats:
         return np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[N_CONSTANTS:]])
 
     def jacobian(x: Floats) -> Floats:
-        found = sensitivities(predict, x) if slopes is None else slopes(x)
-        chained = misfit(predict(x[None, :])[0])[1][:, None] * found
+        chained = misfit(predict(x[None, :])[0])[1][:, None] * sensitivities(predict, x)
         return np.concatenate([without(chained), np.eye(x.size)[N_CONSTANTS:]])
 
     if bounds is None or bounds.are_open:

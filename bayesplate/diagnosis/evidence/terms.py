@@ -193,18 +193,18 @@ class Terms:
         log_mass = np.asarray(log_sum(log_densities))
         shares = np.exp(log_densities - log_mass)
         misses = self.fold.misses
-        by_cell = shares.reshape(self.noise.weights.size, self.table.n_cells, -1)
-        own = (residuals @ misses)[None, :] - (self.table.shift @ misses)[:, None]
-        total = (by_cell.sum(axis=0) * own).sum(axis=0)
+        by_cell = shares.reshape(self.noise.weights.size, self.table.n_cells, -1).sum(axis=0)
+        total = residuals @ misses * by_cell.sum(axis=0) - (self.table.shift @ misses) @ by_cell
         seen = residuals @ self.fold.blind.T
         rows = np.repeat(self._gains_without_cells[:, None], self.table.n_cells, axis=1)
         if self.table.slopes.shape[2] > 0:
             there = np.einsum("di,kip->kdp", self.fold.blind, self.table.slopes)
             along = np.einsum("i,kip->kp", misses, self.table.slopes) - np.einsum("lkd,kdp->lkp", rows, there)
             rows = rows + np.einsum("lkp,lkpd->lkd", along, self._gains)
-        offsets = np.einsum("lkd,kd->lk", rows, self.middles)
-        inside = np.einsum("lkd,nd->lkn", rows, seen) - offsets[:, :, None]
-        return log_mass, np.asarray(total - (by_cell * inside).sum(axis=(0, 1)))
+        # the mean over the terms first: what is told of each data set by every one of them would be a large array
+        inside = ((shares.T @ rows.reshape(len(shares), -1)) * seen).sum(axis=1)
+        inside -= np.einsum("lkd,kd->lk", rows, self.middles).ravel() @ shares
+        return log_mass, np.asarray(total - inside)
 
     @cached_property
     def _gains_without_cells(self) -> Floats:
