@@ -19,6 +19,8 @@ _STRAY = 0.3
 
 _SPARE = 3
 _MOST_MODES = 40
+_AHEAD = 12
+"""Modes beyond those that are asked for, where some turned out to be too few: to be solved for once more at most."""
 
 
 @dataclass(frozen=True)
@@ -159,21 +161,25 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
     # With as many modes as products a class has given all its names, and with more some modes would have none.
     most = {parity: len(products) for parity, products in plate.elastic_products.items()}
     counts = {p: min(n + _SPARE, most[p]) for p, n in _expected_ranks(plate, weights, names).items()}
-    found: dict[Beams, Found] = {}
+    solved: dict[Parity, ClassModes] = {}
+    places: dict[Beams, Place] = {}
     while counts:
-        solved = solve_classes(plate, weights, counts)
-        found = {name: one for name, one in found.items() if one.place.parity not in solved}
-        found |= _found(plate, solved, names)
-        lost = {plate.parity(n) for n in names if n not in found or found[n].place.correlation < _STRAY}
-        unsure = {plate.parity(n) for n in names if n in found and not found[n].place.is_certain}
+        short = {p: n for p, n in counts.items() if p not in solved or solved[p].eigenvalues.size < n}
+        solved |= solve_classes(plate, weights, {p: min(n + _AHEAD * (p in solved), most[p]) for p, n in short.items()})
+        places = {name: place for name, place in places.items() if place.parity not in counts}
+        for parity, n in counts.items():
+            places |= _places(plate, solved[parity].of(range(n)), names)
+        lost = {plate.parity(n) for n in names if n not in places or places[n].correlation < _STRAY}
+        unsure = {plate.parity(n) for n in names if n in places and not places[n].is_certain}
         counts = {
             p: min(n + 2 * _SPARE, most[p])
             for p, n in counts.items()
             if n < most[p] and (p in lost or (p in unsure and n < _MOST_MODES // len(plate.blocks)))
         }
-    missing = [name for name in names if name not in found]
+    missing = [name for name in names if name not in places]
     if missing:
         raise KeyError(missing)
+    found = _with_energies(solved, places)
     return {name: found[name] for name in names}
 
 
@@ -190,13 +196,19 @@ def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) 
     return {p: sum(bool(values[b] <= top) for b in plate.elastic_products[p]) for p, top in highest.items()}
 
 
-def _found(plate: PlateMatrices, solved: Mapping[Parity, ClassModes], names: Sequence[Beams]) -> dict[Beams, Found]:
-    """Those of the wanted names that some of the solved modes have."""
-    result = {}
+def _places(plate: PlateMatrices, modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
+    """Those of the wanted names that some of the lowest modes of a class have."""
+    parity = modes.block.parity
+    of_each = name_shapes(plate, modes.block.spread(modes.vectors), parity)
+    return {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}
+
+
+def _with_energies(solved: Mapping[Parity, ClassModes], places: Mapping[Beams, Place]) -> dict[Beams, Found]:
+    """The modes at some places."""
+    found = {}
     for parity, modes in solved.items():
-        of_each = name_shapes(plate, modes.block.spread(modes.vectors), parity)
-        places = {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}
-        stiffness, mass = modes.of([place.rank for place in places.values()]).coefficients()
-        for (name, place), k, m in zip(places.items(), stiffness, mass, strict=True):
-            result[name] = Found(place, modes.eigenvalues[place.rank], k, m)
-    return result
+        own = {name: place for name, place in places.items() if place.parity == parity}
+        energies = modes.of([place.rank for place in own.values()]).coefficients()
+        for (name, place), stiffness, mass in zip(own.items(), *energies, strict=True):
+            found[name] = Found(place, modes.eigenvalues[place.rank], stiffness, mass)
+    return found
