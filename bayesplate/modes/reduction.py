@@ -222,14 +222,14 @@ def _cheapest_first(
     every = np.eye(size)
     if size > max(WHOLE, 2 * n_condensed):
         turned, turn = _on_modes(whole, every, centre)
-        yield replace(turned, n_kept=n_condensed, is_condensed=True), turn
+        yield replace(turned, n_kept=n_condensed), turn
     if size > (_LARGE_PENCIL if len(whole.masses) else _LARGE):
         last = every[:, size - max(round(_SHARED * size), n_condensed) :]
         for part in [last, every] if len(whole.masses) else [every]:
             kept = [n for n in sorted({n_condensed, n_stepped}) if part.shape[1] > 2 * n]
             if kept:
                 turned, turn = _on_modes(whole, part, centre)
-                yield from ((replace(turned, n_kept=n), turn) for n in kept)
+                yield from ((replace(turned, n_kept=n, n_steps=1), turn) for n in kept)
             elif part is last:
                 yield _turned(whole, part), part
     yield whole, every
