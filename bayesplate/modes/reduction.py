@@ -29,9 +29,11 @@ _HARDLY_MORE = 1.1
 _BEYOND = 10
 """Modes above the wanted ones that are kept from it."""
 _LARGE, _LARGE_PENCIL = 80, 60
-"""Vectors from which on a step from the modes at the centre pays, without and with masses."""
+"""Vectors from which on steps from the modes at the centre pay, without and with masses."""
 _SHARED = 2 / 3
 """Share of them that is tried before the whole: the last ones, which are what the modes have most in common."""
+_STEPS = 1, 2
+"""How many are tried, each with fewer and with more vectors kept."""
 
 
 def reduced_order_model(
@@ -229,7 +231,7 @@ def _cheapest_first(
             kept = [n for n in sorted({n_condensed, n_stepped}) if part.shape[1] > 2 * n]
             if kept:
                 turned, turn = _on_modes(whole, part, centre)
-                yield from ((replace(turned, n_kept=n, n_steps=1), turn) for n in kept)
+                yield from ((replace(turned, n_kept=n, n_steps=steps), turn) for steps in _STEPS for n in kept)
             elif part is last:
                 yield _turned(whole, part), part
     yield whole, every
