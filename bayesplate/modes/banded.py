@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.definite import lapack
+from bayesplate.modes.lapack import lapack
 
 Floats = NDArray[np.float64]
 

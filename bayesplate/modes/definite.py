@@ -1,47 +1,86 @@
 """Equations and eigenvalues with positive definite matrices, many at once, in half the operations of any others.
 
 `scipy.linalg.solve` of many at once takes as long as `numpy.linalg.solve`, which does not use that they are definite,
-`scipy.linalg.eigh` takes pencils one by one, and `scipy.linalg.lapack` keeps Python's lock while it computes, so that
-threads would wait for one another. The addresses of LAPACK's functions, which SciPy hands out to compiled code, are
-called through ctypes, which gives the lock away.
+and `scipy.linalg.eigh` takes pencils one by one.
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from functools import lru_cache
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.lapack import lapack
+
 Floats = NDArray[np.float64]
 
 
-def definite_solutions(matrices: Floats, loads: Floats) -> Floats:
-    """Solve A x = b for each matrix by its Cholesky factors.
+def packed(matrices: Floats) -> Floats:
+    """The lower triangles of symmetric matrices, each folded to a rectangle without gaps.
+
+    Sums of matrices are the sums of their triangles, at half of the operations. LAPACK computes with them at full
+    speed in this form (Gustavson and others, ACM Transactions on Mathematical Software 37, 2010, 18).
 
     Parameters
     ----------
-    matrices : (n_draws, r, r) array
-        Symmetric.
-    loads : (n_draws, r, n) array
+    matrices : (n, r, r) array
 
     Returns
     -------
-    (n_draws, r, n) array
-        Not a number where a matrix is not positive definite.
+    (n, r (r + 1) / 2) array
     """
-    r, n = loads.shape[1:]
-    factors = np.array(matrices, order="C")  # LAPACK writes over them
-    solutions = np.array(np.swapaxes(loads, 1, 2), order="C")  # and over these, column by column
-    size, n_loads = (ctypes.byref(ctypes.c_int(number)) for number in (r, n))
-    fault, solve = ctypes.c_int(), lapack("dposv")
-    for i, (factor, solution) in enumerate(zip(_addresses(factors), _addresses(solutions), strict=True)):
-        solve(b"L", size, n_loads, factor, size, solution, size, ctypes.byref(fault))
+    r = matrices.shape[-1]
+    whole = np.array(matrices, order="C")
+    triangles = np.empty((len(whole), r * (r + 1) // 2))
+    size, fault, pack = ctypes.byref(ctypes.c_int(r)), ctypes.c_int(), lapack("dtrttf")
+    for matrix, triangle in zip(_addresses(whole), _addresses(triangles), strict=True):
+        pack(b"N", b"L", size, matrix, size, triangle, ctypes.byref(fault))
+    return triangles
+
+
+def order(triangles: Floats) -> int:
+    """Rows of each matrix that is packed, r of r (r + 1) / 2 numbers."""
+    return (math.isqrt(8 * triangles.shape[-1] + 1) - 1) // 2
+
+
+def factorise(triangles: Floats) -> None:
+    """Write Cholesky factors over packed matrices, and no numbers where one is not positive definite.
+
+    Parameters
+    ----------
+    triangles : (n_draws, r (r + 1) / 2) array
+        One behind the other in memory.
+    """
+    size, fault, factorise_one = ctypes.byref(ctypes.c_int(order(triangles))), ctypes.c_int(), lapack("dpftrf")
+    for i, triangle in enumerate(_addresses(triangles)):
+        factorise_one(b"N", b"L", size, triangle, ctypes.byref(fault))
         if fault.value:
-            solutions[i] = np.nan
-    return np.swapaxes(solutions, 1, 2)
+            triangles[i] = np.nan
+
+
+def solutions(factors: Floats, loads: Floats) -> Floats:
+    """Solve A x = b for each matrix by its factors.
+
+    Parameters
+    ----------
+    factors : (n_draws, r (r + 1) / 2) array
+        What `factorise` wrote.
+    loads : (n_draws, n, r) array
+        Each row a right-hand side.
+
+    Returns
+    -------
+    (n_draws, n, r) array
+        Each row a solution; not numbers where a matrix is not positive definite.
+    """
+    found = np.array(loads, order="C")  # LAPACK writes over it
+    size, n_loads = (ctypes.byref(ctypes.c_int(number)) for number in (loads.shape[2], loads.shape[1]))
+    fault, solve = ctypes.c_int(), lapack("dpftrs")
+    for factor, solution in zip(_addresses(factors), _addresses(found), strict=True):
+        solve(b"N", b"L", size, n_loads, factor, solution, size, ctypes.byref(fault))
+    return found
 
 
 def definite_pencil_values(forms: Floats, definite: Floats) -> Floats:
@@ -77,31 +116,3 @@ def definite_pencil_values(forms: Floats, definite: Floats) -> Floats:
 def _addresses(matrices: Floats) -> range:
     first, step = matrices.ctypes.data, matrices.strides[0]
     return range(first, first + len(matrices) * step, step)
-
-
-_ARGUMENTS = {
-    "dpbtrf": "sppppp",
-    "dpbtrs": "spppppppp",
-    "dposv": "sppppppp",
-    "dpotrf": "spppp",
-    "dsygst": "pspppppp",
-}
-"""Strings and pointers of the functions of LAPACK, in their order: everything is given by reference.
-
-dposv(uplo, n, nrhs, a, lda, b, ldb, info), dpotrf(uplo, n, a, lda, info), dsygst(itype, uplo, n, a, lda, b, ldb, info);
-dpbtrf(uplo, n, kd, ab, ldab, info), dpbtrs(uplo, n, kd, nrhs, ab, ldab, b, ldb, info).
-"""
-
-
-@lru_cache(maxsize=len(_ARGUMENTS))
-def lapack(name: str) -> Callable[..., None]:
-    """A function of LAPACK that gives Python's lock away while it computes."""
-    from scipy.linalg import cython_lapack
-
-    name_of = ctypes.PYFUNCTYPE(ctypes.c_char_p, ctypes.py_object)(("PyCapsule_GetName", ctypes.pythonapi))
-    of_capsule = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)
-    pointer_of = of_capsule(("PyCapsule_GetPointer", ctypes.pythonapi))
-    capsule = cython_lapack.__pyx_capi__[name]
-    kinds = {"s": ctypes.c_char_p, "p": ctypes.c_void_p}
-    function = ctypes.CFUNCTYPE(None, *[kinds[one] for one in _ARGUMENTS[name]])
-    return function(pointer_of(capsule, name_of(capsule)))

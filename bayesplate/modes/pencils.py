@@ -8,11 +8,10 @@ the centre are near those of every draw already. Let each take along, of every o
 that first-order perturbation gives, omega_i^2 = K_ii / M_ii of the draw; the Ritz values on the modes so corrected are
 those of the whole basis to the fourth order of the perturbation, at a quarter of the cost of all its eigenvalues.
 
-Where the draws lie too far from the centre for that, as with shear moduli that are known to a factor only, one step of
-inverse iteration from the same modes goes further: x = K^-1 M x_centre, which asks for one solution of equations
+Where the draws lie too far from the centre for that, as with shear moduli that are known to a factor only, one or two
+steps of inverse iteration from the same modes go further: x = K^-1 M x_centre, which asks for solutions of equations
 instead of all eigenvalues, and spans those wanted the better, the more modes beyond them take part (Bathe and Wilson,
-Numerical Methods in Finite Element Analysis, 1976, chapter 12). Where the mass is one, K^-1 on the first vectors spans
-what they do with all others following them statically (Guyan, AIAA Journal 3, 1965, 380), at half of the operations.
+Numerical Methods in Finite Element Analysis, 1976, chapter 12).
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.definite import definite_pencil_values, definite_solutions
+from bayesplate.modes.definite import definite_pencil_values, factorise, order, solutions
 
 Floats = NDArray[np.float64]
 
@@ -55,12 +54,20 @@ def _flexibility(stiffness: Floats, mass: Floats, shift: Floats | float) -> tupl
     The stiffness is factorised and not the mass, for shear strains have no mass. Third, which draws are a material: of
     the others both matrices are one.
     """
-    factors, is_material = _factors(stiffness + shift * mass)
-    inverse = np.linalg.inv(factors)
+    inverse, is_material = _inverse_factors(stiffness + shift * mass)
     across = np.swapaxes(inverse, -1, -2)
     flexibility = inverse @ mass @ across
     flexibility[~is_material] = np.eye(stiffness.shape[-1])
     return across, flexibility, is_material
+
+
+def _inverse_factors(matrices: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Inverses of Cholesky factors, and of which draws: those of a matrix that is not positive definite are one.
+
+    On their rows the matrix is one; each is a combination of the vectors up to its own.
+    """
+    factors, is_material = _factors(matrices)
+    return np.asarray(np.linalg.inv(factors), dtype=np.float64), is_material
 
 
 def _factors(matrices: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -143,32 +150,39 @@ def condensed_eigenvalues(stiffness: Floats, mass: Floats | None, n_kept: int, n
     return pencil_eigenvalues(small_stiffness, small_mass, quotients[:, :, n_rigid, None])
 
 
-def stepped_eigenvalues(stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int) -> Floats:
-    """Eigenvalues on the first vectors after one step of inverse iteration, increasing.
+def stepped_eigenvalues(triangles: Floats, mass: Floats | None, n_kept: int, n_steps: int) -> Floats:
+    """Eigenvalues on the first vectors after steps of inverse iteration, increasing.
 
     Parameters
     ----------
-    stiffness, mass, n_kept, n_rigid
-        As of `condensed_eigenvalues`.
+    triangles : (n_draws, r (r + 1) / 2) array
+        Stiffness that no motion leaves at zero, packed (`bayesplate.modes.definite`), on a basis whose first vectors
+        are near the modes; factors are written over it.
+    mass : (n_draws, r, r) array or None
+        None where the basis is orthonormal in the mass.
+    n_kept : int
+        How many of the first vectors are kept.
+    n_steps : int
+        At least one.
 
     Returns
     -------
     (n_draws, n_kept) array, s^-2
         Never below the eigenvalues on the whole basis; not a number where the weights are those of no material.
     """
-    step = _step(stiffness, mass, n_kept, n_rigid)
-    return pencil_eigenvalues(step.shifted, step.mass, 0.0) - step.shift[:, 0]
+    step = _stepped(triangles, mass, n_kept, n_steps)
+    return pencil_eigenvalues(step.stiffness, step.mass, 0.0)
 
 
 def stepped_modes(
-    stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int, n_modes: int
+    triangles: Floats, mass: Floats | None, n_kept: int, n_steps: int, n_modes: int
 ) -> tuple[Floats, Floats]:
-    """The lowest modes from the first vectors after one step of inverse iteration.
+    """The lowest modes from the first vectors after steps of inverse iteration.
 
     Parameters
     ----------
-    stiffness, mass, n_kept, n_rigid
-        As of `condensed_eigenvalues`.
+    triangles, mass, n_kept, n_steps
+        As of `stepped_eigenvalues`.
     n_modes : int
         Not more than are kept.
 
@@ -177,42 +191,31 @@ def stepped_modes(
     values, vectors
         As of `pencil_modes`.
     """
-    step = _step(stiffness, mass, n_kept, n_rigid)
-    values, vectors = pencil_modes(step.shifted, step.mass, 0.0, n_modes)
-    return values - step.shift[:, 0], step.vectors @ vectors
+    step = _stepped(triangles, mass, n_kept, n_steps)
+    values, turned = pencil_modes(step.stiffness, step.mass, 0.0, n_modes)
+    return values, np.swapaxes(step.rows, -1, -2) @ turned
 
 
-class _Step(NamedTuple):
-    """Vectors after a step, (n_draws, r, n_kept); shifted stiffness and mass on them; the shift, (n_draws, 1, 1)."""
+class _Stepped(NamedTuple):
+    """Vectors after steps, each a row of (n_draws, n_kept, r); stiffness and mass on them."""
 
-    vectors: Floats
-    shifted: Floats
+    rows: Floats
+    stiffness: Floats
     mass: Floats
-    shift: Floats
 
 
-def _step(stiffness: Floats, mass: Floats | None, n_kept: int, n_rigid: int) -> _Step:
-    if mass is None:
-        return _step_of_one(stiffness, n_kept, n_rigid)
-    # The shift is the draw's own, so that eigenvalues are homogeneous in the stiffness.
-    shift = np.asarray(stiffness[:, n_rigid, n_rigid] / mass[:, n_rigid, n_rigid])[:, None, None]
-    loads = mass[:, :, :n_kept]
-    vectors = definite_solutions(stiffness + shift * mass, loads)
-    lengths = np.sqrt((vectors**2).sum(axis=1, keepdims=True))
-    vectors, loads = vectors / lengths, loads / lengths
-    across = np.swapaxes(vectors, -1, -2)
-    return _Step(vectors, across @ loads, across @ (mass @ vectors), shift)
-
-
-def _step_of_one(stiffness: Floats, n_kept: int, n_rigid: int) -> _Step:
-    """The same where the mass is one: the others follow the first vectors as the shifted stiffness moves them."""
-    kept, rest = slice(None, n_kept), slice(n_kept, None)
-    shift = np.asarray(stiffness[:, n_rigid, n_rigid])[:, None, None]
-    one, others = np.eye(n_kept), np.eye(stiffness.shape[-1] - n_kept)
-    followed = -definite_solutions(stiffness[:, rest, rest] + shift * others, stiffness[:, rest, kept])
-    shifted = stiffness[:, kept, kept] + shift * one + stiffness[:, kept, rest] @ followed
-    vectors = np.concatenate([np.broadcast_to(one, (len(stiffness), n_kept, n_kept)), followed], axis=1)
-    return _Step(vectors, shifted, one + np.swapaxes(followed, -1, -2) @ followed, shift)
+def _stepped(triangles: Floats, mass: Floats | None, n_kept: int, n_steps: int) -> _Stepped:
+    r = order(triangles)
+    loads = np.broadcast_to(np.eye(n_kept, r), (len(triangles), n_kept, r)) if mass is None else mass[:, :n_kept]
+    factorise(triangles)
+    rows = solutions(triangles, loads)
+    for _ in range(n_steps - 1):
+        # Each vector is freed of those before it; otherwise all of them would turn to the lowest modes.
+        inverse, _ = _inverse_factors(rows @ np.swapaxes(loads, -1, -2))
+        loads = inverse @ (rows if mass is None else rows @ mass)
+        rows = solutions(triangles, loads)
+    moved = rows if mass is None else rows @ mass
+    return _Stepped(rows, rows @ np.swapaxes(loads, -1, -2), moved @ np.swapaxes(rows, -1, -2))
 
 
 def _with_followers(matrix: Floats, followed: Floats, n_kept: int) -> Floats:

@@ -7,10 +7,12 @@ its diagonal at the centre is the linear law. `bayesplate.modes.reduction` build
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.definite import packed
 from bayesplate.modes.naming import Place, name_parts
 from bayesplate.modes.pencils import (
     condensed_eigenvalues,
@@ -52,8 +54,8 @@ class ReducedBlock:
     n_kept : int
         Where it is not 0, the basis is the block's modes at the centre in the order of their frequencies, and the
         modes of each draw are found from so many of them (`bayesplate.modes.pencils`).
-    is_condensed : bool
-        Whether they take all others along to first order; otherwise they go one step of inverse iteration.
+    n_steps : int
+        Steps of inverse iteration that they go; where it is 0, they take all others along to first order instead.
     """
 
     parity: Parity
@@ -64,12 +66,12 @@ class ReducedBlock:
     n_rigid: int = 0
     shift: float = 1.0
     n_kept: int = 0
-    is_condensed: bool = False
+    n_steps: int = 0
 
     def eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
         """Elastic eigenvalues of many draws, increasing: (n_draws, n) array, s^-2.
 
-        All r - n_rigid of them, or n_kept - n_rigid where the others are condensed.
+        All r - n_rigid of them, or n_kept - n_rigid.
         """
         is_large = self.stiffness.shape[-1] > WHOLE
         starts = _starts(len(weights.stiffness)) if is_large else range(0, max(len(weights.stiffness), 1), _SMALL_BATCH)
@@ -78,18 +80,20 @@ class ReducedBlock:
         return np.concatenate(found)
 
     def _eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
-        stiffness = _weighted(weights.stiffness, self.stiffness)
-        mass = _weighted(weights.mass, self.masses) if len(self.masses) else None
-        if self.n_kept and not self.is_condensed:
-            values = stepped_eigenvalues(stiffness, mass, self.n_kept, self.n_rigid)
-        elif self.n_kept:
-            values = condensed_eigenvalues(stiffness, mass, self.n_kept, self.n_rigid)
-        elif mass is None:
-            values = np.asarray(np.linalg.eigvalsh(stiffness), dtype=np.float64)
+        if self.n_kept and self.n_steps:
+            shift, triangles, mass = self._shifted(weights)
+            values = stepped_eigenvalues(triangles, mass, self.n_kept, self.n_steps) - shift
         else:
-            values = pencil_eigenvalues(stiffness, mass, self.shift)
+            stiffness = _weighted(weights.stiffness, self.stiffness)
+            mass = _weighted(weights.mass, self.masses) if len(self.masses) else None
+            if self.n_kept:
+                values = condensed_eigenvalues(stiffness, mass, self.n_kept, self.n_rigid)
+            elif mass is None:
+                values = np.asarray(np.linalg.eigvalsh(stiffness), dtype=np.float64)
+            else:
+                values = pencil_eigenvalues(stiffness, mass, self.shift)
         values = values[:, self.n_rigid :]
-        return np.asarray(values / weights.mass[:, :1] if mass is None else values)
+        return np.asarray(values if len(self.masses) else values / weights.mass[:, :1])
 
     def modes(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest elastic modes of many draws: (n_draws, n) eigenvalues, s^-2, and (n_draws, r, n) vectors.
@@ -98,12 +102,35 @@ class ReducedBlock:
         no plate.
         """
         n_wanted = min(n_modes + self.n_rigid, self.stiffness.shape[-1])
-        pencil = _weighted(weights.stiffness, self.stiffness), self.mass(weights)
-        if self.n_kept >= n_wanted and not self.is_condensed:
-            values, vectors = stepped_modes(*pencil, self.n_kept, self.n_rigid, n_wanted)
+        if self.n_kept >= n_wanted and self.n_steps:
+            shift, triangles, mass = self._shifted(weights)
+            values, vectors = stepped_modes(triangles, mass, self.n_kept, self.n_steps, n_wanted)
+            values -= shift
+            if not len(self.masses):
+                values, vectors = values / weights.mass[:, :1], vectors / np.sqrt(weights.mass[:, :1, None])
         else:
-            values, vectors = pencil_modes(*pencil, self.shift, n_wanted)
+            stiffness = _weighted(weights.stiffness, self.stiffness)
+            values, vectors = pencil_modes(stiffness, self.mass(weights), self.shift, n_wanted)
         return values[:, self.n_rigid :], vectors[:, :, self.n_rigid :]
+
+    def _shifted(self, weights: Weights) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]:
+        """What lifts rigid motions off zero at many draws, (n_draws, 1) in s^-2; the stiffness so lifted, packed; mass.
+
+        The shift is the draw's own, so that eigenvalues are homogeneous in the stiffness.
+        """
+        lowest = self.n_rigid
+        stiffness = weights.stiffness @ self.stiffness[:, lowest, lowest, None]
+        if not len(self.masses):
+            return stiffness, np.hstack([weights.stiffness, stiffness]) @ self._triangles, None
+        shift = stiffness / (weights.mass @ self.masses[:, lowest, lowest, None])
+        shifted = np.hstack([weights.stiffness, shift * weights.mass]) @ self._triangles
+        return shift, shifted, _weighted(weights.mass, self.masses)
+
+    @cached_property
+    def _triangles(self) -> NDArray[np.float64]:
+        """The stiffness terms and then the masses, packed: (n_terms + n_masses, r (r + 1) / 2) array."""
+        masses = self.masses if len(self.masses) else np.eye(self.stiffness.shape[-1])[None]
+        return np.concatenate([packed(terms) for terms in (self.stiffness, masses)])
 
     def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
         """Which of the lowest elastic modes each of `products` names, with at least that correlation, at many draws.

@@ -30,9 +30,11 @@ _HARDLY_MORE = 1.1
 _BEYOND = 10
 """Modes above the wanted ones that are kept from it."""
 _LARGE, _LARGE_PENCIL = 80, 60
-"""Vectors from which on a step from the modes at the centre pays, without and with masses."""
+"""Vectors from which on steps from the modes at the centre pay, without and with masses."""
 _SHARED = 2 / 3
 """Share of them that is tried before the whole: the last ones, which are what the modes have most in common."""
+_STEPS = 1, 2
+"""How many are tried, each with fewer and with more vectors kept."""
 
 
 def reduced_order_model(
@@ -232,14 +234,14 @@ def _cheapest_first(
     every = np.eye(size)
     if size > max(WHOLE, 2 * n_condensed):
         turned, turn = _on_modes(whole, every, centre)
-        yield replace(turned, n_kept=n_condensed, is_condensed=True), turn
+        yield replace(turned, n_kept=n_condensed), turn
     if size > (_LARGE_PENCIL if len(whole.masses) else _LARGE):
         last = every[:, size - max(round(_SHARED * size), n_condensed) :]
         for part in [last, every] if len(whole.masses) else [every]:
             kept = [n for n in sorted({n_condensed, n_stepped}) if part.shape[1] > 2 * n]
             if kept:
                 turned, turn = _on_modes(whole, part, centre)
-                yield from ((replace(turned, n_kept=n), turn) for n in kept)
+                yield from ((replace(turned, n_kept=n, n_steps=steps), turn) for steps in _STEPS for n in kept)
             elif part is last:
                 yield _turned(whole, part), part
     yield whole, every

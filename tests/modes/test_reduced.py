@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import ritz
 from bars import meets
+from scipy.linalg import eigh
 
 from bayesplate.frequencies.laws import ExactLaw, LinearLaw
 from bayesplate.modes import reduction
@@ -191,6 +192,38 @@ def test_of_a_large_basis_too_however_many_they_are(n_draws):
     found = block.eigenvalues(Weights(weights, np.ones((n_draws, 1))))
     alone = [np.linalg.eigvalsh(np.tensordot(one, stiffness, axes=1)) for one in weights]
     np.testing.assert_allclose(found, np.reshape(alone, (n_draws, WHOLE + 1)), rtol=1e-10)
+
+
+@pytest.mark.parametrize("n_steps", [1, 2])
+@pytest.mark.parametrize("with_masses", [True, False])
+@pytest.mark.parametrize("r", [10, 11])
+def test_steps_with_all_vectors_kept_find_every_mode_of_each_draw(r, with_masses, n_steps):
+    """As scipy does one by one. A rigid motion is in the basis, so that the stiffness alone cannot be factorised."""
+    rng = np.random.default_rng(4)
+    forms = rng.standard_normal((2, 3, r, 2 * r))
+    stiffness, masses = forms @ np.swapaxes(forms, 2, 3)
+    stiffness[:, 0], stiffness[:, :, 0] = 0.0, 0.0
+    block = ReducedBlock(
+        Parity(0, 0),
+        stiffness,
+        masses if with_masses else np.empty((0, r, r)),
+        np.zeros((r, 0)),
+        (),
+        n_rigid=1,
+        n_kept=r,
+        n_steps=n_steps,
+    )
+    weights = Weights(rng.uniform(0.5, 2.0, (4, 3)), rng.uniform(0.5, 2.0, (4, 3 if with_masses else 1)))
+    values, vectors = block.modes(weights, r - 1)
+    for draw, found in enumerate(block.eigenvalues(weights)):
+        one = weights.at(draw)
+        whole = np.tensordot(one.stiffness, stiffness, axes=1)
+        mass = np.tensordot(one.mass, masses, axes=1) if with_masses else one.mass * np.eye(r)
+        expected = eigh(whole, mass, eigvals_only=True)[1:]
+        np.testing.assert_allclose(found, expected, rtol=1e-10)
+        np.testing.assert_allclose(values[draw], expected, rtol=1e-10)
+        np.testing.assert_allclose(vectors[draw].T @ mass @ vectors[draw], np.eye(r - 1), atol=1e-10)
+        np.testing.assert_allclose(whole @ vectors[draw], mass @ vectors[draw] * expected, atol=1e-8 * expected[-1])
 
 
 @pytest.mark.parametrize("name", WANTED)
