@@ -32,7 +32,11 @@ def one_thread_each() -> Iterator[None]:
         yield
 
 
-def in_threads(compute: Callable[[Part], Result], parts: Sequence[Part] | NDArray[Any]) -> list[Result]:
+def in_threads(
+    compute: Callable[[Part], Result],
+    parts: Sequence[Part] | NDArray[Any],
+    tell: Callable[[float], None] | None = None,
+) -> list[Result]:
     """What comes of each part, in their order.
 
     Worker processes share the cores between them already, and have one thread each.
@@ -42,15 +46,21 @@ def in_threads(compute: Callable[[Part], Result], parts: Sequence[Part] | NDArra
     compute : callable
         Spends its time in compiled code. Where it calls this function again its parts follow one another.
     parts : sequence or (n_parts, ...) array
+    tell : callable, optional
+        Told, by the thread that calls this function, which share of the parts is done.
 
     Returns
     -------
     list
     """
     is_part = hasattr(_local, "is_part") or multiprocessing.parent_process() is not None
-    if is_part or len(parts) < 2 or _n_cores() < 2:
-        return [compute(part) for part in parts]
-    return list(_pool().map(compute, parts))
+    is_alone = is_part or len(parts) < 2 or _n_cores() < 2
+    found = []
+    for result in map(compute, parts) if is_alone else _pool().map(compute, parts):
+        found.append(result)
+        if tell is not None:
+            tell(len(found) / len(parts))
+    return found
 
 
 def _n_cores() -> int:

@@ -17,6 +17,7 @@ from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.diagnosis.shifts.tables import Table
+from bayesplate.modes.threads import in_threads
 from bayesplate.planning.station_laws import BareLaw, SolvedStation
 from bayesplate.plate.material import RIGIDITIES
 
@@ -154,7 +155,9 @@ def _lagrange(at: Floats, value: Floats) -> Floats:
 
 def form_shift(found: Found, candidate: Candidate, nodes: Nodes, law: BareLaw) -> FormShift:
     """Solve a form at its nodes in a station; not a number where a mode cannot be followed."""
-    by_cell = {int(cell): _beside(found, candidate.fine, nodes.form, int(cell), law) for cell in nodes.cells}
+    cells = nodes.cells.tolist()
+    solved = in_threads(lambda cell: _beside(found, candidate.fine, nodes.form, cell, law), cells)
+    by_cell = dict(zip(cells, solved, strict=True))
     at, beside = [], []
     for j, cells in enumerate(nodes.along):
         at.append(np.asarray(nodes.form.free[j].prior.value(candidate.fine.z[cells, j])))

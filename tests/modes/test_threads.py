@@ -42,6 +42,13 @@ def test_parts_come_back_in_their_order_from_other_threads():
     assert in_threads(name_of, range(1)) == [threading.current_thread().name]
 
 
+@pytest.mark.parametrize("n_parts", [1, 4])
+def test_the_calling_thread_is_told_what_is_done(n_parts):
+    told = []
+    in_threads(name_of, range(n_parts), lambda share: told.append((share, threading.current_thread().name)))
+    assert told == [((i + 1) / n_parts, threading.current_thread().name) for i in range(n_parts)]
+
+
 def test_parts_of_a_part_stay_in_its_thread():
     """Otherwise all threads would wait for parts that no thread is left for."""
     for names in in_threads(names_within, range(8)):

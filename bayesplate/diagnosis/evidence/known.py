@@ -23,6 +23,7 @@ from bayesplate.estimates.refit import normal_misfit, refit
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
+from bayesplate.modes.threads import in_threads
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.sessions import same_modes
@@ -81,7 +82,7 @@ def known_fits(
     laws : dict of FormLaw
         Of effects that were solved already, by name.
     tell : callable, optional
-        Told after every fit which share of them is done.
+        Told which share of the fits is done.
 
     Returns
     -------
@@ -89,22 +90,24 @@ def known_fits(
         The board as it stands first.
     """
     known, own = computable(problem.board), stated(problem.board)
-    n_fits = 1 + len(known) + (len(known) > 1) + len(own)
-    found: list[KnownFit] = []
+    alone: list[tuple[tuple[str, ...], tuple[str, ...], Models]] = [((), (), problem.posterior.models)]
+    alone += [((name,), (), laws[name].models if name in laws else ()) for name in known]
+    alone += [((), (name,), ()) for name in own]
+    n_fits = len(alone) + (len(known) > 1)
 
-    def add(one: KnownFit) -> KnownFit:
-        found.append(one)
+    def reached(share: float) -> None:
         if tell is not None:
-            tell(len(found) / n_fits)
-        return one
+            tell(share * len(alone) / n_fits)
 
-    first = add(known_fit(problem, solved=problem.posterior.models)).log_rigidities
-    each = [add(known_fit(problem, (name,), solved=laws[name].models if name in laws else ())) for name in known]
+    fits = in_threads(lambda one: known_fit(problem, one[0], one[1], solved=one[2]), alone, reached)
+    first, each, without = fits[0], fits[1 : 1 + len(known)], fits[1 + len(known) :]
+    together = []
     if len(known) > 1:
-        add(known_fit(problem, known, start=first + sum(one.log_rigidities - first for one in each)))
-    for name in own:
-        add(known_fit(problem, without=(name,)))
-    return tuple(found)
+        start = first.log_rigidities + sum(one.log_rigidities - first.log_rigidities for one in each)
+        together = [known_fit(problem, known, start=start)]
+        if tell is not None:
+            tell(1.0)
+    return (first, *each, *together, *without)
 
 
 def computable(board: Board) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve
 from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate, traced_shift
+from bayesplate.modes.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -181,7 +182,7 @@ def prepare_search(
     tried : sequence of str, optional
         Effects to try; by default all that are not declared and can act.
     tell : callable, optional
-        Told after every effect which share of them is done.
+        Told which share of the effects is done.
 
     Returns
     -------
@@ -189,15 +190,13 @@ def prepare_search(
         Without effects that leave no plate, whatever their size.
     """
     solve = form_law if solve is None else solve
-    candidates = {}
     every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
-    for n_done, (name, each) in enumerate(every.items(), start=1):
-        laws = tuple(solve(baseline, form).placed(baseline) for form in each)
-        one = _candidate(baseline, name, laws)
-        if one.fine.n_cells and one.coarse.n_cells:
-            candidates[name] = one
-        if tell is not None:
-            tell(n_done / len(every))
+
+    def candidate(name: str) -> Candidate:
+        return _candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in every[name]))
+
+    made = in_threads(candidate, list(every), tell)
+    candidates = {one.name: one for one in made if one.fine.n_cells and one.coarse.n_cells}
     ground = Ground(baseline, candidates, ())
     fine = {name: one.fine for name, one in candidates.items()}
     coarse = {name: one.coarse for name, one in candidates.items()}
