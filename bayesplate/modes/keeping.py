@@ -32,21 +32,29 @@ def kept(most_bytes: int, size: Callable[[Found], int]) -> Callable[[Callable[Gi
 
     def decorate(find: Callable[Given, Found]) -> Callable[Given, Found]:
         results: OrderedDict[Hashable, tuple[Found, int]] = OrderedDict()
+        sought: dict[Hashable, threading.Lock] = {}
         lock = threading.Lock()
 
         @wraps(find)
         def found(*args: Given.args, **kwargs: Given.kwargs) -> Found:
             key = (args, tuple(sorted(kwargs.items())))
             with lock:
-                if key in results:
-                    results.move_to_end(key)
-                    return results[key][0]
-            result = find(*args, **kwargs)
-            with lock:
-                results[key] = (result, size(result))
-                while len(results) > 1 and sum(one for _, one in results.values()) > most_bytes:
-                    results.popitem(last=False)
-            return result
+                this_one = sought.setdefault(key, threading.Lock())
+            try:
+                with this_one:  # what another thread is finding is waited for
+                    with lock:
+                        if key in results:
+                            results.move_to_end(key)
+                            return results[key][0]
+                    result = find(*args, **kwargs)
+                    with lock:
+                        results[key] = (result, size(result))
+                        while len(results) > 1 and sum(one for _, one in results.values()) > most_bytes:
+                            results.popitem(last=False)
+                    return result
+            finally:
+                with lock:
+                    sought.pop(key, None)
 
         return found
 

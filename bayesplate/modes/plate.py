@@ -204,10 +204,14 @@ class Block:
 
         Row by row of whole terms, of which each nearly cancels; triangles alone would lose a digit.
         """
-        found = np.zeros((len(terms), vectors.shape[1]))
-        for rows, columns, places in self.panels:
-            found += np.einsum("trv,rv->tv", terms[:, places] @ vectors[columns], vectors[rows])
-        return found
+
+        def of(panels: Sequence[Panel]) -> NDArray[np.float64]:
+            found = np.zeros((len(terms), vectors.shape[1]))
+            for rows, columns, places in panels:
+                found += np.einsum("trv,rv->tv", terms[:, places] @ vectors[columns], vectors[rows])
+            return found
+
+        return np.asarray(sum(in_threads(of, [self.panels[::2], self.panels[1::2]])))
 
     def project_masses(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """All mass terms on the span of vectors, the projected ones last."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -41,6 +45,29 @@ def test_one_that_is_larger_than_all_that_is_kept_is_still_kept_alone(made):
     assert array(500) is large
     array(10)
     assert asked == [10, 500, 10]
+
+
+def test_what_another_thread_is_finding_is_waited_for():
+    asked: list[int] = []
+    begun = threading.Event()
+
+    @kept(1000, lambda _: 1)
+    def slow(number: int) -> list[int]:
+        asked.append(number)
+        begun.set()
+        time.sleep(0.2)
+        if len(asked) == 1:
+            raise ValueError("the first time")
+        return [number]
+
+    with ThreadPoolExecutor(3) as pool:
+        first = pool.submit(slow, 7)
+        assert begun.wait(10)
+        others = [pool.submit(slow, 7) for _ in range(2)]
+        with pytest.raises(ValueError, match="the first time"):
+            first.result(10)
+        assert others[0].result(10) is others[1].result(10)
+    assert asked == [7, 7]
 
 
 def test_a_plate_is_assembled_once_for_two_boards_of_one_shape():
