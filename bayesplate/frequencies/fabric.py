@@ -14,8 +14,8 @@ from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.frequencies.terms import along_grain
 from bayesplate.modes.fields import EdgeStrip, Fabric, Field, Group, layout
 from bayesplate.modes.plate import Weights
-from bayesplate.modes.shear import shear_groups
-from bayesplate.modes.thin import thin_groups
+from bayesplate.modes.shear import SHEAR_FLEXIBLE
+from bayesplate.modes.thin import THIN
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
 
@@ -95,7 +95,7 @@ def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values
     rest = [others.get(_fields(joined), np.zeros(1)) for joined in varying["along"]]
     counts = {group: len(made) for group, made in weights.items()}
     is_turned = any(effect.turns_grain for effect in effects)
-    groups = thin_groups(is_turned) if theory == "thin" else shear_groups(is_turned)
+    groups = (THIN if theory == "thin" else SHEAR_FLEXIBLE).groups(is_turned)
 
     def stiffness(term: int, k: int) -> Floats:
         own, group = whole.stiffness[:, term], groups[0][term]

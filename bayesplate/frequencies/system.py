@@ -15,13 +15,14 @@ from bayesplate.effects.base import Effect, Mass, ProjectedMass, Stiffness, Theo
 from bayesplate.frequencies.fabric import fabric_of, over_fields
 from bayesplate.frequencies.shear_terms import shear_term_weights
 from bayesplate.frequencies.terms import term_weights
+from bayesplate.modes.energies import assembled_plate
 from bayesplate.modes.hermite import Hold, Holds
 from bayesplate.modes.keeping import kept
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.modes.plate import PlateMatrices, Weights
-from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, assemble_shear_flexible
-from bayesplate.modes.thin import assemble
+from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
+from bayesplate.modes.thin import THIN
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.setup import Ends, Setup
@@ -176,7 +177,7 @@ def _assembled(
     added = contributions_of(effects)
     stiffness = tuple(one.matrix(x, y) for one in added.stiffness)
     masses = tuple(one.matrix(x, y) for one in added.masses)
-    return (assemble_shear_flexible if is_sheared else assemble)(x, y, stiffness, masses, fabric_of(effects))
+    return assembled_plate(SHEAR_FLEXIBLE if is_sheared else THIN, x, y, stiffness, masses, fabric_of(effects))
 
 
 def _held(ends: Ends, effects: tuple[Effect, ...]) -> Holds:

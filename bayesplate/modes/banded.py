@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.lapack import lapack
+from bayesplate.modes.lapack import integers, lapack
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class BandFactor:
         self._columns = np.zeros((band.order.size, band.width + 1))
         self._columns.ravel()[band.at] = stored
         fault = ctypes.c_int()
-        n, width, height = (_integer(k) for k in (band.order.size, band.width, band.width + 1))
+        n, width, height = integers(band.order.size, band.width, band.width + 1)
         lapack("dpbtrf")(b"L", n, width, self._columns.ctypes.data, height, ctypes.byref(fault))
         if fault.value or not np.isfinite(self._columns[-1, 0]):
             raise np.linalg.LinAlgError("the matrix is not positive definite")
@@ -76,15 +76,10 @@ class BandFactor:
         order = self.band.order
         by_load = np.ascontiguousarray(loads[order].T)  # LAPACK writes over it, column by column
         fault = ctypes.c_int()
-        n, width, height = (_integer(k) for k in (order.size, self.band.width, self.band.width + 1))
+        n, width, height, n_loads = integers(order.size, self.band.width, self.band.width + 1, len(by_load))
         lapack("dpbtrs")(
-            b"L", n, width, _integer(len(by_load)), self._columns.ctypes.data, height, by_load.ctypes.data, n,
-            ctypes.byref(fault),
-        )  # fmt: skip
+            b"L", n, width, n_loads, self._columns.ctypes.data, height, by_load.ctypes.data, n, ctypes.byref(fault)
+        )
         solutions = np.empty_like(loads)
         solutions[order] = by_load.T
         return solutions
-
-
-def _integer(number: int) -> ctypes._CArgObject:
-    return ctypes.byref(ctypes.c_int(number))

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.lapack import lapack
+from bayesplate.modes.lapack import integers, lapack
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def packed(matrices: Floats) -> Floats:
     r = matrices.shape[-1]
     whole = np.array(matrices, order="C")
     triangles = np.empty((len(whole), r * (r + 1) // 2))
-    size, fault, pack = ctypes.byref(ctypes.c_int(r)), ctypes.c_int(), lapack("dtrttf")
+    (size,), fault, pack = integers(r), ctypes.c_int(), lapack("dtrttf")
     for matrix, triangle in zip(_addresses(whole), _addresses(triangles), strict=True):
         pack(b"N", b"L", size, matrix, size, triangle, ctypes.byref(fault))
     return triangles
@@ -53,7 +53,7 @@ def factorise(triangles: Floats) -> None:
     triangles : (n_draws, r (r + 1) / 2) array
         One behind the other in memory.
     """
-    size, fault, factorise_one = ctypes.byref(ctypes.c_int(order(triangles))), ctypes.c_int(), lapack("dpftrf")
+    (size,), fault, factorise_one = integers(order(triangles)), ctypes.c_int(), lapack("dpftrf")
     for i, triangle in enumerate(_addresses(triangles)):
         factorise_one(b"N", b"L", size, triangle, ctypes.byref(fault))
         if fault.value:
@@ -76,7 +76,7 @@ def solutions(factors: Floats, loads: Floats) -> Floats:
         Each row a solution; not numbers where a matrix is not positive definite.
     """
     found = np.array(loads, order="C")  # LAPACK writes over it
-    size, n_loads = (ctypes.byref(ctypes.c_int(number)) for number in (loads.shape[2], loads.shape[1]))
+    size, n_loads = integers(loads.shape[2], loads.shape[1])
     fault, solve = ctypes.c_int(), lapack("dpftrs")
     for factor, solution in zip(_addresses(factors), _addresses(found), strict=True):
         solve(b"N", b"L", size, n_loads, factor, solution, size, ctypes.byref(fault))
@@ -99,7 +99,7 @@ def definite_pencil_values(forms: Floats, definite: Floats) -> Floats:
         Not a number where B is not positive definite.
     """
     factors, reduced = np.array(definite, order="C"), np.array(forms, order="C")
-    size, kind = (ctypes.byref(ctypes.c_int(number)) for number in (factors.shape[1], 1))
+    size, kind = integers(factors.shape[1], 1)
     fault, factorise, reduce = ctypes.c_int(), lapack("dpotrf"), lapack("dsygst")
     is_definite = np.ones(len(factors), dtype=np.bool_)
     for i, (factor, form) in enumerate(zip(_addresses(factors), _addresses(reduced), strict=True)):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.element import ORDERS, LineProducts, line_places
-from bayesplate.modes.fields import Fabric, Group, Measure, layout
+from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.hermite import end_products, products
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import Block, EdgeTurn, KronSum, Parity, PlateMatrices, Term, count_rigid
@@ -62,6 +62,10 @@ Functions = Mapping[str, Any]
 """Functions along one side by name, as columns of a sparse array on those of the free line."""
 
 
+Groups = tuple[tuple[Group, ...], tuple[Group, ...]]
+"""Of each stiffness and of each mass term."""
+
+
 class Kinematics(NamedTuple):
     """How a plate deforms.
 
@@ -74,6 +78,8 @@ class Kinematics(NamedTuple):
         How the cross-sections turn along x and along y.
     functions : callable
         From a line and the parity of a class to the class's functions along that side.
+    groups : callable
+        From whether the grain runs at an angle to the group of each of the plate's own stiffness and mass terms.
     """
 
     fields: Fields
@@ -81,6 +87,7 @@ class Kinematics(NamedTuple):
     masses: tuple[Strains, ...]
     turns: Strains
     functions: Callable[[Line, int], Functions]
+    groups: Callable[[bool], Groups]
 
 
 def deflected(side: Line, parity: int) -> Any:
@@ -130,31 +137,29 @@ class _Integrals:
 
 def assembled_plate(
     kinematics: Kinematics,
-    groups: tuple[Sequence[Group], Sequence[Group]],
     x: Line,
     y: Line,
-    stiffness: Sequence[Term],
-    masses: Sequence[KronSum],
-    fabric: Fabric,
+    stiffness: Sequence[Term] = (),
+    masses: Sequence[KronSum] = (),
+    fabric: Fabric = UNIFORM,
 ) -> PlateMatrices:
     """A plate on two lines, class by class.
 
     Parameters
     ----------
     kinematics : Kinematics
-    groups : (sequence of Group, sequence of Group)
-        Of each of the plate's own stiffness and mass terms; the fabric repeats them in the order of
-        `bayesplate.modes.fields.layout`.
     x, y : Line
         Unsplit along a side on which a further term is not symmetric.
     stiffness, masses : sequence of Term, sequence of KronSum
         Further terms; they come after the plate's own.
     fabric : Fabric
+        Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`.
 
     Returns
     -------
     PlateMatrices
     """
+    groups = kinematics.groups(fabric.is_turned)
     measures = fabric.measures({*groups[0], *groups[1]}, x, y)
     counts = {group: len(made) for group, made in measures.items()}
 

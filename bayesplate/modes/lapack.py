@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 _ARGUMENTS = {
     "dpbtrf": "sppppp",
@@ -39,3 +40,8 @@ def lapack(name: str) -> Callable[..., None]:
     kinds = {"s": ctypes.c_char_p, "p": ctypes.c_void_p}
     function = ctypes.CFUNCTYPE(None, *[kinds[one] for one in _ARGUMENTS[name]])
     return function(pointer_of(capsule, name_of(capsule)))
+
+
+def integers(*numbers: int) -> list[Any]:
+    """Numbers as these functions take them, by reference."""
+    return [ctypes.byref(ctypes.c_int(number)) for number in numbers]

@@ -16,14 +16,13 @@ is nothing to lock.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
-from bayesplate.modes.energies import Derivative, Functions, Kinematics, Piece, assembled_plate, deflected
-from bayesplate.modes.fields import UNIFORM, Fabric, Group
+from bayesplate.modes.energies import Derivative, Functions, Groups, Kinematics, Piece, assembled_plate, deflected
+from bayesplate.modes.fields import Group
 from bayesplate.modes.hermite import even_and_odd, kept_unknowns, slopes_as_values
 from bayesplate.modes.line import Line, line
-from bayesplate.modes.plate import KronSum, PlateMatrices, Term
+from bayesplate.modes.plate import PlateMatrices
 from bayesplate.modes.thin import THIN_TERMS, thin_groups
 from bayesplate.plate.setup import Ends
 
@@ -72,13 +71,24 @@ def _functions(side: Line, parity: int) -> Functions:
     return {"deflected": of_deflection, "strained": strained, "tied": value_from_slope @ of_deflection}
 
 
-_SHEAR_FLEXIBLE = Kinematics(
+def shear_groups(is_turned: bool = False) -> Groups:
+    """Group of each stiffness and of each mass term that is the shear-flexible plate's own.
+
+    Where the grain runs at an angle, the terms that couple bending with twist and the two shear strains come last.
+    """
+    bending, _ = thin_groups(is_turned)
+    own, coupling = bending[: len(THIN_TERMS)], bending[len(THIN_TERMS) :]
+    strains: tuple[Group, ...] = ("shear",) if is_turned else ()
+    return (*own, "shear", "shear", *coupling, *strains), ("mass", "rotary", "rotary")
+
+
+SHEAR_FLEXIBLE = Kinematics(
     fields={
         "w": (Piece("w", "deflected", "deflected"),),
         "g_x": (Piece("g_x", "strained", "deflected"), Piece("w", "tied", "deflected")),
         "g_y": (Piece("g_y", "deflected", "strained"), Piece("w", "deflected", "tied")),
     },
-    # The last three couple.
+    # The last three are there where the grain runs at an angle.
     stiffnesses=(
         (_BEND_X, _BEND_X),
         (_BEND_Y, _BEND_Y),
@@ -93,6 +103,7 @@ _SHEAR_FLEXIBLE = Kinematics(
     masses=((_DEFLECTION, _DEFLECTION), (_TURN_X, _TURN_X), (_TURN_Y, _TURN_Y)),
     turns=(_TURN_X, _TURN_Y),
     functions=_functions,
+    groups=shear_groups,
 )
 
 
@@ -120,41 +131,5 @@ def shear_flexible_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> Plat
     ----------
     Reissner (1945) and Mindlin (1951); the shear strains as unknowns in place of the turning: Endo and Kimura (2007).
     """
-    return assemble_shear_flexible(line(ends_x, n_x, is_sheared=True), line(ends_y, n_y, is_sheared=True))
-
-
-def assemble_shear_flexible(
-    x: Line,
-    y: Line,
-    stiffness: Sequence[Term] = (),
-    masses: Sequence[KronSum] = (),
-    fabric: Fabric = UNIFORM,
-) -> PlateMatrices:
-    """The shear-flexible plate on two sheared lines, joined by further terms.
-
-    Parameters
-    ----------
-    x, y : Line
-        Unsplit along a side on which a further term is not symmetric.
-    stiffness : sequence of Term
-    masses : sequence of KronSum
-        Further terms; they come after the plate's own.
-    fabric : Fabric
-        Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`.
-
-    Returns
-    -------
-    PlateMatrices
-    """
-    return assembled_plate(_SHEAR_FLEXIBLE, shear_groups(fabric.is_turned), x, y, stiffness, masses, fabric)
-
-
-def shear_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
-    """Group of each stiffness and of each mass term that is the shear-flexible plate's own.
-
-    Where the grain runs at an angle, the terms that couple bending with twist and the two shear strains come last.
-    """
-    bending, _ = thin_groups(is_turned)
-    own, coupling = bending[: len(THIN_TERMS)], bending[len(THIN_TERMS) :]
-    strains: tuple[Group, ...] = ("shear",) if is_turned else ()
-    return (*own, "shear", "shear", *coupling, *strains), ("mass", "rotary", "rotary")
+    x, y = (line(ends, n, is_sheared=True) for ends, n in ((ends_x, n_x), (ends_y, n_y)))
+    return assembled_plate(SHEAR_FLEXIBLE, x, y)

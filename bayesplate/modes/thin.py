@@ -7,15 +7,14 @@ with K_xx = int w_xx^2, K_yy = int w_yy^2, K_mix = 2 int w_xx w_yy (the 2 is ins
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
-from bayesplate.modes.energies import Derivative, Kinematics, Piece, assembled_plate, deflected
-from bayesplate.modes.fields import UNIFORM, Fabric, Floats, Group, Outline
+from bayesplate.modes.energies import Derivative, Groups, Kinematics, Piece, assembled_plate, deflected
+from bayesplate.modes.fields import Fabric, Floats, Outline
 from bayesplate.modes.line import Line, line
-from bayesplate.modes.plate import Beams, KronSum, PlateMatrices, Term
+from bayesplate.modes.plate import Beams, KronSum, PlateMatrices
 from bayesplate.plate.setup import Ends
 
 THIN_TERMS = ("xx", "yy", "mix", "xy")
@@ -28,9 +27,18 @@ _BEND_Y = (Derivative(1.0, "w", 0, 2),)
 _TWIST = (Derivative(1.0, "w", 1, 1),)
 _TWICE_TWIST = (Derivative(2.0, "w", 1, 1),)
 
-_THIN = Kinematics(
+
+def thin_groups(is_turned: bool = False) -> Groups:
+    """Group of each stiffness and of each mass term that is the thin plate's own.
+
+    Where the grain runs at an angle, the modulus along it has a part in every term.
+    """
+    return (("along",) * 6 if is_turned else ("along", "bending", "bending", "bending")), ("mass",)
+
+
+THIN = Kinematics(
     fields={"w": (Piece("w", "deflected", "deflected"),)},
-    # The last two couple bending with twist.
+    # The last two, 4 int w_xx w_xy and 4 int w_yy w_xy, are there where the grain runs at an angle.
     stiffnesses=(
         (_BEND_X, _BEND_X),
         (_BEND_Y, _BEND_Y),
@@ -42,6 +50,7 @@ _THIN = Kinematics(
     masses=((_DEFLECTION, _DEFLECTION),),
     turns=(_SLOPE_X, _SLOPE_Y),
     functions=lambda side, parity: {"deflected": deflected(side, parity)},
+    groups=thin_groups,
 )
 
 
@@ -65,15 +74,7 @@ def thin_plate(ends_x: Ends, ends_y: Ends, n_x: int, n_y: int) -> PlateMatrices:
     ----------
     Ducceschi et al., eq. (1) and (2), as energies.
     """
-    return assemble(line(ends_x, n_x), line(ends_y, n_y))
-
-
-def thin_groups(is_turned: bool = False) -> tuple[tuple[Group, ...], tuple[Group, ...]]:
-    """Group of each stiffness and of each mass term that is the thin plate's own.
-
-    Where the grain runs at an angle, the modulus along it has a part in every term.
-    """
-    return (("along",) * 6 if is_turned else ("along", "bending", "bending", "bending")), ("mass",)
+    return assembled_plate(THIN, line(ends_x, n_x), line(ends_y, n_y))
 
 
 def within_outline(x: Line, y: Line, a: Beams, b: Beams, outline: Outline | None) -> KronSum:
@@ -90,30 +91,3 @@ def mean_deflections(x: Line, y: Line, deflections: Floats, outline: Outline | N
     """Integrals over the unit square, or what an outline leaves of it, of (n, n_dof_x, n_dof_y) deflections: (n,)."""
     measure = Fabric(outline=outline).inside(x, y)
     return np.asarray(sum(np.einsum("i,kij,j->k", x.load(a), deflections, y.load(b)) for a, b in measure))
-
-
-def assemble(
-    x: Line,
-    y: Line,
-    stiffness: Sequence[Term] = (),
-    masses: Sequence[KronSum] = (),
-    fabric: Fabric = UNIFORM,
-) -> PlateMatrices:
-    """The thin plate on two lines, joined by further terms.
-
-    Parameters
-    ----------
-    x, y : Line
-        Unsplit along a side on which a further term is not symmetric.
-    stiffness : sequence of Term
-    masses : sequence of KronSum
-        Further terms; they come after the plate's own.
-    fabric : Fabric
-        Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`: the four of
-        `THIN_TERMS`, then 4 int w_xx w_xy and 4 int w_yy w_xy where the grain runs at an angle.
-
-    Returns
-    -------
-    PlateMatrices
-    """
-    return assembled_plate(_THIN, thin_groups(fabric.is_turned), x, y, stiffness, masses, fabric)

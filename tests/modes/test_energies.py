@@ -7,11 +7,12 @@ import pytest
 from scipy.sparse import csr_array
 
 from bayesplate.modes.element import gauss_points, hermite_functions
+from bayesplate.modes.energies import assembled_plate
 from bayesplate.modes.fields import Fabric, layout
 from bayesplate.modes.line import line
 from bayesplate.modes.plate import EdgeTurn
-from bayesplate.modes.shear import assemble_shear_flexible, shear_groups
-from bayesplate.modes.thin import assemble, thin_groups, within_outline
+from bayesplate.modes.shear import SHEAR_FLEXIBLE
+from bayesplate.modes.thin import THIN, within_outline
 
 FREE = ("free", "free")
 GROUPS = ("along", "bending", "shear", "mass", "rotary")
@@ -100,7 +101,7 @@ def test_terms_are_sums_over_points(is_sheared, outline):
     # A mass at one place, and one that couples unknowns far from one another.
     rows = (x.shapes(np.array([0.3])), y.shapes(np.array([0.8])) - y.shapes(np.array([0.1])))
     at_a_place = tuple(csr_array(row.T @ row) for row in rows)
-    plate = (assemble_shear_flexible if is_sheared else assemble)(x, y, further, ((at_a_place,),), fabric)
+    plate = assembled_plate(SHEAR_FLEXIBLE if is_sheared else THIN, x, y, further, ((at_a_place,),), fabric)
     (block,) = plate.blocks
 
     sums = Sums(x, y, ["w", "g_x", "g_y"] if is_sheared else ["w"])
@@ -115,7 +116,7 @@ def test_terms_are_sums_over_points(is_sheared, outline):
         return (1.0 - ghost) * inside + ghost * sums.integral(*term, *whole)
 
     terms = [*BENDING, *SHEARS, *COUPLING, (2, SHEAR_X, SHEAR_Y)] if is_sheared else [*BENDING, *COUPLING]
-    groups = (shear_groups if is_sheared else thin_groups)(is_turned=True)
+    groups = (SHEAR_FLEXIBLE if is_sheared else THIN).groups(True)
     counts = {group: len(one) for group, one in field.items()}
     expected = [own(terms[i], groups[0][i], field[groups[0][i]][k], 1e-5) for i, k in layout(groups[0], counts)]
     expected.append(sums.integral(1, DEFLECTION, DEFLECTION, at_x, at_y, weights))

@@ -11,15 +11,16 @@ import ritz
 from bars import meets
 from scipy.linalg import eigh
 
+from bayesplate.modes.energies import assembled_plate
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
 from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import (
     SHEAR_ELEMENTS_PER_SIDE,
+    SHEAR_FLEXIBLE,
     SHEAR_MASSES,
     SHEAR_TERMS,
-    assemble_shear_flexible,
     shear_flexible_plate,
 )
 from bayesplate.modes.solve import solve
@@ -118,7 +119,7 @@ def unsplit(n_x=6, n_y=5):
     """A plate without held edges and without classes: the unknowns of w, g_x and g_y are those of the two lines."""
     free = ("free", "free")
     x, y = (line(free, n, is_sheared=True, is_split=False) for n in (n_x, n_y))
-    (block,) = assemble_shear_flexible(x, y).blocks
+    (block,) = assembled_plate(SHEAR_FLEXIBLE, x, y).blocks
     return x, y, block
 
 

@@ -11,10 +11,11 @@ import ritz
 from bars import meets
 from scipy.linalg import eigh
 
+from bayesplate.modes.energies import assembled_plate
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.modes.plate import Weights
-from bayesplate.modes.shear import assemble_shear_flexible
+from bayesplate.modes.shear import SHEAR_FLEXIBLE
 from bayesplate.modes.solve import solve, solve_class
 from bayesplate.modes.thin import thin_plate
 
@@ -260,7 +261,7 @@ def test_free_plate_answers_for_its_rounding_alone(projected):
     one move by 5e-3.
     """
     side = line(("free", "free"), 8, is_sheared=True, is_split=False)
-    plate = assemble_shear_flexible(side, side).with_projected(projected)
+    plate = assembled_plate(SHEAR_FLEXIBLE, side, side).with_projected(projected)
     mass = np.array([1.0, 1e-4, 1e-4, *(0.3 for _ in projected)])
     weights = Weights(np.array([1.0, 0.1, 0.05, 0.3, 4e3, 2e2]), mass)
     modes = solve(plate, weights, 6)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,24 +91,22 @@ def known_fits(
         The board as it stands first.
     """
     known, own = computable(problem.board), stated(problem.board)
-    alone: list[tuple[tuple[str, ...], tuple[str, ...], Models]] = [((), (), problem.posterior.models)]
-    alone += [((name,), (), laws[name].models if name in laws else ()) for name in known]
-    alone += [((), (name,), ()) for name in own]
-    n_fits = len(alone) + (len(known) > 1)
+    fits = [partial(known_fit, problem, solved=problem.posterior.models)]
+    fits += [partial(known_fit, problem, (name,), solved=laws[name].models if name in laws else ()) for name in known]
+    fits += [partial(known_fit, problem, without=(name,)) for name in own]
+    n_fits = len(fits) + (len(known) > 1)
 
-    def reached(share: float) -> None:
+    def reached(n_done: float) -> None:
         if tell is not None:
-            tell(share * len(alone) / n_fits)
+            tell(n_done / n_fits)
 
-    fits = in_threads(lambda one: known_fit(problem, one[0], one[1], solved=one[2]), alone, reached)
-    first, each, without = fits[0], fits[1 : 1 + len(known)], fits[1 + len(known) :]
-    together = []
+    found = in_threads(lambda fit: fit(), fits, lambda share: reached(share * len(fits)))
     if len(known) > 1:
-        start = first.log_rigidities + sum(one.log_rigidities - first.log_rigidities for one in each)
-        together = [known_fit(problem, known, start=start)]
-        if tell is not None:
-            tell(1.0)
-    return (first, *each, *together, *without)
+        first, *each = (one.log_rigidities for one in found[: 1 + len(known)])
+        together = known_fit(problem, known, start=first + sum(one - first for one in each))
+        found.insert(1 + len(known), together)
+        reached(n_fits)
+    return tuple(found)
 
 
 def computable(board: Board) -> tuple[str, ...]:
