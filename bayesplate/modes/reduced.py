@@ -154,12 +154,14 @@ class ReducedBlock:
 
         The ratio of their weighted sums is omega^2 to second order around the draw.
         """
-        vectors = self.modes(weights, n_modes)[1][0]
-        stiffness = np.einsum("ri,trs,si->it", vectors, self.stiffness, vectors, optimize=True)
+        vectors = self.modes(weights, n_modes)[1][0].T
+        products = (vectors[:, :, None] * vectors[:, None, :]).reshape(len(vectors), -1)
+        flat = (terms.reshape(len(terms), products.shape[1]) for terms in (self.stiffness, self.masses))
+        stiffness, masses = (products @ terms.T for terms in flat)
         if len(self.masses):
-            return stiffness, np.einsum("ri,trs,si->it", vectors, self.masses, vectors, optimize=True)
+            return stiffness, masses
         first = np.eye(weights.mass.shape[1])[:1]
-        return stiffness, (vectors**2).sum(axis=0)[:, None] * first
+        return stiffness, (vectors**2).sum(axis=1)[:, None] * first
 
     def mass(self, weights: Weights) -> NDArray[np.float64]:
         """Mass matrices of many draws on the basis: (n_draws, r, r) array."""

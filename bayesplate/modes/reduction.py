@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,15 +116,18 @@ def _reduce(
         vectors = _orthonormal(block, rigid, elastic, first, training[0], is_steady)
         # A basis and a way to use it are judged by the stiffness at these points alone; its terms follow in the end.
         whole = _projected(plate, block, vectors, stiffness @ block.terms, rigid.shape[1], first, is_steady)
-        checked = Weights(*(w[n_joined:-1] for w in seen))
-        ways = list(_tried(whole, seen.at(-1), checked, exact[n_joined:], accepted_cents))
-        if ways[-1].cents <= accepted_cents:
-            best = ways[-1]
+        checked, against = Weights(*(w[n_joined:-1] for w in seen)), exact[n_joined:]
+        cents = _worst_cents(whole, checked, against)
+        if cents <= accepted_cents:
             break
-    else:
-        # Where the basis itself is not that good, the first way that adds hardly anything to its error will do.
-        best = next((way for way in ways if way.cents <= _HARDLY_MORE * ways[-1].cents), ways[-1])
-    return replace(best.block, stiffness=block.project(block.terms, vectors @ best.turn)), best.cents
+    # Where the basis itself is not that good, the first way that adds hardly anything to its error will do.
+    bar = accepted_cents if cents <= accepted_cents else _HARDLY_MORE * cents
+    for way in _cheapest_first(whole, seen.at(-1), n_modes):
+        cents = _worst_cents(way[0], checked, against)
+        if cents <= bar:
+            break
+    used, turn = way
+    return replace(used, stiffness=block.project(block.terms, vectors @ turn)), cents
 
 
 def _of_plates(
@@ -201,25 +203,10 @@ def _projected(
     return ReducedBlock(block.parity, stiffness, masses, named, tuple(parts), n_rigid, first)
 
 
-class _Way(NamedTuple):
-    """A way to use a basis: the block, what turns the basis to its vectors, and its error where it was checked."""
-
-    block: ReducedBlock
-    turn: NDArray[np.float64]
-    cents: float
-
-
-def _tried(
-    whole: ReducedBlock, centre: Weights, checked: Weights, exact: NDArray[np.float64], accepted_cents: float
-) -> Iterator[_Way]:
-    """Ways to use a basis, the cheapest first, up to one that is accepted: against the eigenvalues of full solves."""
-    n_modes = exact.shape[1]
-    for block, turn in _cheapest_first(whole, centre, n_modes):
-        ratios = block.eigenvalues(checked)[:, :n_modes] / exact
-        cents = 600.0 * float(np.abs(np.log2(ratios)).max())
-        yield _Way(block, turn, cents)
-        if cents <= accepted_cents:
-            return
+def _worst_cents(block: ReducedBlock, checked: Weights, exact: NDArray[np.float64]) -> float:
+    """Largest error against (n_points, n_modes) eigenvalues of full solves."""
+    ratios = block.eigenvalues(checked)[:, : exact.shape[1]] / exact
+    return 600.0 * float(np.abs(np.log2(ratios)).max())
 
 
 def _cheapest_first(

@@ -169,10 +169,12 @@ def _beside(found: Found, table: Table, form: Form, cell: int, law: BareLaw) -> 
     """What a form does in one cell, less what the linear law of the constants says: (n,) array."""
     baseline = found.ground.baseline
     sizes = {free.name: np.asarray(free.prior.value(table.z[cell, j])) for j, free in enumerate(form.free)}
-    constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities + table.moved[cell]), strict=True))
     exact = {name: np.asarray(q.mean) for name, q in form.board.inputs.items() if q.is_exact}
-    there = {**exact, **baseline.values, **sizes, **constants}
-    shift = SolvedStation.of(law.station, form.board, there).bare_and_added - law.solved
+    constants = (np.exp(baseline.log_rigidities + moved) for moved in (table.moved[cell], 0.0))
+    there, meshed = (
+        {**exact, **baseline.values, **sizes, **dict(zip(RIGIDITIES, each, strict=True))} for each in constants
+    )
+    shift = SolvedStation.of(law.station, form.board, there, meshed).bare_and_added - law.solved
     shift[0] -= law.slopes[:, : len(RIGIDITIES)] @ table.moved[cell]
     shift[:, np.abs(shift[0]) > _TOO_FAR] = np.nan
     return np.asarray(shift.ravel())

@@ -53,11 +53,15 @@ class SolvedStation:
     share: float
 
     @classmethod
-    def of(cls, station: Station, board: Board, values: Values) -> SolvedStation:
-        """Solve a station of a board with its effects."""
+    def of(cls, station: Station, board: Board, values: Values, meshed: Values | None = None) -> SolvedStation:
+        """Solve a station of a board with its effects.
+
+        On the mesh for other values where these are given, whose matrices then serve again.
+        """
         system = station.system(board)
         there = station.values(system, values)
-        modes, named = spectrum(system, there, SEARCHED)
+        plate = None if meshed is None else system.plate(station.values(system, meshed))
+        modes, named = spectrum(system, there, SEARCHED, plate)
         at = {one.label: i for i, one in enumerate(named)}
         length_x, length_y = vibrating_lengths(there, station.setup)
         vibrating = density(there) * there["thickness"] * length_x * length_y
