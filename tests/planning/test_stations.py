@@ -65,6 +65,20 @@ def test_of_a_mode_that_has_lost_its_name_nothing_is_told(free):
     np.testing.assert_array_equal(lost.bare_and_added[:, 1:], found.bare_and_added[:, 1:])
 
 
+def test_on_the_mesh_for_other_values_the_matrices_serve_again_and_the_modes_are_the_same(free):
+    here = values()
+    there = {**here, "D_x": 2.0 * here["D_x"]}
+    first, own, again = (
+        SolvedStation.of(free[0], board(FREE), at, meshed)
+        for at, meshed in ((here, None), (there, None), (there, here))
+    )
+    terms = [one.modes.plate.blocks[0].terms for one in (first, own, again)]
+    assert terms[2] is terms[0]
+    assert terms[1].shape != terms[0].shape
+    np.testing.assert_allclose(again.bare_and_added, own.bare_and_added, atol=5e-4)  # a cent
+    assert np.abs(again.bare_and_added - first.bare_and_added).max() > 0.1
+
+
 def test_of_several_sessions_only_the_last_goes_on():
     made = board(FREE)
     days = [replace(made.setups[0], name=name) for name in ("monday", "friday", "sunday")]
