@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from bayesplate.results.contract import Constants, Elastic
+from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,8 @@ class CheckReport:
     invisible : str
         What no frequencies can show.
     identifiability, notes : tuple of str
+    n_doubts : int
+        How many of the notes, the first ones, put a reading or a constant in doubt.
     """
 
     name: str
@@ -111,6 +113,7 @@ class CheckReport:
     invisible: str
     identifiability: tuple[str, ...]
     notes: tuple[str, ...]
+    n_doubts: int = field(default=0, metadata=NOT_IN_JSON)
 
     def __repr__(self) -> str:
         told = ", ".join(f"{name} ± {percent:.1f} %" for name, percent in self.expected_sd_percent.items())

@@ -37,7 +37,7 @@ class CheckResult(CheckReport):
         Posed: `fit` takes it as it is.
     """
 
-    problem: Problem = field(metadata=NOT_IN_JSON, compare=False)
+    problem: Problem = field(metadata=NOT_IN_JSON, compare=False, kw_only=True)
 
     @property
     def summary(self) -> CheckReport:
@@ -136,6 +136,7 @@ def check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
         invisible=INVISIBLE,
         identifiability=tuple(remarks(board, found)),
         notes=(*problem.doubts, *board.notes),
+        n_doubts=len(problem.doubts),
         problem=given,
     )
 

@@ -80,15 +80,22 @@ def show_check(report: CheckReport | CampaignCheck) -> Shown:
     """The report of `bayesplate.workflow.check.check` for a person."""
     if isinstance(report, CampaignCheck):
         return _show_campaign_check(report)
-    closing = f"{report.law} law; nothing was sampled. Next: bayesplate fit, with the same card"
+    closing = f"{report.law} law; nothing was sampled. {_next_after_check(report.n_doubts)}"
     return Shown(check_tables(report), (*report.identifiability, report.invisible), report.notes, closing)
 
 
 def _show_campaign_check(report: CampaignCheck) -> Shown:
     """The report of `bayesplate.workflow.check.check` on a campaign for a person."""
     notes = tuple(f"{name}: {note}" for name, one in report.boards.items() for note in one.notes)
-    closing = "nothing was sampled. bayesplate check tells more of each board. Next: bayesplate fit, with the same card"
+    n_doubts = sum(one.n_doubts for one in report.boards.values())
+    closing = f"nothing was sampled. bayesplate check tells more of each board. {_next_after_check(n_doubts)}"
     return Shown(campaign_check_tables(report), (), notes, closing)
+
+
+def _next_after_check(n_doubts: int) -> str:
+    """What to do once a card has no fault: what is in doubt comes first, for a fit would take it as it stands."""
+    fit = "bayesplate fit, with the same card"
+    return f"Next: settle what is in doubt above; then {fit}" if n_doubts else f"Next: {fit}"
 
 
 def show_fit(summary: Summary | CampaignSummary) -> Shown:

@@ -137,6 +137,22 @@ def test_the_tables_name_the_law_and_what_comes_next(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("without_effects")
+def test_what_is_in_doubt_is_to_be_settled_before_a_fit(with_labels):
+    """A reading an octave too high; the sound board has no doubt."""
+    card = with_labels(*PEAKS)
+    sound = bayesplate.check(card)
+    card.write_text(
+        card.read_text(encoding="utf-8").replace(f'"(2,1)" = {PEAKS["(2,1)"]}', f'"(2,1)" = {2 * PEAKS["(2,1)"]}')
+    )
+    doubted = bayesplate.check(card)
+
+    assert (sound.n_doubts, doubted.n_doubts) == (0, 2)  # the reading, and the scatter that it makes
+    assert "(2,1)" in doubted.notes[0]
+    assert "Next: bayesplate fit" in sound._repr_html_()
+    assert "Next: settle what is in doubt above" in doubted._repr_html_()
+
+
 def test_checking_imports_no_sampler():
     program = (
         "import sys, bayesplate\n"
