@@ -156,10 +156,9 @@ class ReducedBlock:
         """
         vectors = self.modes(weights, n_modes)[1][0].T
         products = (vectors[:, :, None] * vectors[:, None, :]).reshape(len(vectors), -1)
-        flat = (terms.reshape(len(terms), products.shape[1]) for terms in (self.stiffness, self.masses))
-        stiffness, masses = (products @ terms.T for terms in flat)
+        stiffness = products @ self.stiffness.reshape(len(self.stiffness), -1).T
         if len(self.masses):
-            return stiffness, masses
+            return stiffness, products @ self.masses.reshape(len(self.masses), -1).T
         first = np.eye(weights.mass.shape[1])[:1]
         return stiffness, (vectors**2).sum(axis=1)[:, None] * first
 

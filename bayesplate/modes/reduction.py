@@ -117,14 +117,14 @@ def _reduce(
         # A basis and a way to use it are judged by the stiffness at these points alone; its terms follow in the end.
         whole = _projected(plate, block, vectors, stiffness @ block.terms, rigid.shape[1], first, is_steady)
         checked, against = Weights(*(w[n_joined:-1] for w in seen)), exact[n_joined:]
-        cents = _worst_cents(whole, checked, against)
-        if cents <= accepted_cents:
+        of_basis = _worst_cents(whole, checked, against)
+        if of_basis <= accepted_cents:
             break
     # Where the basis itself is not that good, the first way that adds hardly anything to its error will do.
-    bar = accepted_cents if cents <= accepted_cents else _HARDLY_MORE * cents
+    bar = accepted_cents if of_basis <= accepted_cents else _HARDLY_MORE * of_basis
     for way in _cheapest_first(whole, seen.at(-1), n_modes):
         cents = _worst_cents(way[0], checked, against)
-        if cents <= bar:
+        if cents <= bar:  # at the latest the last way, which is the whole basis
             break
     used, turn = way
     return replace(used, stiffness=block.project(block.terms, vectors @ turn)), cents

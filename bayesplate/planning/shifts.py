@@ -166,7 +166,10 @@ def form_shift(found: Found, candidate: Candidate, nodes: Nodes, law: BareLaw) -
 
 
 def _beside(found: Found, table: Table, form: Form, cell: int, law: BareLaw) -> Floats:
-    """What a form does in one cell, less what the linear law of the constants says: (n,) array."""
+    """What a form does in one cell, less what the linear law of the constants says: (n,) array.
+
+    On the mesh for the baseline's constants, so that all cells of a form have the same matrices.
+    """
     baseline = found.ground.baseline
     sizes = {free.name: np.asarray(free.prior.value(table.z[cell, j])) for j, free in enumerate(form.free)}
     exact = {name: np.asarray(q.mean) for name, q in form.board.inputs.items() if q.is_exact}

@@ -113,7 +113,7 @@ class CheckReport:
     invisible: str
     identifiability: tuple[str, ...]
     notes: tuple[str, ...]
-    n_doubts: int = field(default=0, metadata=NOT_IN_JSON)
+    n_doubts: int = field(metadata=NOT_IN_JSON)
 
     def __repr__(self) -> str:
         told = ", ".join(f"{name} ± {percent:.1f} %" for name, percent in self.expected_sd_percent.items())

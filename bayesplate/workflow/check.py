@@ -37,7 +37,7 @@ class CheckResult(CheckReport):
         Posed: `fit` takes it as it is.
     """
 
-    problem: Problem = field(metadata=NOT_IN_JSON, compare=False, kw_only=True)
+    problem: Problem = field(metadata=NOT_IN_JSON, compare=False)
 
     @property
     def summary(self) -> CheckReport:

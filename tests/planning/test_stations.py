@@ -75,7 +75,7 @@ def test_on_the_mesh_for_other_values_the_matrices_serve_again_and_the_modes_are
     terms = [one.modes.plate.blocks[0].terms for one in (first, own, again)]
     assert terms[2] is terms[0]
     assert terms[1].shape != terms[0].shape
-    np.testing.assert_allclose(again.bare_and_added, own.bare_and_added, atol=5e-4)  # a cent
+    np.testing.assert_allclose(again.bare_and_added, own.bare_and_added, atol=4e-4)  # either mesh is within 0.02 %
     assert np.abs(again.bare_and_added - first.bare_and_added).max() > 0.1
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.command_tables import check_tables, forward_table, methods_table, sheet_tables
 from bayesplate.results.comparison import (
@@ -39,6 +40,7 @@ REPORT = CheckReport(
     invisible="what cannot be seen",
     identifiability=("weak",),
     notes=("noted",),
+    n_doubts=0,
 )
 
 NOTHING = Estimated(None, None, None, None, "Pa")
@@ -70,6 +72,14 @@ def test_check_shows_what_its_report_holds():
     assert shown.closing == "exact law; nothing was sampled. Next: bayesplate fit, with the same card"
     doubted = show_check(replace(REPORT, n_doubts=1)).closing
     assert doubted.endswith("Next: settle what is in doubt above; then bayesplate fit, with the same card")
+
+
+@pytest.mark.parametrize(
+    ("n_doubts", "told"), [(0, "Next: bayesplate fit"), (1, "Next: settle what is in doubt above")]
+)
+def test_of_a_campaign_one_board_in_doubt_is_enough(n_doubts, told):
+    boards = {"first": REPORT, "second": replace(REPORT, n_doubts=n_doubts)}
+    assert told in show_check(CampaignCheck("made", "", {}, None, boards)).closing
 
 
 def test_methods_stand_beside_each_other():
