@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.report.priors import input_words
 from bayesplate.report.style import BLACK, POSTERIOR, SMALL, WIDTH, Picture, plain_axes, short
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.symbols import in_figure, is_symbol
 from bayesplate.results.budget import input_shares
 from bayesplate.results.words import GPA
 
@@ -35,7 +34,8 @@ _BRIEF = {
     "length along the grain": "length",
     "length across the grain": "width",
     " profile": "",
-    "Poisson ratio nu_xy": "ν_xy",
+    " of transverse shear": "",
+    "Poisson ratio ": "",
 }
 
 
@@ -124,28 +124,26 @@ def _label(panel: Axes, below: str, beside: str, side: float) -> None:
     panel.tick_params(labelsize=SMALL - 1.5)
     if below:
         panel.tick_params(axis="x", labelrotation=45)
-        panel.set_xlabel(_broken(below, side), fontsize=SMALL - 1, parse_math=_is_modulus(below))
+        text, is_math = _broken(below, side)
+        panel.set_xlabel(text, fontsize=SMALL - 1, parse_math=is_math)
     else:
         panel.set_xticklabels([])
     if beside:
-        panel.set_ylabel(_broken(beside, side), fontsize=SMALL - 1, parse_math=_is_modulus(beside))
+        text, is_math = _broken(beside, side)
+        panel.set_ylabel(text, fontsize=SMALL - 1, parse_math=is_math)
     elif panel.get_yticks().size:
         panel.set_yticklabels([])
 
 
-def _is_modulus(name: str) -> bool:
-    return name.partition(",")[0] in MODULI
-
-
-def _broken(name: str, side: float) -> str:
-    """A name in two lines, below its unit or the effect that it is of, each no longer than the panel."""
-    if _is_modulus(name):
-        return in_figure(name).replace(", ", ",\n")
+def _broken(name: str, side: float) -> tuple[str, bool]:
+    """A name in two lines, below its unit or its effect, each no longer than the panel; whether it is a symbol."""
     for words, brief in _BRIEF.items():
         name = name.replace(words, brief)
+    if is_symbol(name):
+        return in_figure(name).replace(", ", ",\n"), True
     first, comma, below = name.rpartition(", ") if ", " in name else name.partition(" of ")
     longest = int(_CHARACTERS_AN_INCH * side)
-    return f"{short(first, longest)}{',' if comma else ''}\n{short(below, longest)}"
+    return f"{short(first, longest)}{',' if comma else ''}\n{short(below, longest)}", False
 
 
 def _limits(values: Floats) -> tuple[float, float]:

@@ -19,6 +19,11 @@ def in_figure(text: str) -> str:
     return _SYMBOL.sub(lambda found: f"${_LETTERS.get(found[1], ('', found[1]))[1]}_{{{found[2]}}}$", text)
 
 
+def is_symbol(name: str) -> bool:
+    """Whether a name, its unit aside, is a symbol of ours and nothing else: such a text holds nothing of a user's."""
+    return _SYMBOL.fullmatch(name.partition(",")[0]) is not None
+
+
 def in_page(text: str) -> Markup:
     """A text as HTML, escaped: symbols with lowered indices, units with raised powers, 1.0 ± 0.1 in one line."""
     from markupsafe import Markup, escape

@@ -382,10 +382,12 @@ def test_what_the_readings_made_of_each_prior(clamped):
 
 
 def test_the_corner_plot_names_a_quantity_in_two_lines():
-    assert _broken("thickness, mm", 0.75) == "thickness,\nmm"
-    assert _broken("shape 2 of thickness profile", 0.75) == "shape 2,\nthickness"
-    assert _broken("Poisson ratio nu_xy", 0.6) == "ν_xy\n"
-    assert _broken("compliance of clamp rotation", 0.75) == "compliance,\nclamp rotat…"
+    assert _broken("thickness, mm", 0.75) == ("thickness,\nmm", False)
+    assert _broken("shape 2 of thickness profile", 0.75) == ("shape 2,\nthickness", False)
+    assert _broken("compliance of clamp rotation", 0.75) == ("compliance,\nclamp rotat…", False)
+    assert _broken("Poisson ratio nu_xy", 0.6) == (r"$\nu_{xy}$", True)
+    assert _broken("G_yz of transverse shear, GPa", 0.6) == ("$G_{yz}$,\nGPa", True)
+    assert _broken("G_yz of transverse shear ($x$), GPa", 0.9) == ("G_yz ($x$),\nGPa", False)  # a user's own text
 
 
 def test_percentiles_are_of_the_modes_that_the_table_has():
