@@ -128,7 +128,7 @@ _CLAMPED_SIZES = {
     "membrane_tension": 160.0,  # N m^-1
     "rib": 0.05,
 }
-_ANYWHERE = ("transverse_shear", "air_loading", "attached_mass", "grain_angle", "poisson_ratio")
+_ANYWHERE = ("transverse_shear", "fluid_loading", "attached_mass", "grain_angle", "poisson_ratio")
 _TAPERED = ("thickness_profile", "density_gradient", "stiffness_gradient")
 """What differs from end to end along x: of second order, and invisible, where the board is held alike at both."""
 _CLAMP = ("clamp_rotation", "clamp_translation")

@@ -46,7 +46,7 @@ class TransverseShear(NoEffect):
 
 
 @dataclass(frozen=True)
-class AirLoading(NoEffect):
+class FluidLoading(NoEffect):
     """Air of a density, kg m^-3, on both faces; baffle 0 is open air, 1 a rigid wall around the plate."""
 
     density: float = 1.2

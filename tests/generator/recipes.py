@@ -121,7 +121,7 @@ def _make(effect: type[NoEffect]) -> Callable[[Parameters], NoEffect]:
 
 LIBRARY: dict[str, Recipe] = {
     "transverse_shear": Recipe(_shear, _make(effects.TransverseShear)),
-    "air_loading": Recipe(_air, _make(effects.AirLoading)),
+    "fluid_loading": Recipe(_air, _make(effects.FluidLoading)),
     "attached_mass": Recipe(_attached, _make(effects.AttachedMass)),
     "clamp_rotation": Recipe(
         _compliance("stiffness", "clamp_rotation"), _make(effects.ClampRotation), lambda setup: setup.is_clamped
@@ -156,5 +156,5 @@ OUTSIDE: dict[str, Recipe] = {
 """The effects that it does not know."""
 
 RECIPES = LIBRARY | OUTSIDE
-KNOWN_SIZE = ("transverse_shear", "air_loading")
+KNOWN_SIZE = ("transverse_shear", "fluid_loading")
 """Effects whose size nature sets: they are left alone when a size is asked for, unless that is asked for too."""

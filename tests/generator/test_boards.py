@@ -148,7 +148,7 @@ def test_random_boards_have_random_effects_sizes_and_noise(rng: np.random.Genera
 
 def test_air_and_shear_keep_their_physical_size_unless_told(rng: np.random.Generator) -> None:
     physical, doubled = (
-        plant(rng, "free-12", ["air_loading"], 2.0, scale_known=scale).truth.effects["air_loading"]["density"]
+        plant(rng, "free-12", ["fluid_loading"], 2.0, scale_known=scale).truth.effects["fluid_loading"]["density"]
         for scale in (False, True)
     )
 
