@@ -12,7 +12,7 @@ import numpy as np
 
 from generator.basis import Basis, Floats
 from generator.panels import air_mass
-from generator.plate import Plate, Spring
+from generator.plate import Plate, Rider, Spring
 
 Places = tuple[tuple[float, float], ...]
 
@@ -33,6 +33,10 @@ class NoEffect:
         """Stiffness and mass with this effect; `plate` has all changes made."""
         return stiffness, mass
 
+    def riders(self, plate: Plate, basis: Basis) -> tuple[Rider, ...]:
+        """Bodies that hang on the board by a spring and move by themselves."""
+        return ()
+
 
 @dataclass(frozen=True)
 class TransverseShear(NoEffect):
@@ -47,7 +51,7 @@ class TransverseShear(NoEffect):
 
 @dataclass(frozen=True)
 class AirLoading(NoEffect):
-    """Air of a density, kg m^-3, on both faces; baffle 0 is open air, 1 a rigid wall around the plate."""
+    """A fluid of a density, kg m^-3, on both faces, air or water; baffle 0 is open, 1 a rigid wall around the plate."""
 
     density: float = 1.2
     baffle: float = 0.0

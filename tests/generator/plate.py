@@ -174,8 +174,20 @@ def _uniform(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
     return stiffness, inertia * motions[0] + inertia * plate.h**2 / 12.0 * sum(motions[1:])
 
 
+def points_of(plate: Plate, basis: Basis) -> tuple[Floats, Floats, Floats]:
+    """Gauss points x and y, m, and weights, m^2, of the plate within its outline."""
+    return outline_points(plate, basis) if plate.outline else basis.points
+
+
+def in_plane_stiffness(plate: Plate, x: Floats, y: Floats) -> Floats:
+    """Stiffness against stretching at points, in the axes of the sides: (3, 3, n_points) array, N m^-1."""
+    thick, stiff = (_product(p, x + plate.covered, y) for p in (plate.thickness, plate.stiffness_x))
+    local = [rotated(replace(plate, E_x=plate.E_x * f).in_plane, plate.grain) for f in stiff]
+    return np.stack(local, axis=-1) * plate.h * thick
+
+
 def _varying(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
-    x, y, weights = outline_points(plate, basis) if plate.outline else basis.points
+    x, y, weights = points_of(plate, basis)
     bent, sheared, motions = basis.rows_at(x, y) if plate.outline else basis.rows
     thick, dense, stiff = (
         _product(p, x + plate.covered, y) for p in (plate.thickness, plate.density, plate.stiffness_x)
@@ -232,8 +244,34 @@ def _spring_matrix(basis: Basis, edge: str, spring: Spring) -> Floats:
     return matrix
 
 
+@dataclass(frozen=True)
+class Rider:
+    """A body that hangs on the board by a spring and moves by itself: one more coordinate of the pencil.
+
+    Attributes
+    ----------
+    mass : float, kg
+    spring : float, N m^-1
+    moved : (size,) array
+        Deflection of the board's unknowns where the spring is fixed.
+    """
+
+    mass: float
+    spring: float
+    moved: Floats
+
+    def joined(self, stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+        """Both matrices with this body's deflection as the last unknown."""
+        stretch = np.zeros(len(stiffness) + 1)
+        stretch[: len(self.moved)] = self.moved
+        stretch[-1] = -1.0
+        stiffness, mass = (np.pad(matrix, (0, 1)) for matrix in (stiffness, mass))
+        mass[-1, -1] = self.mass
+        return stiffness + self.spring * np.outer(stretch, stretch), mass
+
+
 class Effect(Protocol):
-    """What a real board has besides: a changed plate, or matrices to add."""
+    """What a real board has besides: a changed plate, matrices to add, or bodies that ride on it."""
 
     def changed(self, plate: Plate) -> Plate:
         """The plate with this effect in its constants, edges or profiles."""
@@ -241,10 +279,13 @@ class Effect(Protocol):
     def added(self, plate: Plate, basis: Basis, stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
         """Stiffness and mass with this effect."""
 
+    def riders(self, plate: Plate, basis: Basis) -> tuple[Rider, ...]:
+        """Bodies that this effect hangs on the board."""
+
 
 @dataclass(frozen=True)
 class Modes:
-    """Lowest motions of a plate, rigid ones included.
+    """Lowest motions of a plate, rigid ones and those of bodies that ride on it included.
 
     Attributes
     ----------
@@ -252,11 +293,14 @@ class Modes:
     vectors : (size, n_modes) array
         Coefficients in the basis, of unit modal mass.
     basis : Basis
+    shares : (n_modes,) array
+        Share of the kinetic energy that is not in bodies riding on the board; 1 where there are none.
     """
 
     frequencies: Floats
     vectors: Floats
     basis: Basis
+    shares: Floats
 
     @cached_property
     def deflections(self) -> Floats:
@@ -286,5 +330,10 @@ def solve(plate: Plate, effects: Sequence[Effect] = (), n_modes: int = 24, n: Co
     stiffness, mass = matrices(plate, basis)
     for effect in effects:
         stiffness, mass = effect.added(plate, basis, stiffness, mass)
+    riders = [rider for effect in effects for rider in effect.riders(plate, basis)]
+    for rider in riders:
+        stiffness, mass = rider.joined(stiffness, mass)
     squares, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, n_modes - 1], check_finite=False)
-    return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), vectors, basis)
+    ridden = sum((rider.mass * vectors[basis.size + k] ** 2 for k, rider in enumerate(riders)), np.zeros(n_modes))
+    frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+    return Modes(frequencies, vectors[: basis.size], basis, 1.0 - ridden)
