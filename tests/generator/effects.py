@@ -12,7 +12,9 @@ import numpy as np
 
 from generator.basis import Basis, Floats
 from generator.panels import air_mass
-from generator.plate import Plate, Rider, Spring
+from generator.plate import Plate
+from generator.rider import Rider
+from generator.spring import Spring
 
 Places = tuple[tuple[float, float], ...]
 
@@ -40,13 +42,14 @@ class NoEffect:
 
 @dataclass(frozen=True)
 class TransverseShear(NoEffect):
-    """Finite shear moduli G_xz and G_yz, Pa, and rotary inertia."""
+    """Finite shear moduli G_xz and G_yz, Pa, and rotary inertia; absent: those of an isotropic plate, its G_xy."""
 
-    G_xz: float
-    G_yz: float
+    G_xz: float | None = None
+    G_yz: float | None = None
 
     def changed(self, plate: Plate) -> Plate:
-        return replace(plate, shear=(self.G_xz, self.G_yz))
+        G_xz, G_yz = (plate.G_xy if G is None else G for G in (self.G_xz, self.G_yz))
+        return replace(plate, shear=(G_xz, G_yz))
 
 
 @dataclass(frozen=True)

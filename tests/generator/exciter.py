@@ -8,7 +8,8 @@ import numpy as np
 
 from generator.basis import Basis, Floats
 from generator.effects import NoEffect, Places
-from generator.plate import Plate, Rider
+from generator.plate import Plate
+from generator.rider import Rider
 
 COIL = 1.6e-3
 """Mass of the coil of a small exciter, kg."""

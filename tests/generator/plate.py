@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 import scipy.linalg
 
-from generator.basis import Basis, Counts, Floats, edge_points, gauss, symmetric
+from generator.basis import Basis, Counts, Floats
+from generator.outline import Outline, outline_points
+from generator.rider import Rider
+from generator.spring import Spring, spring_matrix
 
 Profile = Callable[[Floats, Floats], Floats]
 """A factor over the board as a function of x and y, m, counted on the whole board."""
@@ -26,20 +28,6 @@ N_POLYNOMIALS_SHEAR: Counts = (14, 20)
 FINE_SHEAR: Counts = (20, 22)
 """Polynomials along x and along y. With shear, twist ends in a thin layer at free edges: there the first leave up to
 1.3 cents in modes that twist, the fine ones a tenth."""
-
-
-@dataclass(frozen=True)
-class Spring:
-    """What holds an edge that is not rigidly clamped; infinity is rigid.
-
-    Attributes
-    ----------
-    rotation : float, N (N m per m and rad)
-    translation : float, N m^-2 (N per m and m)
-    """
-
-    rotation: float = np.inf
-    translation: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -68,8 +56,8 @@ class Plate:
         Length of the whole board along x; 0: that of the vibrating part.
     thickness, density, stiffness_x : tuple of Profile
         Factors on h, on rho, and on E_x.
-    outline : tuple of (float, float)
-        Stations x and widths, m, linear between them, centred on the middle line; empty: a rectangle.
+    outline : Outline
+        Empty: a rectangle.
     """
 
     E_x: float
@@ -89,7 +77,14 @@ class Plate:
     thickness: tuple[Profile, ...] = ()
     density: tuple[Profile, ...] = ()
     stiffness_x: tuple[Profile, ...] = ()
-    outline: tuple[tuple[float, float], ...] = ()
+    outline: Outline = ()
+
+    @classmethod
+    def isotropic(
+        cls, E: float, nu: float, rho: float, h: float, L_x: float, L_y: float, edges: Mapping[str, str]
+    ) -> Plate:
+        """A thin plate of metal, glass or foam: one modulus, Pa, and a Poisson ratio."""
+        return cls(E, E, 0.5 * E / (1.0 + nu), nu, rho, h, L_x, L_y, edges)
 
     @property
     def whole_length(self) -> float:
@@ -153,7 +148,7 @@ def matrices(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
     else:
         stiffness, mass = _uniform(plate, basis)
     for edge, spring in plate.springs.items():
-        stiffness = stiffness + _spring_matrix(basis, edge, spring)
+        stiffness = stiffness + spring_matrix(basis, edge, spring)
     return stiffness, mass
 
 
@@ -176,7 +171,7 @@ def _uniform(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
 
 def points_of(plate: Plate, basis: Basis) -> tuple[Floats, Floats, Floats]:
     """Gauss points x and y, m, and weights, m^2, of the plate within its outline."""
-    return outline_points(plate, basis) if plate.outline else basis.points
+    return outline_points(basis, plate.outline, plate.covered) if plate.outline else basis.points
 
 
 def in_plane_stiffness(plate: Plate, x: Floats, y: Floats) -> Floats:
@@ -214,60 +209,6 @@ def _product(profiles: Sequence[Profile], x: Floats, y: Floats) -> Floats:
     for profile in profiles:
         factor = factor * profile(x, y)
     return factor
-
-
-def outline_points(plate: Plate, basis: Basis) -> tuple[Floats, Floats, Floats]:
-    """Gauss points of the true outline, piece by piece between its stations; L_y is the widest width."""
-    stations, widths = (np.array(values) for values in zip(*plate.outline, strict=True))
-    inside = (stations > plate.covered) & (stations < plate.covered + plate.L_x)
-    breaks = np.concatenate([[0.0], stations[inside] - plate.covered, [plate.L_x]])
-    s, ahead = gauss(basis.n[0])
-    t, weights = gauss(basis.n[1])
-    x = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * s for a, b in pairwise(breaks)])
-    along = np.concatenate([0.5 * (b - a) * ahead for a, b in pairwise(breaks)])
-    width = np.interp(x + plate.covered, stations, widths)
-    y = 0.5 * plate.L_y + 0.5 * width[:, None] * t
-    area = along[:, None] * 0.5 * width[:, None] * weights
-    return np.repeat(x, len(t)), y.ravel(), area.ravel()
-
-
-def _spring_matrix(basis: Basis, edge: str, spring: Spring) -> Floats:
-    """Twice the energy of the springs along a released edge; what is rigid is in the basis."""
-    x, y, weights = edge_points(basis, edge)
-    matrix = np.zeros((basis.size, basis.size))
-    if np.isfinite(spring.translation):
-        w = basis.deflection(x, y)
-        matrix += spring.translation * symmetric(w, w, weights)
-    if np.isfinite(spring.rotation):
-        turned = basis.rotation("xy".index(edge[0]), x, y)
-        matrix += spring.rotation * symmetric(turned, turned, weights)
-    return matrix
-
-
-@dataclass(frozen=True)
-class Rider:
-    """A body that hangs on the board by a spring and moves by itself: one more coordinate of the pencil.
-
-    Attributes
-    ----------
-    mass : float, kg
-    spring : float, N m^-1
-    moved : (size,) array
-        Deflection of the board's unknowns where the spring is fixed.
-    """
-
-    mass: float
-    spring: float
-    moved: Floats
-
-    def joined(self, stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
-        """Both matrices with this body's deflection as the last unknown."""
-        stretch = np.zeros(len(stiffness) + 1)
-        stretch[: len(self.moved)] = self.moved
-        stretch[-1] = -1.0
-        stiffness, mass = (np.pad(matrix, (0, 1)) for matrix in (stiffness, mass))
-        mass[-1, -1] = self.mass
-        return stiffness + self.spring * np.outer(stretch, stretch), mass
 
 
 class Effect(Protocol):
