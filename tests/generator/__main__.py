@@ -24,11 +24,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     import numpy as np
 
     from generator.boards import plant
-    from generator.designs import DESIGNS
+    from generator.designs import DESIGNS, STEEL_DESIGNS
     from generator.recipes import RECIPES
 
     parser = argparse.ArgumentParser(prog="python -m tests.generator", description="Print a simulated board card.")
-    parser.add_argument("--design", choices=list(DESIGNS), default="cantilever-6")
+    parser.add_argument("--design", choices=[*DESIGNS, *STEEL_DESIGNS], default="cantilever-6")
     parser.add_argument("--effect", action="append", choices=[*RECIPES, "none"], help="repeat for two; absent: drawn")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--size", type=float, help="multiple of the nominal size; absent: drawn from 1/2 to 2")

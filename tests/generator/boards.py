@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from generator.card import NOISE_FACTOR, NOTHING, card_text
-from generator.designs import DESIGNS, MEDIANS, POISSON, Design
+from generator.designs import DESIGNS, MEDIANS, POISSON, STEEL_DESIGNS, STEEL_MEDIANS, STEEL_POISSON, Design
 from generator.naming import LEAST_CORRELATION, Label, frequencies
-from generator.recipes import KNOWN_SIZE, LIBRARY, RECIPES
+from generator.recipes import KNOWN_SIZE, LIBRARY, OF_WOOD, RECIPES
 
 MOST_DRAWS = 200
 KINDS = {"none": 0.25, "one": 0.5, "two": 0.125, "outside": 0.125}
@@ -25,7 +25,7 @@ class Truth:
     Attributes
     ----------
     constants : dict
-        E_x, E_y, G_xy, Pa, and nu_xy as tabulated (a planted poisson_ratio replaces it).
+        E_x, E_y, G_xy, Pa, and nu_xy as tabulated (a planted poisson_ratio replaces it), or drawn if isotropic.
     effects : dict
         Name -> parameters, SI units; empty for an ideal board.
     size : dict
@@ -64,7 +64,7 @@ class PlantedBoard:
     n_draws : int
         How many boards were drawn until every label was beyond doubt.
     places_known : bool
-        Whether the card says where the attached mass sits.
+        Whether the card says where the attached mass, or the exciter, sits.
     prior : str
         Prior card named in the card.
     sensor : (float, float) or None, m
@@ -88,11 +88,14 @@ class PlantedBoard:
     resolution: float = 0.0
 
     def card_text(self, stated: Mapping[str, str] = NOTHING) -> str:
-        """The board card, which tells nothing of the truth but the noise and the place of an attached mass.
+        """The board card, which tells nothing of the truth but the noise and the places of what is attached.
 
         Unless it is told more: see `generator.card.card_text`.
         """
-        places = self.truth.effects.get("attached_mass", {}).get("places", ()) if self.places_known else ()
+        places, driven = (
+            self.truth.effects.get(effect, {}).get("places", ()) if self.places_known else ()
+            for effect in ("attached_mass", "exciter")
+        )
         places = places if self.sensor is None else (self.sensor,)
         return card_text(
             self.name,
@@ -102,6 +105,7 @@ class PlantedBoard:
             noise_factor=self.noise_factor,
             resolution=self.resolution,
             places=places,
+            driven=driven,
             outline=self.truth.effects.get("outline_profile"),
             prior=self.prior,
             stated=stated,
@@ -141,7 +145,7 @@ def plant(
     ----------
     rng : numpy.random.Generator
     design : Design or str
-        One of `DESIGNS`.
+        One of `DESIGNS` or `STEEL_DESIGNS`.
     effects : sequence of str, optional
         Names to plant, of the library or outside it; empty for an ideal board. None draws none, one, two, or one
         outside the library, with the shares `KINDS`.
@@ -154,9 +158,9 @@ def plant(
     scale_known : bool
         Whether size acts on the air and the shear compliance too, beyond what is physical.
     n_places : int
-        Places over which an attached mass roves.
+        Places over which an attached mass, or an exciter, roves.
     places_known : bool
-        Whether the card states the place of a planted mass.
+        Whether the card states the place of a planted mass or exciter.
     prior : str
         Prior card named in the card; empty: the package's default.
     fixed : mapping, optional
@@ -166,7 +170,7 @@ def plant(
     noise_factor : float
         Of the noise prior on the card, whose median is the true noise unless that is drawn.
     constants : mapping, optional
-        E_x, E_y, G_xy, Pa, if they are not to be drawn.
+        E_x, E_y, G_xy, Pa, if they are not to be drawn; nu_xy is the tabulated one unless it is given too.
     noise_is_drawn : bool
         Whether the true noise of each setup is drawn from the prior on the card, whose median is `noise_cents`.
     resolution : float, Hz
@@ -184,7 +188,7 @@ def plant(
     RuntimeError
         If no board with labels beyond doubt was found in `MOST_DRAWS` draws.
     """
-    design = DESIGNS[design] if isinstance(design, str) else design
+    design = (DESIGNS | STEEL_DESIGNS)[design] if isinstance(design, str) else design
     planted = _choose(rng, design) if effects is None else tuple(effects)
     _refuse_wrong(planted, design)
     noise = _log_uniform(rng, 2.0, 17.0) if noise_cents is None else noise_cents
@@ -192,12 +196,13 @@ def plant(
     if sensor is not None:
         settled.setdefault("attached_mass", {})["places"] = (sensor,)
     for n_draws in range(1, MOST_DRAWS + 1):
-        true = _draw_constants(rng) if constants is None else {**constants, "nu_xy": POISSON}
+        true = _draw_constants(rng, design) if constants is None else {"nu_xy": POISSON, **constants}
         sizes = {effect: _size(rng, effect, size, scale_known) for effect in planted}
         drawn = {effect: RECIPES[effect].draw(rng, design, sizes[effect]) for effect in planted}
-        if n_places > 1 and "attached_mass" in drawn:
-            more = [RECIPES["attached_mass"].draw(rng, design, 1.0)["places"][0] for _ in range(n_places - 1)]
-            drawn["attached_mass"]["places"] += tuple(more)
+        for effect in ("attached_mass", "exciter"):
+            if n_places > 1 and effect in drawn:
+                more = [RECIPES[effect].draw(rng, design, 1.0)["places"][0] for _ in range(n_places - 1)]
+                drawn[effect]["places"] += tuple(more)
         drawn = {effect: values | settled.get(effect, {}) for effect, values in drawn.items()}
         exact, correlation = _frequencies(design, true, drawn)
         if correlation < LEAST_CORRELATION:
@@ -238,6 +243,7 @@ def _frequencies(
     least = 1.0
     for setup in design.setups:
         acting = [RECIPES[e].make(dict(values)) for e, values in drawn.items() if RECIPES[e].acts(setup)]
+        acting += setup.surroundings
         found, correlation = frequencies(design.plate(setup, constants), acting, setup.beams)
         hertz[setup.name] = {setup.label(beams): value for beams, value in found.items()}
         least = min(least, correlation)
@@ -246,7 +252,12 @@ def _frequencies(
     return hertz, least
 
 
-def _draw_constants(rng: np.random.Generator) -> dict[str, float]:
+def _draw_constants(rng: np.random.Generator, design: Design) -> dict[str, float]:
+    if design.isotropic:
+        (median, factor), (mean, sd) = STEEL_MEDIANS["E_x"], STEEL_POISSON
+        modulus = float(median * np.exp(np.log(factor) * rng.standard_normal()))
+        nu = float(mean + sd * rng.standard_normal())
+        return {"E_x": modulus, "E_y": modulus, "G_xy": 0.5 * modulus / (1.0 + nu), "nu_xy": nu}
     drawn = {name: float(m * np.exp(np.log(f) * rng.standard_normal())) for name, (m, f) in MEDIANS.items()}
     return {**drawn, "nu_xy": POISSON}
 
@@ -272,5 +283,6 @@ def _refuse_wrong(planted: Sequence[str], design: Design) -> None:
     for effect in planted:
         if effect not in RECIPES:
             raise ValueError(f"effects: wanted one of {', '.join(RECIPES)}, got {effect}")
-        if not any(RECIPES[effect].acts(setup) for setup in design.setups):
+        of_wood = design.isotropic and effect in OF_WOOD
+        if of_wood or not any(RECIPES[effect].acts(setup) for setup in design.setups):
             raise ValueError(f"effects: wanted one that acts on {design.name}, got {effect}")

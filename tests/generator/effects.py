@@ -12,7 +12,9 @@ import numpy as np
 
 from generator.basis import Basis, Floats
 from generator.panels import air_mass
-from generator.plate import Plate, Spring
+from generator.plate import Plate
+from generator.rider import Rider
+from generator.spring import Spring
 
 Places = tuple[tuple[float, float], ...]
 
@@ -33,21 +35,26 @@ class NoEffect:
         """Stiffness and mass with this effect; `plate` has all changes made."""
         return stiffness, mass
 
+    def riders(self, plate: Plate, basis: Basis) -> tuple[Rider, ...]:
+        """Bodies that hang on the board by a spring and move by themselves."""
+        return ()
+
 
 @dataclass(frozen=True)
 class TransverseShear(NoEffect):
-    """Finite shear moduli G_xz and G_yz, Pa, and rotary inertia."""
+    """Finite shear moduli G_xz and G_yz, Pa, and rotary inertia; absent: those of an isotropic plate, its G_xy."""
 
-    G_xz: float
-    G_yz: float
+    G_xz: float | None = None
+    G_yz: float | None = None
 
     def changed(self, plate: Plate) -> Plate:
-        return replace(plate, shear=(self.G_xz, self.G_yz))
+        G_xz, G_yz = (plate.G_xy if G is None else G for G in (self.G_xz, self.G_yz))
+        return replace(plate, shear=(G_xz, G_yz))
 
 
 @dataclass(frozen=True)
 class FluidLoading(NoEffect):
-    """Air of a density, kg m^-3, on both faces; baffle 0 is open air, 1 a rigid wall around the plate."""
+    """A fluid of a density, kg m^-3, on both faces, air or water; baffle 0 is open, 1 a rigid wall around the plate."""
 
     density: float = 1.2
     baffle: float = 0.0

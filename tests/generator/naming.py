@@ -32,9 +32,14 @@ def _products(basis: Basis, words: tuple[str, ...]) -> Floats:
 
 
 def correlations(modes: Modes, words: tuple[str, ...]) -> Floats:
-    """Size of the correlation of each mode with each beam product: (n_modes, N_BEAMS^2) array."""
+    """Size of the correlation of each mode with each beam product: (n_modes, N_BEAMS^2) array.
+
+    A magnet that bounces on its spring bends the board a little, in a shape like that of the lowest mode: a correlation
+    counts by the board's share of the motion, so that such a mode takes no label.
+    """
     shapes = np.sqrt(modes.basis.points[2])[:, None] * modes.deflections
-    return np.abs((shapes / np.linalg.norm(shapes, axis=0)).T @ _products(modes.basis, words))
+    shapes = shapes * np.sqrt(modes.shares) / np.linalg.norm(shapes, axis=0)
+    return np.abs(shapes.T @ _products(modes.basis, words))
 
 
 def named(modes: Modes, edges: Mapping[str, str]) -> dict[Label, tuple[float, float]]:

@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 import scipy.linalg
 
-from generator.basis import Basis, Counts, Floats, edge_points, gauss, symmetric
+from generator.basis import Basis, Counts, Floats
+from generator.outline import Outline, outline_points
+from generator.rider import Rider
+from generator.spring import Spring, spring_matrix
 
 Profile = Callable[[Floats, Floats], Floats]
 """A factor over the board as a function of x and y, m, counted on the whole board."""
@@ -26,20 +28,6 @@ N_POLYNOMIALS_SHEAR: Counts = (14, 20)
 FINE_SHEAR: Counts = (20, 22)
 """Polynomials along x and along y. With shear, twist ends in a thin layer at free edges: there the first leave up to
 1.3 cents in modes that twist, the fine ones a tenth."""
-
-
-@dataclass(frozen=True)
-class Spring:
-    """What holds an edge that is not rigidly clamped; infinity is rigid.
-
-    Attributes
-    ----------
-    rotation : float, N (N m per m and rad)
-    translation : float, N m^-2 (N per m and m)
-    """
-
-    rotation: float = np.inf
-    translation: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -68,8 +56,8 @@ class Plate:
         Length of the whole board along x; 0: that of the vibrating part.
     thickness, density, stiffness_x : tuple of Profile
         Factors on h, on rho, and on E_x.
-    outline : tuple of (float, float)
-        Stations x and widths, m, linear between them, centred on the middle line; empty: a rectangle.
+    outline : Outline
+        Empty: a rectangle.
     """
 
     E_x: float
@@ -89,7 +77,14 @@ class Plate:
     thickness: tuple[Profile, ...] = ()
     density: tuple[Profile, ...] = ()
     stiffness_x: tuple[Profile, ...] = ()
-    outline: tuple[tuple[float, float], ...] = ()
+    outline: Outline = ()
+
+    @classmethod
+    def isotropic(
+        cls, E: float, nu: float, rho: float, h: float, L_x: float, L_y: float, edges: Mapping[str, str]
+    ) -> Plate:
+        """A thin plate of metal, glass or foam: one modulus, Pa, and a Poisson ratio."""
+        return cls(E, E, 0.5 * E / (1.0 + nu), nu, rho, h, L_x, L_y, edges)
 
     @property
     def whole_length(self) -> float:
@@ -153,7 +148,7 @@ def matrices(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
     else:
         stiffness, mass = _uniform(plate, basis)
     for edge, spring in plate.springs.items():
-        stiffness = stiffness + _spring_matrix(basis, edge, spring)
+        stiffness = stiffness + spring_matrix(basis, edge, spring)
     return stiffness, mass
 
 
@@ -174,8 +169,20 @@ def _uniform(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
     return stiffness, inertia * motions[0] + inertia * plate.h**2 / 12.0 * sum(motions[1:])
 
 
+def points_of(plate: Plate, basis: Basis) -> tuple[Floats, Floats, Floats]:
+    """Gauss points x and y, m, and weights, m^2, of the plate within its outline."""
+    return outline_points(basis, plate.outline, plate.covered) if plate.outline else basis.points
+
+
+def in_plane_stiffness(plate: Plate, x: Floats, y: Floats) -> Floats:
+    """Stiffness against stretching at points, in the axes of the sides: (3, 3, n_points) array, N m^-1."""
+    thick, stiff = (_product(p, x + plate.covered, y) for p in (plate.thickness, plate.stiffness_x))
+    local = [rotated(replace(plate, E_x=plate.E_x * f).in_plane, plate.grain) for f in stiff]
+    return np.stack(local, axis=-1) * plate.h * thick
+
+
 def _varying(plate: Plate, basis: Basis) -> tuple[Floats, Floats]:
-    x, y, weights = outline_points(plate, basis) if plate.outline else basis.points
+    x, y, weights = points_of(plate, basis)
     bent, sheared, motions = basis.rows_at(x, y) if plate.outline else basis.rows
     thick, dense, stiff = (
         _product(p, x + plate.covered, y) for p in (plate.thickness, plate.density, plate.stiffness_x)
@@ -204,36 +211,8 @@ def _product(profiles: Sequence[Profile], x: Floats, y: Floats) -> Floats:
     return factor
 
 
-def outline_points(plate: Plate, basis: Basis) -> tuple[Floats, Floats, Floats]:
-    """Gauss points of the true outline, piece by piece between its stations; L_y is the widest width."""
-    stations, widths = (np.array(values) for values in zip(*plate.outline, strict=True))
-    inside = (stations > plate.covered) & (stations < plate.covered + plate.L_x)
-    breaks = np.concatenate([[0.0], stations[inside] - plate.covered, [plate.L_x]])
-    s, ahead = gauss(basis.n[0])
-    t, weights = gauss(basis.n[1])
-    x = np.concatenate([0.5 * (a + b) + 0.5 * (b - a) * s for a, b in pairwise(breaks)])
-    along = np.concatenate([0.5 * (b - a) * ahead for a, b in pairwise(breaks)])
-    width = np.interp(x + plate.covered, stations, widths)
-    y = 0.5 * plate.L_y + 0.5 * width[:, None] * t
-    area = along[:, None] * 0.5 * width[:, None] * weights
-    return np.repeat(x, len(t)), y.ravel(), area.ravel()
-
-
-def _spring_matrix(basis: Basis, edge: str, spring: Spring) -> Floats:
-    """Twice the energy of the springs along a released edge; what is rigid is in the basis."""
-    x, y, weights = edge_points(basis, edge)
-    matrix = np.zeros((basis.size, basis.size))
-    if np.isfinite(spring.translation):
-        w = basis.deflection(x, y)
-        matrix += spring.translation * symmetric(w, w, weights)
-    if np.isfinite(spring.rotation):
-        turned = basis.rotation("xy".index(edge[0]), x, y)
-        matrix += spring.rotation * symmetric(turned, turned, weights)
-    return matrix
-
-
 class Effect(Protocol):
-    """What a real board has besides: a changed plate, or matrices to add."""
+    """What a real board has besides: a changed plate, matrices to add, or bodies that ride on it."""
 
     def changed(self, plate: Plate) -> Plate:
         """The plate with this effect in its constants, edges or profiles."""
@@ -241,10 +220,13 @@ class Effect(Protocol):
     def added(self, plate: Plate, basis: Basis, stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
         """Stiffness and mass with this effect."""
 
+    def riders(self, plate: Plate, basis: Basis) -> tuple[Rider, ...]:
+        """Bodies that this effect hangs on the board."""
+
 
 @dataclass(frozen=True)
 class Modes:
-    """Lowest motions of a plate, rigid ones included.
+    """Lowest motions of a plate, rigid ones and those of bodies that ride on it included.
 
     Attributes
     ----------
@@ -252,11 +234,14 @@ class Modes:
     vectors : (size, n_modes) array
         Coefficients in the basis, of unit modal mass.
     basis : Basis
+    shares : (n_modes,) array
+        Share of the kinetic energy that is not in bodies riding on the board; 1 where there are none.
     """
 
     frequencies: Floats
     vectors: Floats
     basis: Basis
+    shares: Floats
 
     @cached_property
     def deflections(self) -> Floats:
@@ -286,5 +271,10 @@ def solve(plate: Plate, effects: Sequence[Effect] = (), n_modes: int = 24, n: Co
     stiffness, mass = matrices(plate, basis)
     for effect in effects:
         stiffness, mass = effect.added(plate, basis, stiffness, mass)
+    riders = [rider for effect in effects for rider in effect.riders(plate, basis)]
+    for rider in riders:
+        stiffness, mass = rider.joined(stiffness, mass)
     squares, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, n_modes - 1], check_finite=False)
-    return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), vectors, basis)
+    ridden = sum((rider.mass * vectors[basis.size + k] ** 2 for k, rider in enumerate(riders)), np.zeros(n_modes))
+    frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+    return Modes(frequencies, vectors[: basis.size], basis, 1.0 - ridden)

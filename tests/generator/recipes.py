@@ -11,8 +11,14 @@ import numpy as np
 from generator import effects, outside
 from generator.designs import POISSON, SHEAR_MEANS, Design, Setup
 from generator.effects import NoEffect
+from generator.exciter import COIL, SUSPENSION, Exciter
+from generator.warp import Warp
 
 STEEPEST_GRAIN = 5.0  # degrees
+EXCITER = 48e-3
+"""Mass of an exciter, kg, coil and magnet."""
+WARP = (0.005, 0.004, 0.01)
+"""Spread of cup over the width, bow over the length, twist over the longer side, of boards as they come."""
 Parameters = dict[str, Any]
 Draw = Callable[[np.random.Generator, Design, float], Parameters]
 
@@ -52,8 +58,13 @@ def _compliance(parameter: str, nominal: str) -> Draw:
 
 
 def _shear(rng: np.random.Generator, design: Design, size: float) -> Parameters:
-    """Log-normal with the mean and sd of the card, cut at two sd; size divides both."""
-    drawn = {}
+    """Log-normal with the mean and sd of the card, cut at two sd; size divides both.
+
+    An isotropic plate has no others than its G.
+    """
+    drawn: Parameters = {}
+    if design.isotropic:
+        return drawn
     for name, (mean, sd) in SHEAR_MEANS.items():
         spread = np.sqrt(np.log1p((sd / mean) ** 2))
         drawn[name] = float(mean * np.exp(spread * np.clip(rng.standard_normal(), -2.0, 2.0) - 0.5 * spread**2) / size)
@@ -69,6 +80,27 @@ def _attached(rng: np.random.Generator, design: Design, size: float) -> Paramete
     low = 0.4 if any("free" in s.edges.values() and s.is_clamped for s in design.setups) else 0.05
     place = (float(design.L_x * rng.uniform(low, 0.95)), float(design.L_y * rng.uniform(0.05, 0.95)))
     return {"mass": size * design.nominal["attached_mass"], "places": (place,), "rotary_radius": 0.0}
+
+
+def _exciter(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    """Suspension and coil as such exciters spread, cut at two sd; well inside the board; size multiplies all three."""
+    z = np.clip(rng.standard_normal(2), -2.0, 2.0)
+    times = size * design.nominal["exciter"]
+    place = (float(design.L_x * rng.uniform(0.15, 0.85)), float(design.L_y * rng.uniform(0.15, 0.85)))
+    return {
+        "mass": times * EXCITER,
+        "places": (place,),
+        "coil_mass": times * COIL * 1.3 ** float(z[0]),
+        "suspension": times * SUSPENSION * 1.5 ** float(z[1]),
+        "magnet": "free",
+    }
+
+
+def _warp(rng: np.random.Generator, design: Design, size: float) -> Parameters:
+    """Normal about flat; only signs that can be told: the bow's, which makes a dome or a saddle."""
+    spread = size * design.nominal["warp"] * np.multiply(WARP, (design.L_y, design.L_x, max(design.L_x, design.L_y)))
+    cup, bow, twist = (float(value) for value in spread * rng.standard_normal(3))
+    return {"cup": abs(cup), "bow": bow, "twist": abs(twist)}
 
 
 def _tension(rng: np.random.Generator, design: Design, size: float) -> Parameters:
@@ -121,8 +153,10 @@ def _make(effect: type[NoEffect]) -> Callable[[Parameters], NoEffect]:
 
 LIBRARY: dict[str, Recipe] = {
     "transverse_shear": Recipe(_shear, _make(effects.TransverseShear)),
-    "fluid_loading": Recipe(_air, _make(effects.FluidLoading)),
+    "fluid_loading": Recipe(_air, _make(effects.FluidLoading), lambda setup: not setup.tank),
     "attached_mass": Recipe(_attached, _make(effects.AttachedMass)),
+    "exciter": Recipe(_exciter, _make(Exciter)),
+    "warp": Recipe(_warp, _make(Warp)),
     "clamp_rotation": Recipe(
         _compliance("stiffness", "clamp_rotation"), _make(effects.ClampRotation), lambda setup: setup.is_clamped
     ),
@@ -158,3 +192,5 @@ OUTSIDE: dict[str, Recipe] = {
 RECIPES = LIBRARY | OUTSIDE
 KNOWN_SIZE = ("transverse_shear", "fluid_loading")
 """Effects whose size nature sets: they are left alone when a size is asked for, unless that is asked for too."""
+OF_WOOD = ("grain_angle", "poisson_ratio", "stiffness_gradient")
+"""Effects that an isotropic plate cannot have: they would leave it one no longer."""

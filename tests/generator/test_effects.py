@@ -30,7 +30,8 @@ from generator.effects import (
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE, cents, field
 from generator.naming import frequencies
 from generator.outside import Crack, Rib
-from generator.plate import EDGES, Plate, Spring, matrices, solve
+from generator.plate import EDGES, Plate, matrices, solve
+from generator.spring import Spring
 
 ALL_SUPPORTED = dict.fromkeys(EDGES, "supported")
 FREE_FINNISH = replace(FINNISH, edges=ALL_FREE)

@@ -10,7 +10,8 @@ import ritz
 
 from generator.designs import ALL_FREE
 from generator.known_boards import FIEMME, FINNISH, FREE
-from generator.plate import EDGES, Plate, Spring, rotated, solve
+from generator.plate import EDGES, Plate, rotated, solve
+from generator.spring import Spring
 
 ALL_SUPPORTED = dict.fromkeys(EDGES, "supported")
 SHEAR = (0.62e9, 0.023e9)
