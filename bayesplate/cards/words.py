@@ -18,6 +18,8 @@ EFFECT_NAMES = (
     "transverse_shear",
     "fluid_loading",
     "attached_mass",
+    "exciter",
+    "warp",
     "clamp_rotation",
     "clamp_translation",
     "support_mass",
