@@ -23,8 +23,11 @@ _WIDEST, _TALLEST = 3.1, 3.6
 _LEFT, _ABOVE, _BELOW = 0.85, 0.42, 0.62
 _HATCH = 0.10
 _HEADING = 0.14
+_LEGEND = 0.3
 _N_GRAIN = 13
 _N_POINTS = 201
+_BENT = 0.12
+"""Height at which the largest rise is drawn, as a share of the shorter side."""
 _LINES = {"clamped": ("-", 1.6), "supported": ((0, (4, 3)), 1.6), "free": ("-", 0.9)}
 _MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p"}
 
@@ -48,8 +51,9 @@ def board_picture(board: Board) -> Picture:
     scale = min(_WIDEST / length, _TALLEST / width)
     above = _ABOVE + (_HEADING if len(board.setups) > 1 else 0.0)
     row = above + width * scale + _BELOW
-    has_legend = any(setup.hammer or any(item.places for item in setup.attached) for setup in board.setups)
-    height = row * len(board.setups) + (0.3 if has_legend else 0.0)
+    has_items = any(setup.hammer or any(item.places for item in setup.attached) for setup in board.setups)
+    has_legend = has_items or _is_warped(board)
+    height = row * len(board.setups) + (_LEGEND * (2 if has_items and _is_warped(board) else 1) if has_legend else 0.0)
     figure = Figure(figsize=(WIDTH, height))
     handles: dict[str, Any] = {}
     for i, (setup, outline) in enumerate(zip(board.setups, outlines, strict=True)):
@@ -63,13 +67,15 @@ def board_picture(board: Board) -> Picture:
         if len(board.setups) > 1:
             heading = (length / 2, width + 0.3 / scale)
             panel.text(*heading, short(setup.name, 44), ha="center", fontsize=WORDS, weight="bold", parse_math=False)
-        handles |= _draw_items(panel, setup, outline)
+        handles |= _draw_items(panel, setup, outline) | _draw_warp(panel, board, length, outline.width)
     if handles:
         figure.legend(
             handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL,
             handletextpad=0.4,
         )  # fmt: skip
     caption = _CAPTION if all(one.is_rectangle for one in outlines) else f"{_CAPTION} {_OUTLINE}"
+    if _is_warped(board):
+        caption = f"{caption} {_WARP}"
     return Picture("board", "The board, drawn to scale", _alt(board, values, outlines), caption, figure)
 
 
@@ -80,6 +86,12 @@ _CAPTION = (
 _OUTLINE = (
     "The outline is what the readings of the width make probable. Which edge recedes they do not say: where both are "
     "free, both are drawn to recede alike."
+)
+
+
+_WARP = (
+    "Dashed: how far the board is from flat where a straightedge lies along it and across it, drawn larger than it is; "
+    "a filled corner lifts off the table."
 )
 
 
@@ -219,6 +231,34 @@ def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
     return handles
 
 
+def _is_warped(board: Board) -> bool:
+    """Whether a rise was read that is not zero."""
+    return any(rise.mean for rise in board.warp.values())
+
+
+def _draw_warp(panel: Axes, board: Board, length: float, width: float) -> dict[str, Any]:
+    """The rises that were read, as bent lines through the middle and a lifted corner; handles for the legend."""
+    rises = {name: rise.mean for name, rise in board.warp.items() if rise.mean}
+    bends = {name: rise for name, rise in rises.items() if name != "twist"}
+    handles: dict[str, Any] = {}
+    if bends:
+        largest = max(abs(rise) for rise in bends.values())
+        times = float(f"{_BENT * min(length, width) / largest:.1g}")
+        s = np.linspace(0.0, 1.0, _N_POINTS)
+        arch = times * 4.0 * s * (1.0 - s)
+        lines = {"cup": (length / 2 + arch * bends.get("cup", 0.0), width * s)}
+        lines["bow"] = (length * s, width / 2 + arch * bends.get("bow", 0.0))
+        for name, style in (("cup", (0, (4, 2))), ("bow", (0, (1, 1.5)))):
+            if name in bends:
+                told = f"{name} {bends[name] * 1e3:.3g} mm"
+                handles[name] = panel.plot(*lines[name], color=VERMILLION, lw=1.3, ls=style, label=told, zorder=5)[0]
+    if "twist" in rises:
+        told = f"twist {rises['twist'] * 1e3:.3g} mm"
+        marker: Any = {"ls": "none", "ms": 8, "mec": "black", "mew": 0.8, "clip_on": False, "zorder": 6}
+        handles["twist"] = _points(panel, [(length, width)], "^", told, mfc=VERMILLION, **marker)
+    return handles
+
+
 def _points(panel: Axes, places: Sequence[tuple[float, float]], marker: str, label: str, **style: Any) -> Any:
     x, y = zip(*places, strict=True)
     return panel.plot(x, y, marker=marker, label=label, **style)[0]
@@ -232,4 +272,5 @@ def _alt(board: Board, values: Values, outlines: Sequence[_Outline]) -> str:
         free = " by ".join(f"{float(side) * 1e3:.4g}" for side in vibrating_lengths(values, setup))
         held.append(f"setup {setup.name}: {words}; the part that vibrates is {free} mm")
     kind = "rectangular board" if all(one.is_rectangle for one in outlines) else "board whose width varies"
-    return f"A {kind}, {size}. " + ". ".join(held) + "."
+    rises = ", ".join(f"{name} {rise.mean * 1e3:.3g} mm" for name, rise in board.warp.items() if rise.mean)
+    return ". ".join([f"A {kind}, {size}", *held, *([f"Not flat: {rises}"] if rises else [])]) + "."

@@ -170,6 +170,21 @@ def test_a_board_that_narrows_is_drawn_so(tapered):
     assert "both are drawn to recede alike" in picture.caption
 
 
+def test_a_board_that_is_not_flat_is_drawn_so():
+    """The largest rise at an eighth of the width, the other to the same scale, a sign as read, zero not at all."""
+    board = prepare("spruce-free-2R").board
+    rises = {"cup": Quantity.exact(1e-3), "bow": Quantity.exact(-4e-3), "twist": Quantity.exact(0.0)}
+    picture = board_picture(replace(board, warp=rises))
+    lines = {line.get_label(): 1e3 * line.get_xydata() for line in picture.figure.axes[0].lines}
+    length, width = (1e3 * board.inputs[f"length_{axis}"].mean for axis in "xy")
+    cup, bow = lines["cup 1 mm"][:, 0] - length / 2, lines["bow -4 mm"][:, 1] - width / 2
+    assert bow.min() == pytest.approx(-4.0 * cup.max())
+    assert bow.min() == pytest.approx(-0.12 * width, rel=0.25)  # a round number of times
+    assert not any(str(label).startswith("twist") for label in lines)
+    assert picture.alt.endswith("Not flat: cup 1 mm, bow -4 mm.")
+    assert "lies along it and across it" in picture.caption
+
+
 def test_figures_of_a_board_that_narrows_end_at_its_outline(tapered):
     """Twist of a free board, symmetric across: its line along stays in the middle, and nothing is drawn beyond."""
     system = system_of(tapered, tapered.setups[1])
