@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from bayesplate.planning.plan import Plan
     from bayesplate.plate.board import Board
     from bayesplate.plate.measured import Peak, Reading
-    from bayesplate.plate.setup import AttachedItem, DeclaredAir, Setup
+    from bayesplate.plate.setup import AttachedItem, DeclaredFluid, Setup
     from bayesplate.quantities import Quantity
     from bayesplate.recordings.contract import PickReport
     from bayesplate.results.checking import CheckReport
@@ -99,7 +99,7 @@ __all__ = [
     "CheckpointError",
     "CompareResult",
     "Comparison",
-    "DeclaredAir",
+    "DeclaredFluid",
     "DiagnoseResult",
     "Diagnosis",
     "Fault",
@@ -156,7 +156,7 @@ _HOMES = {
     "CheckpointError": "bayesplate.errors",
     "CompareResult": "bayesplate.workflow.compare",
     "Comparison": "bayesplate.results.comparison",
-    "DeclaredAir": "bayesplate.plate.setup",
+    "DeclaredFluid": "bayesplate.plate.setup",
     "DiagnoseResult": "bayesplate.workflow.diagnose",
     "Diagnosis": "bayesplate.diagnosis.wording.diagnosis",
     "Fault": "bayesplate.errors",

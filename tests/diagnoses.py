@@ -55,14 +55,14 @@ def known_model(error: float, left_out: float | None, *effects: str, without: tu
 KNOWN = (
     known_model(21.25, 46.5),
     known_model(9.5, 12.25, "transverse_shear"),
-    known_model(42.75, 94.0, "air_loading"),
-    known_model(38.5, 88.0, "transverse_shear", "air_loading"),
+    known_model(42.75, 94.0, "fluid_loading"),
+    known_model(38.5, 88.0, "transverse_shear", "fluid_loading"),
     known_model(30.25, 61.0, without=("attached_mass",)),
 )
 """Shear lowers the error, air raises it, and the sensor is there."""
 WORDS = {
     "membrane_tension": "membrane tension",
-    "air_loading": "air loading",
+    "fluid_loading": "fluid loading",
     "relabelling": "relabelling (1,0) and (0,1)",
 }
 SHIFT = {
@@ -115,7 +115,7 @@ def candidate(name: str, setup: str = "clamped", **changed: Any) -> EffectEntry:
 
 TENSION = candidate("membrane_tension", inclusion_probability=0.97, rejected_because=None, fate="in the verdict")
 AIR = candidate(
-    "air_loading", raw_rms_cents=60.0, visible_rms_cents=2.5, inclusion_probability=0.02, amplitude=None,
+    "fluid_loading", raw_rms_cents=60.0, visible_rms_cents=2.5, inclusion_probability=0.02, amplitude=None,
     look_alikes=("attached_mass",), rejected_because="its visible part drowns in the noise", fate="not detectable",
 )  # fmt: skip
 GRAIN = candidate("grain_angle", "board", visible_rms_cents=0.25, inclusion_probability=0.01)
@@ -174,7 +174,7 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         rigidity_averaged={name: spread(value, "N m") for name, value in (("D_x", 30.0), ("D_y", 2.5), ("D_s", 5.0))},
         answers=(
             Explanation(effects=("membrane_tension",), probability=0.97, words="membrane tension"),
-            Explanation(effects=("air_loading",), probability=0.0075, words="air loading"),
+            Explanation(effects=("fluid_loading",), probability=0.0075, words="fluid loading"),
             Explanation(effects=("grain_angle",), probability=0.0025, words="grain angle"),
         ),
         candidates=() if word == "undetectable" else (TENSION, AIR, GRAIN),
@@ -188,7 +188,7 @@ DIAGNOSES = {
     for one in (
         diagnosis("none needed"),
         diagnosis("named", ("membrane_tension",), claim=True, after=AFTER),
-        diagnosis("indistinguishable group", ("membrane_tension", "air_loading"), after=AFTER),
+        diagnosis("indistinguishable group", ("membrane_tension", "fluid_loading"), after=AFTER),
         diagnosis("unexplained"),
         diagnosis("undetectable"),
     )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,21 +14,25 @@ from pydantic import BeforeValidator, Field, PlainValidator, PrivateAttr
 
 from bayesplate.cards.fragment import merged
 from bayesplate.cards.measures import DENSITY, QuantityReader
-from bayesplate.cards.reading import read_file, read_table
-from bayesplate.cards.repeated import CALIPER, FURTHEST_SIZES, RULE, SCALES
+from bayesplate.cards.reading import read_file
+from bayesplate.cards.reading import read_table as read_toml
+from bayesplate.cards.repeated import CALIPER, FEELER, FURTHEST_SIZES, RULE, SCALES
 from bayesplate.cards.schema import Section, place, validated
 from bayesplate.cards.setup import SetupSection
 from bayesplate.cards.shelf import CAMPAIGN_REMEDY, find
 from bayesplate.cards.values import (
+    Complaint,
     Number,
+    Refusal,
+    read_effects,
     read_format,
     read_list,
     read_name,
     read_reference,
+    read_table,
     read_text,
-    read_words,
 )
-from bayesplate.cards.words import EFFECT_NAMES, name_complaint, quoted, shown
+from bayesplate.cards.words import name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.quantities import Quantity
 
@@ -35,9 +40,7 @@ DEFAULT_PRIOR = "weakly-informative"
 DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
 LARGEST_POISSON = 1.5
 MOST_SETUPS = 20
-EffectNames = Annotated[
-    tuple[str, ...], PlainValidator(lambda value: read_words(value, "names of effects", EFFECT_NAMES))
-]
+EffectNames = Annotated[tuple[str, ...], PlainValidator(read_effects)]
 """Effects that a card declares."""
 _LENGTH = Number(1, 100_000, "mm", too_small="in mm: 1 m is 1000 mm, 1 cm is 10 mm")
 _THICKNESS = Number(0.01, 1000, "mm")
@@ -46,17 +49,36 @@ _SIZE = partial(QuantityReader, furthest=FURTHEST_SIZES)
 _LENGTH_X = _SIZE(_LENGTH, places=("at_y_mm",), resolution=RULE)
 _LENGTH_Y = _SIZE(_LENGTH, places=("at_x_mm",), resolution=RULE)
 _THICKNESSES = _SIZE(_THICKNESS, places=("at_x_mm", "at_y_mm"), resolution=CALIPER)
+_OVER = "seen from below every warp has the other sign, and turning the board over changes nothing"
+_WARPS: dict[str, Callable[[object], Any]] = {
+    name: QuantityReader(
+        Number(low, 1000, "mm", hint), "normal", resolution=FEELER, widest=1000, lower=0.0 if low == 0 else -math.inf
+    )
+    for name, low, hint in (("cup", 0, _OVER), ("bow", -1000, ""), ("twist", 0, _OVER))
+}
 _SHEAR = QuantityReader(Number(1e-4, 1000, "GPa"))
 
 
+def _read_warp(value: object) -> dict[str, Quantity]:
+    """The rise across the width, along the length and of a corner, as a straightedge tells them."""
+    if not isinstance(value, dict):
+        raise Refusal(Complaint("a table of cup, bow and twist, { cup = 0.8 }", shown(value)))
+    return read_table(value, _WARPS)
+
+
 class PlateSection(Section):
-    """The whole board before clamping: lengths in mm; its mass in g or its density in kg/m3, one of the two."""
+    """The whole board before clamping: lengths in mm; its mass in g or its density in kg/m3, one of the two.
+
+    Its warp is what a straightedge tells, in mm: `cup` is the rise across the width, `bow` that along the length, of
+    the cup's sign on a dome and negative on a saddle, `twist` a corner's lift off a table that the other three touch.
+    """
 
     length_x_mm: Annotated[Quantity, PlainValidator(_LENGTH_X)] = Field(description="the length along the grain in mm")
     length_y_mm: Annotated[Quantity, PlainValidator(_LENGTH_Y)] = Field(description="the length across the grain in mm")
     thickness_mm: Annotated[Quantity, PlainValidator(_THICKNESSES)] = Field(description="the thickness in mm")
     mass_g: Annotated[Quantity | None, PlainValidator(_SIZE(_MASS, resolution=SCALES))] = None
     density_kg_m3: Annotated[Quantity | None, PlainValidator(_SIZE(DENSITY))] = None
+    warp_mm: Annotated[Mapping[str, Quantity], PlainValidator(_read_warp)] = Field(default_factory=dict)
 
 
 class MaterialSection(Section):
@@ -212,7 +234,7 @@ def _read_board(
     setup: str | os.PathLike[str] | None = None,
 ) -> BoardCard:
     own, file = file, plain(file)
-    table = read_table(data, file)
+    table = read_toml(data, file)
     if {*table} == {"setup"} and isinstance(table["setup"], dict):
         remedy = f"it completes a card: CARD --setup {file}"
         raise InputError(Fault(file, "a card, which has a [plate]", "a [setup] alone, as pick writes it", remedy))
@@ -221,7 +243,7 @@ def _read_board(
     if setup is not None:
         together, file = merged(table, file, setup)
         data = together.encode("utf-8", "surrogatepass")
-        table = read_table(data, file)
+        table = read_toml(data, file)
     faults = [*name_faults(table, file, stem), *_mass_faults(table, file), *_setup_name_faults(table, file)]
     context = {
         "written": table,

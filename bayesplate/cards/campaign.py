@@ -20,13 +20,14 @@ from bayesplate.cards.values import (
     Number,
     Refusal,
     read_each,
+    read_effect,
     read_format,
     read_list,
     read_name,
     read_reference,
     read_text,
 )
-from bayesplate.cards.words import EFFECT_NAMES, quoted
+from bayesplate.cards.words import effect_named, quoted
 from bayesplate.errors import Fault, plain
 
 FEWEST_BOARDS, MOST_BOARDS = 2, 200
@@ -62,7 +63,7 @@ class SharedSection(Section):
         Scale of what the boards' own are believed to differ by from what they have in common; 0 if by nothing.
     """
 
-    effect: Annotated[str, PlainValidator(Choice(EFFECT_NAMES))] = Field(description="the name of an effect")
+    effect: Annotated[str, PlainValidator(read_effect)] = Field(description="the name of an effect")
     way: Annotated[Way, PlainValidator(Choice(WAYS))] = Field(default="value", alias="as")
     scatter_percent: Annotated[float, PlainValidator(Number(0.1, 100, "%"))] = 0.0
 
@@ -163,9 +164,10 @@ def _twice(table: Mapping[str, Any], file: str) -> list[Fault]:
     """An effect is shared once, in one way."""
     shared = table.get("shared")
     entries = shared if isinstance(shared, list) else []
-    names = [entry.get("effect") if isinstance(entry, dict) else None for entry in entries]
+    effects = [entry.get("effect") if isinstance(entry, dict) else None for entry in entries]
+    names = [effect_named(name) if isinstance(name, str) else None for name in effects]
     return [
         Fault(place(file, table, ("shared", i, "effect")), "each effect once", f"{quoted(name)} again")
         for i, name in enumerate(names)
-        if isinstance(name, str) and name in names[:i]
+        if name is not None and name in names[:i]
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from bayesplate.cards.repeated import are_alike, comma_complaint, scatter_complaint
@@ -38,7 +38,7 @@ class QuantityReader:
     `places` names the coordinates that readings of this quantity may (and then must) have, and with them an uncertainty
     of the places; `furthest` is the ratio up
     to which readings without places may lie apart; `resolution` is assumed where all readings are alike and none is
-    stated.
+    stated. A normal quantity has a standard deviation of at most `widest`, and is cut off at `lower`.
     """
 
     number: Number
@@ -46,6 +46,8 @@ class QuantityReader:
     places: tuple[str, ...] = ()
     furthest: float = math.inf
     resolution: float = 0.0
+    widest: float = 1.0
+    lower: float = -math.inf
 
     def __call__(self, value: object) -> Quantity:
         if isinstance(value, list):
@@ -63,11 +65,11 @@ class QuantityReader:
             table, {"mean": self.number, "sd": Number(1e-300, self.number.high, self.number.unit, _ROUNDING)}
         )
         mean, sd = read["mean"], read["sd"]
-        scale = mean if self.kind == "log-normal" else 1.0
+        scale = mean if self.kind == "log-normal" else self.widest
         if not _SMALLEST_SHARE * scale <= sd <= scale:
             wanted = f"a number from {_SMALLEST_SHARE * scale:g} to {scale:g} {self.number.unit}".rstrip()
             raise Refusal(Complaint(wanted, shown(table["sd"]), _ROUNDING, ("sd",)))
-        return Quantity.from_mean(mean, sd, self.kind)
+        return Quantity.from_mean(mean, sd, self.kind, self.lower)
 
     def _from_readings(self, table: dict[str, Any]) -> Quantity:
         readers: dict[str, Callable[[object], Any]] = {
@@ -93,7 +95,8 @@ class QuantityReader:
         """The quantity of readings that are in order, and what the card says of them."""
         assumed = self.resolution if are_alike(readings) else 0.0
         resolution, at_x, at_y = read.get("resolution", assumed), read.get("at_x_mm", ()), read.get("at_y_mm", ())
-        return Quantity.from_readings(readings, resolution, at_x, at_y, self.kind, read.get("place_sd_mm", 0.0))
+        found = Quantity.from_readings(readings, resolution, at_x, at_y, self.kind, read.get("place_sd_mm", 0.0))
+        return found if found.is_exact else replace(found, lower=self.lower)
 
     def _readings(self, value: object) -> list[float]:
         """Readings of a field: they may lie apart."""

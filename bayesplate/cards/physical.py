@@ -14,6 +14,7 @@ from bayesplate.quantities import Quantity
 
 LIGHTEST, HEAVIEST = 20.0, 25_000.0  # kg/m3: lighter than balsa foam, heavier than any metal in use
 _LIGHT, _HEAVY = 100.0, 9_000.0  # kg/m3: balsa and brass, between which a board is likely
+MOST_WARP = 0.1  # of the side: a shallow shell, of which the effect is computed, rises by less
 THICKEST_SHARE = 0.5  # of the shorter side; beyond it no plate theory holds
 
 
@@ -38,6 +39,7 @@ def physical_faults(card: BoardCard) -> list[Fault]:
             *_label_faults(setup, where),
             *_place_faults(card, setup, where),
             *_mass_faults(card, setup, where),
+            *_bounce_faults(setup, where),
         ]
     return faults
 
@@ -75,6 +77,12 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
     if plate.thickness_mm.mean > THICKEST_SHARE * shorter:
         wanted = f"at most half the shorter side, {THICKEST_SHARE * shorter:g} mm"
         yield Fault(f"{file} [plate] thickness_mm", wanted, f"{plate.thickness_mm.mean:g} mm", "no plate is so thick")
+    sides = {"cup": plate.length_y_mm.mean, "bow": plate.length_x_mm.mean}
+    for key, warp in plate.warp_mm.items():
+        most = MOST_WARP * sides.get(key, max(sides.values()))
+        if abs(warp.mean) > most:
+            wanted = f"at most a tenth of the side, {most:g} mm"
+            yield Fault(f"{file} [plate] warp_mm.{key}", wanted, f"{warp.mean:g} mm", "in mm; a board is nearly flat")
     limits = {"at_x_mm": _reach(plate.length_x_mm), "at_y_mm": _reach(plate.length_y_mm)}
     for key in ("length_x_mm", "length_y_mm", "thickness_mm"):
         quantity: Quantity = getattr(plate, key)
@@ -156,8 +164,28 @@ def off_the_board(card: BoardCard, setup: SetupSection, places: Mapping[str, tup
 
 def _mass_faults(card: BoardCard, setup: SetupSection, where: str) -> Iterator[Fault]:
     for number, item in enumerate(setup.attached, start=1):
-        if item.mass_g is not None:
-            yield from too_heavy(card, f"{where} attached {number} mass_g", item.mass_g.mean)
+        own = f"{where} attached {number}"
+        if item.mass_g is None:
+            continue
+        if item.kind != "exciter":
+            yield from too_heavy(card, f"{own} mass_g", item.mass_g.mean)
+        elif item.coil_mass_g is not None and item.coil_mass_g.mean >= item.mass_g.mean:
+            wanted = f"less than the whole exciter's {item.mass_g.mean:g} g"
+            got, remedy = f"{item.coil_mass_g.mean:g} g", "mass_g is coil and magnet together"
+            yield Fault(f"{own} coil_mass_g", wanted, got, remedy)
+        if not item.at_mm and item.kind != "exciter":
+            remedy = "at_mm = [x, y]; without mass_g it is a candidate of diagnose, which tries likely places"
+            yield Fault(f"{own} at_mm", "a place, because the mass is declared", "nothing", remedy)
+
+
+def _bounce_faults(setup: SetupSection, where: str) -> Iterator[Fault]:
+    """A support raises the square of every frequency by that of the bounce, so that no mode is below it."""
+    bounce = None if setup.support is None else setup.support.bounce_hz
+    read = [hz.mean for hz in setup.frequencies_hz.values()]
+    if bounce is not None and read and bounce.mean >= min(read):
+        wanted = f"less than the lowest mode, {min(read):g} Hz"
+        remedy = "the peak of a board that moves as a whole on its support"
+        yield Fault(f"{where} support.bounce_hz", wanted, f"{bounce.mean:g} Hz", remedy)
 
 
 def too_heavy(card: BoardCard, where: str, grams: float) -> Iterator[Fault]:

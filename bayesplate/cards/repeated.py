@@ -16,10 +16,11 @@ FURTHEST_FREQUENCIES = 1.1
 """The same of one mode's frequency. Frequencies of a free board scatter by 0.3 %; clamping it again moves them by up to
 2.4 % (one standard deviation), so two readings a tenth apart are of two modes."""
 
-CALIPER, RULE = 0.05, 1.0  # mm
+CALIPER, FEELER, RULE = 0.05, 0.1, 1.0  # mm
 SCALES, FINE_SCALES = 1.0, 0.1  # g
-"""Resolutions that are assumed where all readings are alike and the card states none: of a thickness, of lengths, of
-the board's mass and of the mass of something attached. Alike readings have no scatter, but no instrument is exact."""
+"""Resolutions that are assumed where all readings are alike and the card states none: of a thickness, of a warp, of
+lengths, of the board's mass and of the mass of something attached. Alike readings have no scatter, but no instrument is
+exact."""
 
 _WHOLE_NUMBERS_APART = 1.5
 _JOINED_APART = 1.25

@@ -33,7 +33,7 @@ from bayesplate.cards.values import (
     refuse,
 )
 from bayesplate.cards.values import read_table as read_entries
-from bayesplate.cards.words import ATTACHED_KINDS, BAFFLES, EDGE_NAMES, EDGE_WORDS, shown
+from bayesplate.cards.words import ATTACHED_KINDS, BAFFLES, EDGE_NAMES, EDGE_WORDS, MAGNETS, quoted, shown
 from bayesplate.labels import Label
 from bayesplate.quantities import Quantity
 
@@ -51,6 +51,11 @@ _CHANCE = Number(_OPEN, 1 - _OPEN, hint=_PROBABILITY)
 _CLAMPED = Number(0.01, 100_000, "mm", "leave the edge out if the clamp covers nothing")
 _CLAMPED_LENGTH = QuantityReader(_CLAMPED, furthest=FURTHEST_SIZES, resolution=RULE)
 _ATTACHED_MASS = QuantityReader(Number(1e-4, 1e6, "g"), furthest=FURTHEST_SIZES, resolution=FINE_SCALES)
+_COIL_MASS = QuantityReader(Number(1e-4, 1e6, "g"), furthest=FURTHEST_SIZES, resolution=FINE_SCALES)
+_SUSPENSION = QuantityReader(Number(0.1, 1e8, "N/m", "1 N/mm is 1000 N/m"), furthest=FURTHEST_SIZES)
+_RESONANCE = QuantityReader(Number(0.1, 10_000, "Hz"), furthest=FURTHEST_FREQUENCIES)
+_BOUNCE = QuantityReader(Number(0.01, 1000, "Hz"), furthest=FURTHEST_SIZES)
+_FLUID_DENSITY = QuantityReader(Number(1e-6, 2000, "kg/m3", "air at the ground is 1.2 kg/m3, water is 997"))
 _SIGN = Choice(("+", "-"))
 _EDGE_WANTED = 'a word for each of the four edges x0, x1, y0, y1: "clamped", "supported" or "free"'
 
@@ -104,15 +109,39 @@ def _edges_table(value: object) -> object:
 
 
 class AttachedItem(Section):
-    """A thing fixed to the board: declared if it has a mass, otherwise a candidate at its place."""
+    """A thing fixed to the board: declared if it has a mass, otherwise a candidate at its place, or anywhere.
+
+    An exciter is a coil on the board and a magnet on a spring; its mass is that of both.
+    """
 
     kind: Annotated[Literal["accelerometer", "exciter", "shaker", "weight"], PlainValidator(Choice(ATTACHED_KINDS))] = (
         Field(description="what it is")
     )
     mass_g: Annotated[Quantity | None, PlainValidator(_ATTACHED_MASS)] = None
     at_mm: Annotated[tuple[Place, ...], PlainValidator(read_places)] = Field(
-        description="its place [x, y] in mm from the corner of the edges x0 and y0"
+        default=(), description="its place [x, y] in mm from the corner of the edges x0 and y0"
     )
+    coil_mass_g: Annotated[Quantity | None, PlainValidator(_COIL_MASS)] = None
+    suspension_n_per_m: Annotated[Quantity | None, PlainValidator(_SUSPENSION)] = None
+    resonance_hz: Annotated[Quantity | None, PlainValidator(_RESONANCE)] = None
+    magnet: Annotated[Literal["free", "held"], PlainValidator(Choice(MAGNETS))] = "free"
+
+    @field_validator("coil_mass_g", "suspension_n_per_m", "resonance_hz", "magnet")
+    @classmethod
+    def _is_of_an_exciter(cls, value: Any, info: ValidationInfo) -> Any:
+        kind = info.data.get("kind", "exciter")
+        if kind != "exciter":
+            remedy = 'leave it out, or kind = "exciter" if it drives the board by a coil'
+            raise Refusal(Complaint("it on an exciter only", f"a thing of kind {quoted(kind)}", remedy))
+        return value
+
+    @field_validator("resonance_hz")
+    @classmethod
+    def _is_stated_once(cls, value: Quantity | None, info: ValidationInfo) -> Quantity | None:
+        if info.data.get("suspension_n_per_m") is not None:
+            remedy = "each gives the other with the magnet's mass"
+            raise Refusal(Complaint("one of suspension_n_per_m and resonance_hz", "both", remedy))
+        return value
 
 
 class PeakSection(Section):
@@ -132,13 +161,17 @@ class HammerSection(Section):
     at_mm: Annotated[Place, PlainValidator(read_place)] = Field(description="the place [x, y] in mm")
 
 
-class AirSection(Section):
-    """The air around the board; a value that is absent keeps the effect's own prior."""
+class FluidSection(Section):
+    """The air or the water around the board; a value that is absent keeps the effect's own prior."""
 
-    density_kg_m3: Annotated[
-        Quantity | None, PlainValidator(QuantityReader(Number(1e-6, 100, "kg/m3", "air at the ground is 1.2 kg/m3")))
-    ] = None
+    density_kg_m3: Annotated[Quantity | None, PlainValidator(_FLUID_DENSITY)] = None
     baffle: Annotated[Literal["none", "full"] | None, PlainValidator(Choice(BAFFLES))] = None
+
+
+class SupportSection(Section):
+    """What the record says of the support of a free board."""
+
+    bounce_hz: Annotated[Quantity | None, PlainValidator(_BOUNCE)] = None
 
 
 def _read_setup_name(value: object) -> str:
@@ -196,7 +229,14 @@ class SetupSection(Section):
     label_confidence: Annotated[float | Mapping[Label, float], PlainValidator(_read_confidence)] = 1.0
     attached: tuple[AttachedItem, ...] = Field(default=(), max_length=MOST_ATTACHED)
     hammer: HammerSection | None = None
-    air: AirSection | None = None
+    support: SupportSection | None = None
+    fluid: FluidSection | None = None
+    air: FluidSection | None = None
+
+    @property
+    def surroundings(self) -> FluidSection | None:
+        """What stands in [setup.fluid], or in [setup.air], which means the same."""
+        return self.air if self.fluid is None else self.fluid
 
     def confidence_in(self, label: Label) -> float:
         """Probability that a label is right."""
@@ -214,6 +254,13 @@ class SetupSection(Section):
             loose = [edge for edge in value if edges.words[edge] != "clamped"]
             if loose:
                 raise Refusal(*(Complaint("a clamped edge", f"a {edges.words[e]} one", inside=(e,)) for e in loose))
+        return value
+
+    @field_validator("air")
+    @classmethod
+    def _is_no_second_fluid(cls, value: FluidSection | None, info: ValidationInfo) -> FluidSection | None:
+        if info.data.get("fluid") is not None:
+            raise Refusal(Complaint("[setup.fluid] alone, which means the same", "both", "leave [setup.air] out"))
         return value
 
     @field_validator("peaks")

@@ -8,7 +8,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from bayesplate.cards.words import did_you_mean, listed, name_complaint, quoted, shown
+from bayesplate.cards.words import (
+    EFFECT_NAMES,
+    did_you_mean,
+    effect_named,
+    listed,
+    name_complaint,
+    quoted,
+    shown,
+)
 
 T = TypeVar("T")
 Inside = tuple[str | int, ...]
@@ -191,12 +199,16 @@ def read_text(value: object) -> str:
     return value
 
 
-def read_words(value: object, what: str, words: tuple[str, ...]) -> tuple[str, ...]:
-    """A list of different words out of `words`; it may be empty."""
+def read_effect(value: object) -> str:
+    """The name of an effect, or another one that is accepted for it."""
+    return Choice(EFFECT_NAMES)(effect_named(value) if isinstance(value, str) else value)
+
+
+def read_effects(value: object) -> tuple[str, ...]:
+    """A list of different effects; it may be empty."""
     if value == []:
         return ()
-    items = read_list(value, what, len(words))
-    read = read_each(enumerate(items), Choice(words))
+    read = read_each(enumerate(read_list(value, "names of effects", len(EFFECT_NAMES))), read_effect)
     twice = sorted({word for word in read if read.count(word) > 1})
     if twice:
         raise Refusal(Complaint("each name once", f"{listed(twice)} twice"))

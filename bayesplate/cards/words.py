@@ -13,10 +13,13 @@ EDGE_NAMES = ("x0", "x1", "y0", "y1")
 EDGE_WORDS = ("clamped", "supported", "free")
 ATTACHED_KINDS = ("accelerometer", "exciter", "shaker", "weight")
 BAFFLES = ("none", "full")
+MAGNETS = ("free", "held")
 EFFECT_NAMES = (
     "transverse_shear",
-    "air_loading",
+    "fluid_loading",
     "attached_mass",
+    "exciter",
+    "warp",
     "clamp_rotation",
     "clamp_translation",
     "support_mass",
@@ -29,6 +32,8 @@ EFFECT_NAMES = (
     "grain_angle",
     "poisson_ratio",
 )
+OTHER_EFFECT_NAMES = {"air_loading": "fluid_loading"}
+"""Names that are accepted wherever a user names an effect, each with the library's own."""
 
 LONGEST_NAME = 80
 NAME_RULE = f"A-Z, a-z, 0-9, '.', '_' or '-', beginning with a letter or digit, at most {LONGEST_NAME} characters"
@@ -36,6 +41,11 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _RESERVED = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT") for n in range(10))}
 _UNIT = re.compile(r"_(mm|g|kg_m3|hz|gpa|percent|n_m)$")
 _LONGEST_SHOWN = 60
+
+
+def effect_named(word: str) -> str:
+    """The library's own name of an effect where another one is accepted for it; any other word as it is."""
+    return OTHER_EFFECT_NAMES.get(word, word)
 
 
 def name_complaint(name: str) -> str:

@@ -111,15 +111,14 @@ def quantity(one: Quantity, scale: float, place_scale: float = 1.0) -> str:
     return table({"mean": number(one.mean, scale), "sd": number(one.sd, scale)})
 
 
-def unstatable(place: str, one: Quantity, kind: Kind = "log-normal") -> list[Fault]:
-    """What a card cannot say of a quantity whose key takes a density of one kind without bounds."""
-    if one.is_exact:
+def unstatable(place: str, one: Quantity, kind: Kind = "log-normal", lower: float = -math.inf) -> list[Fault]:
+    """What a card cannot say of a quantity whose key takes a density of one kind, without bounds but a lower one."""
+    if one.is_exact or (one.kind == kind and (one.lower, one.upper) == (lower, math.inf)):
         return []
     is_bounded = math.isfinite(one.lower) or math.isfinite(one.upper)
-    if one.kind == kind and not is_bounded:
-        return []
     got = f"a {one.kind} one" + (" with bounds" if is_bounded else "")
-    return [Fault(place, f"a {kind} quantity without bounds, as cards state it", got)]
+    bounds = f"from {lower:g} on" if math.isfinite(lower) else "without bounds"
+    return [Fault(place, f"a {kind} quantity {bounds}, as cards state it", got)]
 
 
 def text(value: str) -> str:

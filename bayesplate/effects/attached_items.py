@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,6 +74,12 @@ def item_on_board(board: Board, setup: Setup, item: AttachedItem) -> Item:
     mass, source = (item.mass, "") if item.mass is not None else _PRIORS[item.kind]
     base = 0.0 if item.kind == "shaker" else 0.5 * float(base_diameter(mass.median))
     return Item(mass, source, fractions_on(board, setup, item.places), radius_on(board, setup, base), base)
+
+
+def items_on_board(board: Board, setup: Setup, item: AttachedItem) -> list[Item]:
+    """A thing of the card at its places, or at each of the likely ones where nobody knows them."""
+    own = item_on_board(board, setup, item)
+    return [own] if item.places else [replace(own, places=(place,)) for place in _likely_places(setup)]
 
 
 def fractions_on(board: Board, setup: Setup, places: Places) -> Fractions:

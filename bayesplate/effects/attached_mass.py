@@ -18,6 +18,7 @@ from bayesplate.effects.attached_items import (
     forgotten_items,
     fractions_on,
     item_on_board,
+    items_on_board,
     places_on,
     radius_on,
     rotary_inertia,
@@ -27,7 +28,7 @@ from bayesplate.modes.line import Line
 from bayesplate.modes.plate import KronSum
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import Setup
+from bayesplate.plate.setup import AttachedItem, Setup
 
 HEAVIEST_ROVING = 0.02
 """Share of the board's mass up to which a roving item is computed; see `AttachedMass`."""
@@ -49,7 +50,7 @@ class AttachedMass(Effect):
     square; where two modes lie close, 0.6 percent err by 3.5. A roving item above 2 percent is refused.
 
     A place that nobody knows is no continuous parameter: `forms` tries a few places instead. Places are fractions
-    of the nominal sides.
+    of the nominal sides. An exciter is no point mass: its magnet hangs on a spring.
 
     Attributes
     ----------
@@ -67,8 +68,9 @@ class AttachedMass(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> AttachedMass:
         """All things where the effect is declared, by a list or by one mass; otherwise those of known mass, or all."""
-        known = [item for item in setup.attached if item.mass is not None]
-        items = setup.attached if cls.name in board.effects or not known else known
+        placed = [item for item in _masses(setup) if item.places]
+        known = [item for item in placed if item.mass is not None]
+        items = placed if cls.name in board.effects or not known else known
         return cls(setup.owner, tuple(item_on_board(board, setup, item) for item in items))
 
     @classmethod
@@ -79,28 +81,29 @@ class AttachedMass(Effect):
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
         """Whether the setup states the mass of an attached thing."""
-        return any(item.mass is not None for item in setup.attached)
+        return any(item.mass is not None for item in _masses(setup))
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[AttachedMass, ...]:
-        """Each thing of unknown mass beside those that are known."""
-        if cls.refusal(board, setup):
+        """Each thing of unknown mass beside those that are known, at each likely place where its own is not known."""
+        if not _masses(setup) or heaviest_roving(board, setup) > HEAVIEST_ROVING:
             return ()
-        known = tuple(item_on_board(board, setup, item) for item in setup.attached if item.mass is not None)
-        unknown = [item_on_board(board, setup, item) for item in setup.attached if item.mass is None]
+        known = tuple(item_on_board(board, setup, item) for item in _masses(setup) if item.mass is not None)
+        unknown = [one for item in _masses(setup) if item.mass is None for one in items_on_board(board, setup, item)]
         return tuple(cls(setup.owner, (*known, item)) for item in unknown)
 
     @classmethod
     def forms(cls, board: Board) -> tuple[EffectForm, ...]:
         """Each thing of unknown mass; where nothing is attached, one that nobody mentioned at one of a few places."""
-        if any(setup.attached for setup in board.setups):
-            return super().forms(board)
+        if any(map(_masses, board.setups)):
+            found = super().forms(board)
+            is_placed = all(item.places for setup in board.setups for item in _masses(setup))
+            return found if is_placed else tuple(replace(one, detail=_spot(board, one.effects[0])) for one in found)
         tried = [[cls(setup.owner, (item,)) for item in forgotten_items(board, setup)] for setup in board.setups]
         forms = []
         for effect in max(tried, key=len):
-            x, y = effect._places_on(board)[0][0]
             effects = tuple(effect.in_setup(board, setup) for setup in board.setups)
-            forms.append(EffectForm(f"at {1e3 * x:.0f}, {1e3 * y:.0f} mm", effects))
+            forms.append(EffectForm(_spot(board, effect), effects))
         return tuple(forms)
 
     def in_setup(self, board: Board, setup: Setup) -> AttachedMass:
@@ -135,7 +138,7 @@ class AttachedMass(Effect):
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
         """Refused where the setup does not say what is attached, or where a heavy thing roved."""
-        if not setup.attached:
+        if not any(item.places for item in _masses(setup)):
             return "no [[setup.attached]] says what is fixed to the board and where"
         if heaviest_roving(board, setup) > HEAVIEST_ROVING:
             return f"something above {HEAVIEST_ROVING:.0%} of the board roved: give each place a setup of its own"
@@ -183,9 +186,21 @@ class AttachedMass(Effect):
                 yield Mass(partial(_mean_squares, item=item, tilt=axis), partial(inertia, axis=axis))
 
 
+def _masses(setup: Setup) -> tuple[AttachedItem, ...]:
+    """The things that move with the board as a whole."""
+    return tuple(item for item in setup.attached if item.kind != "exciter")
+
+
+def _spot(board: Board, effect: Effect) -> str:
+    """Where the last of the things is, in words."""
+    assert isinstance(effect, AttachedMass)
+    x, y = effect._places_on(board)[-1][0]
+    return f"at {1e3 * x:.0f}, {1e3 * y:.0f} mm"
+
+
 def heaviest_roving(board: Board, setup: Setup) -> float:
     """Mass of the heaviest thing that roved in a setup, over the board's; 0 if none did."""
-    if not setup.attached:
+    if not _masses(setup):
         return 0.0
     roved = [i.mass.median for i in AttachedMass.of(board, setup).items if len(i.places) > 1]
     return max(roved, default=0.0) / board_mass(board)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from bayesplate.modes.fields import EdgeStrip, Field, Group, Outline
 from bayesplate.modes.line import Line
-from bayesplate.modes.plate import KronSum, Projection, Term, Weights
+from bayesplate.modes.plate import Beside, KronSum, Projection, Term, Weights
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD, Owner, Parameter, shown_name
 from bayesplate.plate.setup import Setup
@@ -32,7 +32,7 @@ Release = Literal["", "value", "slope"]
 """What clamped edges let go in the presence of an effect, whose springs then hold it: nothing, deflection or slope."""
 Floats = NDArray[np.float64]
 Weight = Callable[[Values, Setup], Floats]
-"""What a term weighs at values in a setup: a number or an (n_draws,) array."""
+"""What a term weighs at values in a setup: a number or an (n_draws,) array; of several terms one more axis for them."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,36 @@ class Stiffness:
     matrix: Callable[[Line, Line], Term]
     weight: Weight
 
+    def matrices(self, x: Line, y: Line) -> tuple[Term, ...]:
+        """The one matrix."""
+        return (self.matrix(x, y),)
+
+
+@dataclass(frozen=True)
+class Stiffnesses:
+    """Several stiffness terms whose weights are worked out together."""
+
+    matrices: Callable[[Line, Line], tuple[Term, ...]]
+    weight: Weight
+
 
 @dataclass(frozen=True)
 class Mass:
     """A mass term on the deflection: its matrix from the lines, and its weight as a fraction of the vibrating mass."""
 
     matrix: Callable[[Line, Line], KronSum]
+    weight: Weight
+
+    def matrices(self, x: Line, y: Line) -> tuple[KronSum, ...]:
+        """The one matrix."""
+        return (self.matrix(x, y),)
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Several mass terms whose weights are worked out together."""
+
+    matrices: Callable[[Line, Line], tuple[KronSum | Beside, ...]]
     weight: Weight
 
 
@@ -59,8 +83,23 @@ class ProjectedMass:
     weight: Weight
 
 
-Contribution = Stiffness | Mass | ProjectedMass
-"""One term that an effect adds to the budget of energies."""
+@dataclass(frozen=True)
+class ProjectedStiffnesses:
+    """Stiffness terms without sparse matrices: their projection on given deflections, and their weights.
+
+    Attributes
+    ----------
+    projection : callable
+        From the values at which the plate is made, and the field that its in-plane stiffness follows (None: uniform).
+    weight : callable
+    """
+
+    projection: Callable[[Values, Field | None], Projection]
+    weight: Weight
+
+
+Contribution = Stiffness | Stiffnesses | Mass | Masses | ProjectedMass | ProjectedStiffnesses
+"""A term, or several together, that an effect adds to the budget of energies."""
 
 
 @dataclass(frozen=True)
@@ -260,6 +299,10 @@ class Effect(ABC):
     def goes_with(self) -> tuple[str, ...]:
         """Inputs of the board that its fields follow: another value of them is another plate, not the same scaled."""
         return ()
+
+    def stations(self) -> tuple[Effect, ...]:
+        """The effect at each place over which it roved: what is read is the mean of the frequencies there."""
+        return (self,)
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """Whether the two halves of the plate stay alike along x and along y."""

@@ -64,6 +64,23 @@ def fabric_of(effects: Sequence[Effect]) -> Fabric:
     )
 
 
+def in_plane(effects: Sequence[Effect], values: Values) -> Field | None:
+    """The field that the in-plane stiffness follows at one draw of values; None where it is uniform.
+
+    It goes with the thickness and with the moduli, as the shear stiffness does. What an outline takes away at the edges
+    is left in.
+    """
+    joined = _joined(tuple(effects)).get("shear", [])
+    shares = [
+        (float(_weight(one, values)[0]), tuple(_fields(one)))
+        for one in joined
+        if not any(isinstance(each, EdgeStrip) for each in _fields(one))
+    ]
+    if not any(field for _, fields in shares for field in fields):
+        return None
+    return _Sum(tuple(shares))
+
+
 def over_fields(base: Weights, effects: Sequence[Effect], theory: Theory, values: Values, setup: Setup) -> Weights:
     """Weights of the plate's own terms in the presence of effects, once for each field that they take.
 
@@ -142,6 +159,19 @@ def _times(first: Field | EdgeStrip | None, second: Field | EdgeStrip | None) ->
 
 def _product(first: Field, second: Field | None) -> Field:
     return first if second is None else _Product(first, second)
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """Products of fields, each with its share; None is uniform."""
+
+    shares: tuple[tuple[float, tuple[Field | EdgeStrip | None, ...]], ...]
+
+    def __call__(self, x: Floats, y: Floats) -> Floats:
+        total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
+        for share, fields in self.shares:
+            total = total + share * reduce(np.multiply, (one(x, y) for one in fields if callable(one)), np.ones(1))
+        return total
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.laws import log_frequency
+from bayesplate.frequencies.laws import log_frequency, mean_log_frequency
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.modes.plate import Parity
 from bayesplate.modes.solve import solve_classes
@@ -26,6 +26,8 @@ def full_log_frequencies(model: SetupModel, values: Values) -> NDArray[np.float6
     -------
     (n_modes,) array
     """
+    if model.roved:
+        return mean_log_frequency([full_log_frequencies(one, values) for one in model.stations])
     ranks: dict[Parity, int] = {}
     for place in model.places:
         ranks[place.parity] = max(ranks.get(place.parity, 0), place.rank + 1)

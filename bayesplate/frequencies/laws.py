@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -63,6 +64,11 @@ class ExactLaw:
 def log_frequency(squared: NDArray[np.float64]) -> NDArray[np.float64]:
     """ln f (f in Hz) from omega^2; not a number where omega^2 is not positive."""
     return 0.5 * np.log(np.where(squared > 0, squared, np.nan)) - np.log(2.0 * np.pi)
+
+
+def mean_log_frequency(each: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """ln of the mean of frequencies of which ln is given, arrays of one shape."""
+    return each[0] if len(each) == 1 else np.asarray(np.log(np.mean(np.exp(each), axis=0)))
 
 
 def cents(log_ratio: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency
+from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_frequency, mean_log_frequency
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
 from bayesplate.modes.plate import Beams, PlateMatrices
 from bayesplate.modes.reduction import ACCEPTED_CENTS, reduced_order_model
-from bayesplate.modes.solve import solve_up_to
+from bayesplate.modes.solve import Modes, solve_up_to
 from bayesplate.plate.board import Values
 from bayesplate.plate.sessions import discrepancy_names
 from bayesplate.plate.setup import Setup
@@ -66,6 +66,8 @@ class SetupModel:
     residues : (n_modes + n_others,) array or None
         Residue of each mode between hammer and sensor over the largest that its shape could give; None where the places
         are not known.
+    roved : tuple of SetupModel
+        The same modes with what roved at its further places: a frequency is the mean over all of them.
     """
 
     system: System
@@ -75,6 +77,17 @@ class SetupModel:
     exact: ExactLaw | None = None
     others: tuple[OtherMode, ...] = ()
     residues: NDArray[np.float64] | None = None
+    roved: tuple[SetupModel, ...] = ()
+
+    @property
+    def stations(self) -> tuple[SetupModel, ...]:
+        """The model with what roved at each of its places, the first one first; itself where nothing did."""
+        return (replace(self, roved=()), *self.roved)
+
+    @property
+    def worst_cents(self) -> float:
+        """Largest error of the exact law against full solves that it was not trained on, cents."""
+        return max(one.exact.reduced.worst_cents for one in self.stations if one.exact is not None)
 
     @property
     def setup(self) -> Setup:
@@ -100,7 +113,8 @@ class SetupModel:
 
     def every_log_frequency(self, values: Values, law: LawName) -> NDArray[np.float64]:
         """The same of the labelled modes, then of the others: (n_draws, n_modes + n_others) array."""
-        return log_frequency(self.law(law).squared(self.system.weights(values)))
+        own = log_frequency(self.law(law).squared(self.system.weights(values)))
+        return mean_log_frequency([own, *(one.every_log_frequency(values, law) for one in self.roved)])
 
     @cached_property
     def _discrepancy_names(self) -> dict[int, tuple[str, str]]:
@@ -128,7 +142,8 @@ class SetupModel:
     def tangent(self, values: Values) -> SetupModel:
         """The same with the linear law of the modes that the exact law has at one draw of values."""
         assert self.exact is not None
-        return replace(self, linear=self.exact.tangent(self.system.weights(values)))
+        linear = self.exact.tangent(self.system.weights(values))
+        return replace(self, linear=linear, roved=tuple(one.tangent(values) for one in self.roved))
 
     @cached_property
     def every_label(self) -> tuple[Label | None, ...]:
@@ -150,8 +165,10 @@ class SetupModel:
         """
         beams = self.every_beams
         labelled = [beams.index(reading.beams) for reading in setup.readings]
-        rest = [i for i in range(len(beams)) if i not in labelled]
-        order, places = [*labelled, *rest], self.every_place
+        return self._labelled_as(setup, labelled, [i for i in range(len(beams)) if i not in labelled])
+
+    def _labelled_as(self, setup: Setup, labelled: list[int], rest: list[int]) -> SetupModel:
+        beams, order, places = self.every_beams, [*labelled, *rest], self.every_place
         exact = self.exact
         if exact is not None:
             exact = ExactLaw(replace(exact.reduced, places=tuple(places[i] for i in order)))
@@ -163,6 +180,7 @@ class SetupModel:
             exact=exact,
             others=tuple(OtherMode(places[i], beams[i]) for i in rest),
             residues=None if self.residues is None else self.residues[order],
+            roved=tuple(one._labelled_as(setup, labelled, rest) for one in self.roved),
         )
 
     def sensitivities(self, values: Values) -> NDArray[np.float64]:
@@ -170,6 +188,8 @@ class SetupModel:
 
         Half the share of each constant in the mode's energy: for the bare thin plate rows sum to one half.
         """
+        if self.roved:
+            return np.asarray(np.mean([one.sensitivities(values) for one in self.stations], axis=0))
         stiffness = self.linear.stiffness[: len(self.places)]
         total = stiffness @ self.system.weights(values).stiffness[0]
         columns = []
@@ -200,7 +220,12 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
     KeyError
         If a label is no mode of the plate.
     """
-    plate = system.plate(values) if plate is None else plate
+    first, *further = system.stations
+    model = _setup_model(first, values, first.plate(values) if plate is None else plate)
+    return replace(model, roved=tuple(_setup_model(one, values, one.plate(values)) for one in further))
+
+
+def _setup_model(system: System, values: Values, plate: PlateMatrices) -> SetupModel:
     beams = [reading.beams for reading in system.setup.readings]
     weights = system.weights(values).at(0)
     found = find(plate, weights, beams)
@@ -229,9 +254,25 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
     SetupModel
         With their linear law, without an exact one.
     """
+    found, modes = _with_others(model, values)
+    roved = tuple(_with_others(one, values, len(modes.eigenvalues))[0] for one in model.roved)
+    n = min(len(one.others) for one in (found, *roved))
+    return replace(_with_few(found, n), roved=tuple(_with_few(one, n) for one in roved))
+
+
+def _with_few(model: SetupModel, n: int) -> SetupModel:
+    """The model with no more than its lowest other modes."""
+    n_every = len(model.places) + n
+    linear = LinearLaw(model.linear.stiffness[:n_every], model.linear.mass[:n_every])
+    residues = None if model.residues is None else model.residues[:n_every]
+    return replace(model, others=model.others[:n], linear=linear, residues=residues)
+
+
+def _with_others(model: SetupModel, values: Values, n_least: int = 0) -> tuple[SetupModel, Modes]:
     setup = model.setup
     highest = 2.0 * np.pi * _ABOVE * max([*setup.measured, *setup.unlabelled])
-    modes = solve_up_to(model.plate, model.system.weights(values).at(0), highest**2, 1 + len(model.places))
+    n_least = max(n_least, 1 + len(model.places))
+    modes = solve_up_to(model.plate, model.system.weights(values).at(0), highest**2, n_least)
     at = {(parity, int(rank)): i for i, (parity, rank) in enumerate(zip(modes.parities, modes.ranks, strict=True))}
     labelled = [at.get((place.parity, place.rank)) for place in model.places]
     rest = [i for i in range(len(modes.eigenvalues)) if i not in labelled]
@@ -253,7 +294,7 @@ def with_others(model: SetupModel, values: Values) -> SetupModel:
     residues = None
     if by_mode is not None:
         residues = np.array([np.nan if i is None else by_mode[i] for i in [*labelled, *rest]])
-    return replace(model, linear=linear, exact=None, others=others, residues=residues)
+    return replace(model, linear=linear, exact=None, others=others, residues=residues), modes
 
 
 def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[NDArray[np.float64]]:
@@ -274,7 +315,7 @@ def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: 
 
 def _are_solved_alike(one: SetupModel, other: SetupModel, values: Values) -> bool:
     """Whether two setups have the same exact law, for the same modes, and weigh its terms alike."""
-    if not (isinstance(one.exact, ExactLaw) and isinstance(other.exact, ExactLaw)):
+    if not (isinstance(one.exact, ExactLaw) and isinstance(other.exact, ExactLaw)) or one.roved or other.roved:
         return False
     blocks = zip(one.exact.reduced.blocks, other.exact.reduced.blocks, strict=False)
     if one.exact.reduced.places != other.exact.reduced.places or not all(a is b for a, b in blocks):
@@ -299,7 +340,8 @@ def with_exact(
         [model.system.weights(values).at(0) for values in held_out],
         accepted_cents,
     )
-    return replace(model, exact=ExactLaw(reduced))
+    roved = tuple(with_exact(one, centre, around, held_out, accepted_cents) for one in model.roved)
+    return replace(model, exact=ExactLaw(reduced), roved=roved)
 
 
 def with_exact_of(model: SetupModel, twin: SetupModel) -> SetupModel:
@@ -313,13 +355,14 @@ def are_twins(one: SetupModel, other: SetupModel, points: Sequence[Values]) -> b
 
     Each may have a size of its own of the same effect, if the points of the first one's reach as far as the other's.
     """
-    names = _names_in_twin(one.system, other.system)
+    names = None if one.roved or other.roved else _names_in_twin(one.system, other.system)
     if names is None or not all(_reaches(points, *pair) for pair in names.items()):
         return False
     blocks = zip(one.plate.blocks, other.plate.blocks, strict=False)
     if len(one.plate.blocks) != len(other.plate.blocks):
         return False
-    if any(a.terms is not b.terms or a.masses is not b.masses or a.projected or b.projected for a, b in blocks):
+    projected = (each.projected or each.projected_terms for each in (*one.plate.blocks, *other.plate.blocks))
+    if any(projected) or any(a.terms is not b.terms or a.masses is not b.masses for a, b in blocks):
         return False
     modes = ({(place.parity, place.rank) for place in each.every_place} for each in (one, other))
     if next(modes) != next(modes):

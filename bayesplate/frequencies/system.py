@@ -5,14 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.effects import effects_of
-from bayesplate.effects.base import Effect, Mass, ProjectedMass, Stiffness, Theory
-from bayesplate.frequencies.fabric import fabric_of, over_fields
+from bayesplate.effects.base import (
+    Contribution,
+    Effect,
+    Mass,
+    Masses,
+    ProjectedMass,
+    ProjectedStiffnesses,
+    Stiffness,
+    Stiffnesses,
+    Theory,
+)
+from bayesplate.frequencies.fabric import fabric_of, in_plane, over_fields
 from bayesplate.frequencies.shear_terms import shear_term_weights
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes.energies import assembled_plate
@@ -30,6 +41,9 @@ from bayesplate.plate.setup import Ends, Setup
 _MOST_BYTES = 250_000_000
 """Of the matrices that are kept: those of hundreds of bare plates, or of a few with fields and fine meshes."""
 
+
+_SEVERAL = (Stiffnesses, Masses, ProjectedStiffnesses)
+"""Contributions of more than one term."""
 
 Limits = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Where a plate begins and ends along y at some points of its length, (n,) arrays, as fractions of its widest width."""
@@ -64,7 +78,21 @@ class System:
         finest = max((effect.refines for effect in self.effects), default=1.0)
         per_side = SHEAR_ELEMENTS_PER_SIDE if self.theory == "shear-flexible" else round(ELEMENTS_PER_SIDE * finest)
         elements = mesh(term_weights(values, self.setup).at(0), per_side)
-        return _plate(self.setup.ends_x, self.setup.ends_y, self.theory, self._acting, *elements)
+        plate = _plate(self.setup.ends_x, self.setup.ends_y, self.theory, self._acting, *elements)
+        added = self.contributions
+        if not (added.projected_terms or added.projected):
+            return plate
+        adjusted = self.adjusted(values)
+        membrane = in_plane(self.effects, adjusted)
+        return plate.with_projected(
+            [one.projection for one in added.projected],
+            [one.projection(adjusted, membrane) for one in added.projected_terms],
+        )
+
+    @cached_property
+    def stations(self) -> tuple[System, ...]:
+        """The system with what roved at each of its places; itself where nothing did."""
+        return tuple(replace(self, effects=each) for each in product(*(effect.stations() for effect in self.effects)))
 
     @cached_property
     def contributions(self) -> Contributions:
@@ -102,26 +130,29 @@ class System:
         base = (shear_term_weights if self.theory == "shear-flexible" else term_weights)(values, self.setup)
         base = over_fields(base, self.effects, self.theory, values, self.setup)
         added = self.contributions
-        stiffness = [one.weight(values, self.setup) for one in added.stiffness]
-        masses = [one.weight(values, self.setup) for one in added.masses]
-        masses += [one.weight(values, self.setup) for one in added.projected]
-        if not stiffness and not masses:
+        if not any(added):
             return base
-        shape = np.broadcast_shapes(base.stiffness.shape[:1], *(np.shape(w) for w in (*stiffness, *masses)))
-        joined = [
-            np.column_stack(
-                [np.broadcast_to(own, shape + own.shape[1:]), *(np.broadcast_to(w, shape) for w in further)]
+        columns = [
+            [own, *(_columns(one, values, self.setup) for one in further)]
+            for own, further in zip(
+                base, (added.stiffness + added.projected_terms, added.masses + added.projected), strict=True
             )
-            for own, further in zip(base, (stiffness, masses), strict=True)
         ]
-        return Weights(*joined)
+        n_draws = max(len(one) for each in columns for one in each)
+        return Weights(
+            *(
+                np.concatenate([np.broadcast_to(one, (n_draws, one.shape[1])) for one in each], axis=1)
+                for each in columns
+            )
+        )
 
 
 class Contributions(NamedTuple):
     """The terms that effects add to the budget of energies, by kind; their weights stand in this order too."""
 
-    stiffness: tuple[Stiffness, ...]
-    masses: tuple[Mass, ...]
+    stiffness: tuple[Stiffness | Stiffnesses, ...]
+    projected_terms: tuple[ProjectedStiffnesses, ...]
+    masses: tuple[Mass | Masses, ...]
     projected: tuple[ProjectedMass, ...]
 
 
@@ -129,10 +160,17 @@ def contributions_of(effects: Sequence[Effect]) -> Contributions:
     """What some effects add, by kind: matrices and weights are both read from this one list."""
     added = [one for effect in effects for one in effect.contributions()]
     return Contributions(
-        tuple(one for one in added if isinstance(one, Stiffness)),
-        tuple(one for one in added if isinstance(one, Mass)),
+        tuple(one for one in added if isinstance(one, Stiffness | Stiffnesses)),
+        tuple(one for one in added if isinstance(one, ProjectedStiffnesses)),
+        tuple(one for one in added if isinstance(one, Mass | Masses)),
         tuple(one for one in added if isinstance(one, ProjectedMass)),
     )
+
+
+def _columns(one: Contribution, values: Values, setup: Setup) -> NDArray[np.float64]:
+    """Weights of a contribution: (n_draws, n_terms) array, of one draw where it is the same in all."""
+    weight = np.asarray(one.weight(values, setup))
+    return np.atleast_2d(weight if isinstance(one, _SEVERAL) else weight[..., None])
 
 
 def system_of(board: Board, setup: Setup) -> System:
@@ -145,19 +183,18 @@ def _plate(
 ) -> PlateMatrices:
     # Whose sizes they are does not matter to the matrices, so that setups held alike have the same ones.
     shaping = tuple(replace(effect, owner=BOARD) for effect in effects if not _only_projects(effect))
-    projected = tuple(one.projection for one in contributions_of(effects).projected)
-    return _assembled(ends_x, ends_y, theory, shaping, n_x, n_y).with_projected(projected)
+    return _assembled(ends_x, ends_y, theory, shaping, n_x, n_y)
 
 
 def _only_projects(effect: Effect) -> bool:
-    """Whether all that an effect does to a plate is to add projected masses, which need no matrices of their own."""
+    """Whether all that an effect does to a plate is to add projected terms, which need no matrices of their own."""
     is_plain = effect.theory == "thin" and not effect.releases and not effect.turns_grain and effect.outline() is None
     added = effect.contributions()
     return (
         is_plain
         and not effect.variations()
         and all(effect.keeps_symmetry())
-        and all(isinstance(one, ProjectedMass) for one in added)
+        and all(isinstance(one, ProjectedMass | ProjectedStiffnesses) for one in added)
     )
 
 
@@ -175,8 +212,8 @@ def _assembled(
     x = line(ends_x, n_x, is_sheared, all(along_x for along_x, _ in symmetry), _held(ends_x, effects))
     y = line(ends_y, n_y, is_sheared, all(along_y for _, along_y in symmetry), _held(ends_y, effects))
     added = contributions_of(effects)
-    stiffness = tuple(one.matrix(x, y) for one in added.stiffness)
-    masses = tuple(one.matrix(x, y) for one in added.masses)
+    stiffness = [term for one in added.stiffness for term in one.matrices(x, y)]
+    masses = [term for one in added.masses for term in one.matrices(x, y)]
     return assembled_plate(SHEAR_FLEXIBLE if is_sheared else THIN, x, y, stiffness, masses, fabric_of(effects))
 
 

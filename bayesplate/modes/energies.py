@@ -19,7 +19,7 @@ from bayesplate.modes.element import ORDERS, LineProducts, line_places
 from bayesplate.modes.fields import UNIFORM, Fabric, Group, Measure, layout
 from bayesplate.modes.hermite import end_products, products
 from bayesplate.modes.line import Line
-from bayesplate.modes.plate import Block, EdgeTurn, KronSum, Parity, PlateMatrices, Term, count_rigid
+from bayesplate.modes.plate import Beside, Block, EdgeTurn, KronSum, Parity, PlateMatrices, Term, count_rigid
 from bayesplate.modes.sparse import Entries, Kron, lower_triangles
 
 
@@ -38,6 +38,9 @@ Strain = tuple[Derivative, ...]
 
 Strains = tuple[Strain, Strain]
 """Two whose product is integrated: twice where they differ, so that the matrix is symmetric."""
+
+
+_ONE = Entries(np.ones((1, 1)), np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), (1, 1))
 
 
 class Energy(NamedTuple):
@@ -140,7 +143,7 @@ def assembled_plate(
     x: Line,
     y: Line,
     stiffness: Sequence[Term] = (),
-    masses: Sequence[KronSum] = (),
+    masses: Sequence[KronSum | Beside] = (),
     fabric: Fabric = UNIFORM,
 ) -> PlateMatrices:
     """A plate on two lines, class by class.
@@ -150,8 +153,8 @@ def assembled_plate(
     kinematics : Kinematics
     x, y : Line
         Unsplit along a side on which a further term is not symmetric.
-    stiffness, masses : sequence of Term, sequence of KronSum
-        Further terms; they come after the plate's own.
+    stiffness, masses : sequence of Term, sequence of KronSum or Beside
+        Further terms; they come after the plate's own. A coordinate beside the plate is in every class of it.
     fabric : Fabric
         Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`.
 
@@ -166,9 +169,9 @@ def assembled_plate(
     def own(pairs: Sequence[Strains], group: Sequence[Group]) -> list[Energy]:
         return [Energy(pairs[term], measures[group[term]][k]) for term, k in layout(group, counts)]
 
-    stiff: list[Energy | KronSum] = [*own(kinematics.stiffnesses, groups[0])]
+    stiff: list[Energy | KronSum | Beside] = [*own(kinematics.stiffnesses, groups[0])]
     stiff += [_along_edges(one, kinematics, x, y) if isinstance(one, EdgeTurn) else one for one in stiffness]
-    inert: list[Energy | KronSum] = [*own(kinematics.masses, groups[1]), *masses]
+    inert: list[Energy | KronSum | Beside] = [*own(kinematics.masses, groups[1]), *masses]
     classes = (Parity(*each) for each in np.ndindex(len(x.parts), len(y.parts)))
     return PlateMatrices(x, y, tuple(_block(each, kinematics, x, y, stiff, inert) for each in classes))
 
@@ -189,8 +192,8 @@ def _block(
     kinematics: Kinematics,
     x: Line,
     y: Line,
-    stiffness: Sequence[Energy | KronSum],
-    masses: Sequence[Energy | KronSum],
+    stiffness: Sequence[Energy | KronSum | Beside],
+    masses: Sequence[Energy | KronSum | Beside],
 ) -> Block:
     """One symmetry class: its further terms are on the deflection."""
     functions_x, functions_y = kinematics.functions(x, parity.x), kinematics.functions(y, parity.y)
@@ -206,16 +209,25 @@ def _block(
     nodes = [(_nodes(on_x)[:, None] * (y.n_elements + 1) + _nodes(on_y)).ravel() for on_x, on_y in own]
     starts = dict(zip(kinematics.fields, np.cumsum([0, *(each.size for each in nodes)]).tolist(), strict=False))
     spread_x, spread_y = x.parts[parity.x], y.parts[parity.y]
+    of_plate = np.concatenate(nodes)
+    n_beside = 1 + max((term.coordinate for term in terms if isinstance(term, Beside)), default=-1)
 
-    def parts(term: Energy | KronSum) -> list[Kron]:
+    def parts(term: Energy | KronSum | Beside) -> list[Kron]:
         if isinstance(term, Energy):
             return list(_parts(term.strains, places[id(term.measure)], kinematics.fields, starts, along_x, along_y))
+        if isinstance(term, Beside):
+            own_row = of_plate.size + term.coordinate
+            if not term.rows:
+                return [Kron(_ONE, _ONE, (own_row, own_row))]
+            rows = ((on_x @ spread_x, on_y @ spread_y) for on_x, on_y in term.rows)
+            return [Kron(Entries.of([on_x]), Entries.of([on_y]), (own_row, 0)) for on_x, on_y in rows]
         on_x, on_y = (Entries.of(each) for each in zip(*term, strict=True))
         return [Kron(on_x.between(spread_x, spread_x), on_y.between(spread_y, spread_y))]
 
-    stored, indices, indptr = lower_triangles([parts(term) for term in terms], np.concatenate(nodes))
+    every_node = np.concatenate([of_plate, of_plate.max() + 1 + np.arange(n_beside)])
+    stored, indices, indptr = lower_triangles([parts(term) for term in terms], every_node)
     stiff, inert = stored[: len(stiffness)], stored[len(stiffness) :]
-    return Block(parity, stiff, inert, indices, indptr, spread_x, spread_y, count_rigid(parity, x, y))
+    return Block(parity, stiff, inert, indices, indptr, spread_x, spread_y, count_rigid(parity, x, y), n_beside)
 
 
 def _nodes(functions: Any) -> NDArray[np.intp]:

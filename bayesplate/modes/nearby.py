@@ -9,6 +9,8 @@ of the time of a solution from nothing.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,9 +49,9 @@ def modes_nearby(block: Block, weights: Weights, known: ClassModes, n_modes: int
     numpy.linalg.LinAlgError
         If the weights are those of no plate.
     """
-    pencil = np.stack([weights.stiffness @ block.terms, weights.mass[: len(block.masses)] @ block.masses])
+    pencil = np.stack([block.stored_stiffness(weights), weights.mass[: len(block.masses)] @ block.masses])
     shift = shift_below(block, *(stored[block.diagonal] for stored in pencil))
-    factor = BandFactor(block.band, pencil[0] - shift * pencil[1])
+    factor = _factor(block, pencil[0] - shift * pencil[1])
     vectors = np.concatenate([known.rigid, known.vectors], axis=1)
     loads = block.times(pencil[1:], vectors)[0]
     for _ in range(_N_STEPS):
@@ -57,6 +59,16 @@ def modes_nearby(block: Block, weights: Weights, known: ClassModes, n_modes: int
         values, vectors, loads = _ritz(block, weights, pencil, factor.solve(loads))
     first, last = block.n_rigid, block.n_rigid + n_modes
     return ClassModes(block, values[first:last], vectors[:, first:last], vectors[:, :first])
+
+
+def _factor(block: Block, stored: Floats) -> Any:
+    """What solves equations with a matrix of the class; a coordinate beside the plate reaches all over any band."""
+    if not block.n_beside:
+        return BandFactor(block.band, stored)
+    from scipy.sparse.linalg import splu
+
+    options = {"SymmetricMode": True}
+    return splu(block.matrix(stored), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
 def _without_rigid(loads: Floats, rigid: Floats) -> Floats:
@@ -72,7 +84,7 @@ def _without_rigid(loads: Floats, rigid: Floats) -> Floats:
 def _ritz(block: Block, weights: Weights, pencil: Floats, vectors: Floats) -> tuple[Floats, Floats, Floats]:
     """Modes on the span of some vectors: eigenvalues, (n_dof, n) vectors, and the sparse mass times these."""
     stiff, inert = block.times(pencil, vectors)
-    stiffness, mass = vectors.T @ stiff, vectors.T @ inert
+    stiffness, mass = vectors.T @ stiff + block.further_stiffness(weights, vectors), vectors.T @ inert
     if block.projected:
         mass = np.tensordot(weights.mass, block.project_masses(vectors), axes=1)
     if not (np.diagonal(mass) > 0.0).all():

@@ -44,12 +44,28 @@ class EdgeTurn(NamedTuple):
     at: tuple[bool, bool]
 
 
-Term = KronSum | EdgeTurn
-"""A stiffness term: on the deflection, or on the turning of cross-sections along edges."""
+class Beside(NamedTuple):
+    """A term of a coordinate beside the plate, such as the rise of a magnet that hangs on it.
+
+    Attributes
+    ----------
+    coordinate : int
+        Which one, from 0.
+    rows : tuple of pairs of (1, n_dof_x) and (1, n_dof_y) arrays
+        The term is twice the product of the coordinate with the deflection that these rows give, summed over the pairs;
+        without rows it is the square of the coordinate.
+    """
+
+    coordinate: int
+    rows: KronSum = ()
+
+
+Term = KronSum | EdgeTurn | Beside
+"""A stiffness term: on the deflection, on the turning of cross-sections along edges, or of a coordinate beside."""
 
 Projection = Callable[[Line, Line, NDArray[np.float64]], NDArray[np.float64]]
-"""A mass term without a sparse matrix: from the lines and (n_vectors, n_dof_x, n_dof_y) deflections to its
-(n_vectors, n_vectors) matrix."""
+"""Terms without sparse matrices: from the lines and (n_vectors, n_dof_x, n_dof_y) deflections to their
+(n_terms, n_vectors, n_vectors) matrices; a term alone may be an (n_vectors, n_vectors) one."""
 
 Beams = tuple[int, int]
 """Order of the beam functions along x and y whose product a mode resembles; (0, 0) is the lowest."""
@@ -96,6 +112,10 @@ class Panel(NamedTuple):
     places: NDArray[np.intp]
 
 
+OnDeflections = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""A `Projection` on the lines of its plate."""
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """One symmetry class: the lower triangles of its stiffness and mass terms, which are symmetric, on one pattern.
@@ -113,8 +133,10 @@ class Block:
         From the class's functions along x and y to all functions of the line; the deflection's unknowns come first.
     n_rigid : int
         Number of rigid motions of the whole plate in this class.
-    projected : tuple of Projection
-        Mass terms beyond `masses` that exist on given deflections only.
+    n_beside : int
+        Number of coordinates beside the plate, the last unknowns.
+    projected_terms, projected : tuple of callable
+        Stiffness and mass terms beyond `terms` and `masses` that exist on given deflections only.
     """
 
     parity: Parity
@@ -125,7 +147,9 @@ class Block:
     spread_x: Any
     spread_y: Any
     n_rigid: int
-    projected: tuple[Callable[[NDArray[np.float64]], NDArray[np.float64]], ...] = ()
+    n_beside: int = 0
+    projected_terms: tuple[OnDeflections, ...] = ()
+    projected: tuple[OnDeflections, ...] = ()
 
     @property
     def n_dof(self) -> int:
@@ -134,7 +158,7 @@ class Block:
 
     @property
     def n_masses(self) -> int:
-        """Number of mass terms, the projected ones included."""
+        """Number of mass terms; each of the projected ones is one."""
         return len(self.masses) + len(self.projected)
 
     def matrix(self, stored: NDArray[np.float64]) -> Any:
@@ -148,9 +172,13 @@ class Block:
     def _whole(self) -> tuple[NDArray[np.intp], NDArray[np.int32], NDArray[np.int32]]:
         return mirrored(self.indices, self.indptr)
 
+    def stored_stiffness(self, weights: Weights) -> NDArray[np.float64]:
+        """Stored values of the weighted sum of the stiffness terms, save the projected ones."""
+        return np.asarray(weights.stiffness[..., : len(self.terms)] @ self.terms)
+
     def stiffness(self, weights: Weights) -> Any:
-        """Weighted sum of the stiffness terms as a sparse (n_dof, n_dof) array."""
-        return self.matrix(weights.stiffness @ self.terms)
+        """Weighted sum of the stiffness terms, save the projected ones, as a sparse (n_dof, n_dof) array."""
+        return self.matrix(self.stored_stiffness(weights))
 
     def mass(self, weights: Weights) -> Any:
         """Weighted sum of the mass terms, save the projected ones, as a sparse (n_dof, n_dof) array."""
@@ -213,21 +241,41 @@ class Block:
 
         return np.asarray(sum(in_threads(of, [self.panels[::2], self.panels[1::2]])))
 
+    def project_stiffness(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """All stiffness terms on the span of vectors, the projected ones last."""
+        return np.concatenate([self.project(self.terms, vectors), self._on_span(self.projected_terms, vectors)])
+
     def project_masses(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """All mass terms on the span of vectors, the projected ones last."""
-        small = self.project(self.masses, vectors)
-        if not self.projected:
-            return small
-        deflections = self.spread(vectors)
-        return np.concatenate([small, [term(deflections) for term in self.projected]])
+        return np.concatenate([self.project(self.masses, vectors), self._on_span(self.projected, vectors)])
+
+    def stiffness_energies(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """phi' K phi of all stiffness terms, the projected ones last: (n_terms, n_vectors) array."""
+        further = np.diagonal(self._on_span(self.projected_terms, vectors), axis1=1, axis2=2)
+        return np.concatenate([self.energies(self.terms, vectors), further])
 
     def mass_energies(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same of all mass terms, the projected ones last: (n_masses, n_vectors) array."""
-        own = self.energies(self.masses, vectors)
-        if not self.projected:
-            return own
+        further = np.diagonal(self._on_span(self.projected, vectors), axis1=1, axis2=2)
+        return np.concatenate([self.energies(self.masses, vectors), further])
+
+    def further_stiffness(self, weights: Weights, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weighted sums of the projected stiffness terms on the span of vectors.
+
+        Returns
+        -------
+        (n_vectors, n_vectors) array
+            Of one draw, or (n_draws, n_vectors, n_vectors); zeros where there are no such terms.
+        """
+        further = self._on_span(self.projected_terms, vectors)
+        return np.tensordot(weights.stiffness[..., len(self.terms) :], further, axes=1)
+
+    def _on_span(self, terms: Sequence[OnDeflections], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not terms:
+            return np.empty((0, vectors.shape[1], vectors.shape[1]))
         deflections = self.spread(vectors)
-        return np.concatenate([own, [np.diagonal(term(deflections)) for term in self.projected]])
+        n = vectors.shape[1]
+        return np.concatenate([np.reshape(term(deflections), (-1, n, n)) for term in terms])
 
     def spread(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Deflection of (n_dof, n_vectors) of the class as (n_vectors, n_dof_x, n_dof_y) of the two lines."""
@@ -262,10 +310,12 @@ class PlateMatrices:
         """The block of a class."""
         return next(block for block in self.blocks if block.parity == parity)
 
-    def with_projected(self, terms: Sequence[Projection]) -> PlateMatrices:
-        """The same plate with these as all of its mass terms without a matrix; its own matrices are shared."""
-        on_deflections = tuple(partial(term, self.line_x, self.line_y) for term in terms)
-        return replace(self, blocks=tuple(replace(block, projected=on_deflections) for block in self.blocks))
+    def with_projected(self, masses: Sequence[Projection], terms: Sequence[Projection] = ()) -> PlateMatrices:
+        """The same plate with these as all of its terms without a matrix; its own matrices are shared."""
+        stiff, inert = (tuple(partial(one, self.line_x, self.line_y) for one in each) for each in (terms, masses))
+        return replace(
+            self, blocks=tuple(replace(block, projected_terms=stiff, projected=inert) for block in self.blocks)
+        )
 
 
 def is_rigid(beams: Beams, ends_x: Ends, ends_y: Ends) -> bool:

@@ -115,7 +115,7 @@ def _reduce(
         elastic = np.concatenate([solution.vectors for solution in (*trained, *checks[:n_joined])], axis=1)
         vectors = _orthonormal(block, rigid, elastic, first, training[0], is_steady)
         # A basis and a way to use it are judged by the stiffness at these points alone; its terms follow in the end.
-        whole = _projected(plate, block, vectors, stiffness @ block.terms, rigid.shape[1], first, is_steady)
+        whole = _projected(plate, block, vectors, Weights(stiffness, mass), rigid.shape[1], first, is_steady)
         checked, against = Weights(*(w[n_joined:-1] for w in seen)), exact[n_joined:]
         of_basis = _worst_cents(whole, checked, against)
         if of_basis <= accepted_cents:
@@ -127,7 +127,7 @@ def _reduce(
         if cents <= bar:  # at the latest the last way, which is the whole basis
             break
     used, turn = way
-    return replace(used, stiffness=block.project(block.terms, vectors @ turn)), cents
+    return replace(used, stiffness=block.project_stiffness(vectors @ turn)), cents
 
 
 def _of_plates(
@@ -188,13 +188,13 @@ def _projected(
     plate: PlateMatrices,
     block: Block,
     basis: NDArray[np.float64],
-    terms: NDArray[np.float64],
+    points: Weights,
     n_rigid: int,
     centre: ClassModes,
     is_steady: bool,
 ) -> ReducedBlock:
-    """Some stiffness terms and the masses on a basis, the latter where it is not orthonormal in them."""
-    stiffness = block.project(terms, basis)
+    """The stiffness at some points and the masses on a basis, the latter where it is not orthonormal in them."""
+    stiffness = block.project(block.stored_stiffness(points), basis) + block.further_stiffness(points, basis)
     size = basis.shape[1]
     masses = np.empty((0, size, size)) if is_steady else block.project_masses(basis)
     parts = beam_parts(plate, block.spread(basis), block.parity)

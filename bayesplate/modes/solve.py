@@ -50,7 +50,7 @@ class ClassModes:
 
         Weighted with the weights of the solve they sum to the eigenvalue and to 1 (the sum rule).
         """
-        return self.block.energies(self.block.terms, self.vectors).T, self.block.mass_energies(self.vectors).T
+        return self.block.stiffness_energies(self.vectors).T, self.block.mass_energies(self.vectors).T
 
 
 def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
@@ -74,7 +74,7 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
     factors = splu(
         stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
-    n_bare = n_modes + _SPARE_FOR_PROJECTED if block.projected else n_modes
+    n_bare = n_modes + _SPARE_FOR_PROJECTED if block.projected or block.projected_terms else n_modes
     n_wanted = min(n_bare + block.n_rigid, block.n_dof - 1)
     start = np.random.default_rng(0).standard_normal(block.n_dof)
     _, vectors = eigsh(
@@ -106,13 +106,13 @@ def shift_below(block: Block, stiffness: NDArray[np.float64], mass: NDArray[np.f
     stiffness, mass : (n_dof,) arrays
         The diagonals.
     """
-    return -1e-6 * float((stiffness / mass).min()) if block.n_rigid else 0.0
+    return -1e-6 * float((stiffness / mass)[: block.n_dof - block.n_beside].min()) if block.n_rigid else 0.0
 
 
 def _ritz(
     block: Block, weights: Weights, stiffness: Any, mass: Any, vectors: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Modes on the span of the solver's vectors, with the projected masses joined; rigid ones included, lowest first.
+    """Modes on the span of the solver's vectors, with the projected terms joined; rigid ones included, lowest first.
 
     The solver's own values carry the rounding of a nearly singular factorisation where the plate can move as a whole.
     """
@@ -122,7 +122,8 @@ def _ritz(
         small_mass = np.tensordot(weights.mass, block.project_masses(vectors), axes=1)
     else:
         small_mass = vectors.T @ (mass @ vectors)
-    values, combinations = eigh(vectors.T @ (stiffness @ vectors), small_mass)
+    small_stiffness = vectors.T @ (stiffness @ vectors) + block.further_stiffness(weights, vectors)
+    values, combinations = eigh(small_stiffness, small_mass)
     return values, vectors @ combinations
 
 

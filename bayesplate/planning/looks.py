@@ -50,7 +50,7 @@ class Look:
 
 
 def _has_unweighed(board: Board) -> bool:
-    return any(item.mass is None for setup in board.setups for item in setup.attached)
+    return any(item.mass is None and item.kind != "exciter" for setup in board.setups for item in setup.attached)
 
 
 def _of_taper(board: Board) -> float:

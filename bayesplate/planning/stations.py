@@ -169,7 +169,7 @@ def _elsewhere(board: Board, name: str, ends_x: Ends, prior: PriorCard | None) -
     while name in taken:
         name += "-2"
     noise = assumed_noise((*ends_x, "free", "free"), prior)
-    return Setup(name, ends_x, ("free", "free"), (), noise, attached=first.attached, air=first.air)
+    return Setup(name, ends_x, ("free", "free"), (), noise, attached=first.attached, fluid=first.fluid)
 
 
 def _next_modes(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
 from bayesplate.cards.stated import are, quantity_of, wrong_types
-from bayesplate.cards.words import did_you_mean
+from bayesplate.cards.words import did_you_mean, effect_named
 from bayesplate.cards.writing import write_card
 from bayesplate.errors import Fault, InputError
 from bayesplate.plate.parameter import BOARD, Parameter
@@ -33,6 +34,8 @@ INPUTS = {
     "poisson_xy": ("1", "Poisson ratio nu_xy"),
 }
 """What a card states of a board: unit, and what people call it."""
+WARPS = {"cup": 0.0, "bow": -math.inf, "twist": 0.0}
+"""How a board may not be flat, and from where on: all signs at once change nothing, nor does the twist's alone."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,10 @@ class Board:
     chosen : tuple
         Effects (`bayesplate.effects.Effect`) in another form than the card itself would give them.
     shear_xz, shear_yz : Quantity or None, Pa
+    warp : dict of Quantity, m
+        What a straightedge tells of a board that is not flat, as far as it was stated: "cup", the rise across the
+        width; "bow", that along the length, negative on a saddle; "twist", a corner's lift off a table that the other
+        three touch.
     notes : tuple of str
         What was assumed because the card does not say it.
     """
@@ -72,7 +79,11 @@ class Board:
     chosen: tuple[Any, ...] = ()
     shear_xz: Quantity | None = None
     shear_yz: Quantity | None = None
+    warp: Mapping[str, Quantity] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(map(effect_named, self.effects)))
 
     @cached_property
     def inputs(self) -> Mapping[str, Quantity]:
@@ -128,6 +139,7 @@ class Board:
 
     def without(self, effects: Collection[str]) -> Board:
         """The board without some of its declared effects, by their names."""
+        effects = {*map(effect_named, effects)}
         return replace(
             self,
             effects=tuple(name for name in self.effects if name not in effects),
@@ -151,6 +163,7 @@ class Board:
         effects: Sequence[str] = (),
         shear_xz: Quantity | ArrayLike | None = None,
         shear_yz: Quantity | ArrayLike | None = None,
+        warp: Mapping[str, Quantity | ArrayLike] | None = None,
         title: str = "",
         source: str = "",
     ) -> Board:
@@ -176,6 +189,8 @@ class Board:
         effects : sequence of str
             Declared effects.
         shear_xz, shear_yz : Quantity, number or array of readings, Pa
+        warp : dict of Quantity, number or array of readings, m
+            "cup", "bow" and "twist", as far as they were read with a straightedge; a quantity is a normal one.
         title, source : str
 
         Returns
@@ -204,6 +219,7 @@ class Board:
             ("effects", effects, are(effects, str), "a list of names of effects"),
             ("title", title, isinstance(title, str), "a text"),
             ("source", source, isinstance(source, str), "a text"),
+            ("warp", warp, isinstance(warp, Mapping | None), "a dict of heights by cup, bow and twist"),
         )))  # fmt: skip
         stated = {
             "length_x": length_x, "length_y": length_y, "thickness": thickness, "mass": mass, "density": density,
@@ -212,6 +228,8 @@ class Board:
         needed = ("length_x", "length_y", "thickness")
         values = {key: one for key, one in stated.items() if one is not None or key in needed}
         quantities, unread = _quantities(values, str(name))
+        warps, faulty = _warps(warp, str(name)) if isinstance(warp, Mapping) else ({}, [])
+        unread += faulty
         if faults or unread:
             raise InputError([*faults, *unread])
         card = prior if isinstance(prior, PriorCard) else load_prior(prior)
@@ -226,6 +244,7 @@ class Board:
             effects=tuple(effects),
             title=title,
             source=source,
+            warp=warps,
             **shear,
         )
 
@@ -279,6 +298,22 @@ def _quantities(
             found[name] = quantity_of(value, f"{place} {name}", "SI", kind)
         except InputError as error:
             faults += error.faults
+    return found, faults
+
+
+def _warps(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[dict[str, Quantity], list[Fault]]:
+    """Heights by name from what was stated of them, cup and twist from zero on, and what cannot be one."""
+    found: dict[str, Quantity] = {}
+    faults = [_unknown(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
+    for key in WARPS:
+        if key in stated:
+            try:
+                one = quantity_of(stated[key], f"{place} warp {key}", "in m", "normal")
+            except InputError as error:
+                faults += error.faults
+                continue
+            is_open = one.kind == "normal" and not one.is_exact and one.lower == -math.inf
+            found[key] = replace(one, lower=WARPS[key]) if is_open else one
     return found, faults
 
 

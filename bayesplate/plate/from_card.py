@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from bayesplate.cards import BoardCard, CoefficientCard, PriorCard, SetupSection
 from bayesplate.plate.board import Board, made_board
-from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredAir, Peak, Reading, Setup
+from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid, Peak, Reading, Setup
 from bayesplate.quantities import Quantity
 
 NO_TABLES: Mapping[str, CoefficientCard] = MappingProxyType({})
@@ -57,6 +57,7 @@ def board_from_card(
         effects=tuple(card.effects),
         shear_xz=_optional(card.material.shear_xz_gpa, 1e9),
         shear_yz=_optional(card.material.shear_yz_gpa, 1e9),
+        warp={name: rise.scaled(_MILLI) for name, rise in card.plate.warp_mm.items()},
         notes=_notes(assumed),
     )
 
@@ -81,7 +82,7 @@ def _joined_with_rounding(frequency: Quantity, resolution: float | None) -> Quan
 
 def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCard | None) -> Setup:
     edges, first = section.edges, section.first_label
-    stated = section.noise_percent
+    stated, around = section.noise_percent, section.surroundings
     made = Setup(
         name=section.name,
         ends_x=(edges.x0, edges.x1),
@@ -109,11 +110,16 @@ def _setup(section: SetupSection, prior: PriorCard | None, table: CoefficientCar
                 item.kind,
                 tuple((x * _MILLI, y * _MILLI) for x, y in item.at_mm),
                 _optional(item.mass_g, _MILLI),
+                _optional(item.coil_mass_g, _MILLI),
+                item.suspension_n_per_m,
+                item.resonance_hz,
+                item.magnet,
             )
             for item in section.attached
         ),
         hammer=None if section.hammer is None else (section.hammer.at_mm[0] * _MILLI, section.hammer.at_mm[1] * _MILLI),
-        air=None if section.air is None else DeclaredAir(section.air.density_kg_m3, section.air.baffle),
+        fluid=None if around is None else DeclaredFluid(around.density_kg_m3, around.baffle),
+        bounce=None if section.support is None else section.support.bounce_hz,
     )
     return made.assuming_noise(prior) if stated is None else made
 

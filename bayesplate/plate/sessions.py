@@ -58,7 +58,8 @@ def notes(board: Board) -> tuple[str, ...]:
 def _is_held_alike(one: Setup, other: Setup) -> bool:
     covered = ({edge: length.mean for edge, length in each.clamped.items()} for each in (one, other))
     return next(covered) == next(covered) and all(
-        getattr(one, name) == getattr(other, name) for name in ("ends_x", "ends_y", "first_label", "attached", "air")
+        getattr(one, name) == getattr(other, name)
+        for name in ("ends_x", "ends_y", "first_label", "attached", "fluid", "bounce")
     )
 
 

@@ -20,7 +20,7 @@ from bayesplate.quantities import Quantity
 
 __all__ = [
     "CLAMPED_NOISE", "DEFAULT_NOISE", "EDGES", "NOISE_WANTED", "NO_OFFSET",
-    "AttachedItem", "DeclaredAir", "End", "Ends", "Peak", "Reading", "Setup", "assumed_noise",
+    "AttachedItem", "DeclaredFluid", "End", "Ends", "Peak", "Reading", "Setup", "assumed_noise",
 ]  # fmt: skip
 
 End = Literal["clamped", "supported", "free"]
@@ -49,29 +49,52 @@ def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quant
 
 @dataclass(frozen=True)
 class AttachedItem:
-    """Something fixed to the board: its places in m from the corner x = y = 0, and its mass in kg where known."""
+    """Something fixed to the board.
+
+    Attributes
+    ----------
+    kind : str
+        "accelerometer", "exciter", "shaker" or "weight"; an exciter is a coil on the board and a magnet on a spring.
+    places : tuple of (float, float), m
+        From the corner x = y = 0; several if it roved, none if nobody knows.
+    mass : Quantity or None, kg
+        Of the whole; None if not known, and so are those below, which an exciter alone has.
+    coil : Quantity or None, kg
+    suspension : Quantity or None, N/m
+        Stiffness of the spring that holds the magnet.
+    resonance : Quantity or None, Hz
+        Of the magnet on that spring, in place of the suspension.
+    magnet : str
+        "free", or "held" by something else than the board.
+    """
 
     kind: str
-    places: tuple[tuple[float, float], ...]
+    places: tuple[tuple[float, float], ...] = ()
     mass: Quantity | None = None
+    coil: Quantity | None = None
+    suspension: Quantity | None = None
+    resonance: Quantity | None = None
+    magnet: str = "free"
 
     def __post_init__(self) -> None:
         if not isinstance(self.places, list | tuple) or not all(map(is_place, self.places)):
             raise InputError(wrong_types(str(self.kind), [("places", self.places, False, "((x, y), ...) in m")]))
-        if self.mass is not None:
-            object.__setattr__(self, "mass", quantity_of(self.mass, f"{self.kind} mass", "in kg"))
+        for name, unit in (("mass", "kg"), ("coil", "kg"), ("suspension", "N/m"), ("resonance", "Hz")):
+            stated = getattr(self, name)
+            if stated is not None:
+                object.__setattr__(self, name, quantity_of(stated, f"{self.kind} {name}", f"in {unit}"))
 
 
 @dataclass(frozen=True)
-class DeclaredAir:
-    """Air that the card declares: its density in kg m^-3 and baffle ("none" or "full"), each None if not stated."""
+class DeclaredFluid:
+    """Air or water around the board: density in kg m^-3 and baffle ("none" or "full"), each None if not stated."""
 
     density: Quantity | None = None
     baffle: str | None = None
 
     def __post_init__(self) -> None:
         if self.density is not None:
-            object.__setattr__(self, "density", quantity_of(self.density, "air density", "in kg/m^3"))
+            object.__setattr__(self, "density", quantity_of(self.density, "fluid density", "in kg/m^3"))
 
 
 @dataclass(frozen=True)
@@ -101,8 +124,10 @@ class Setup:
         Table of the paper's least squares and percentile method, and of nothing else.
     attached : tuple of AttachedItem
     hammer : tuple of float or None, m
-    air : DeclaredAir or None
-        None: not declared.
+    fluid : DeclaredFluid or None
+        The air or the water around the board; None: not declared.
+    bounce : Quantity or None, Hz
+        Frequency at which a free board moves as a whole on its support; None: not stated.
     group : Owner or None
         The group of sessions that the setup is one of (`bayesplate.plate.sessions`).
     assumed : Quantity or None
@@ -123,7 +148,8 @@ class Setup:
     published_coefficients: CoefficientCard | None = None
     attached: tuple[AttachedItem, ...] = ()
     hammer: tuple[float, float] | None = None
-    air: DeclaredAir | None = None
+    fluid: DeclaredFluid | None = None
+    bounce: Quantity | None = None
     group: Owner | None = None
     assumed: Quantity | None = field(default=None, compare=False, repr=False)
 
@@ -131,6 +157,8 @@ class Setup:
         object.__setattr__(self, "noise", quantity_of(self.noise, f"{self.name} noise", "relative"))
         covered = {edge: quantity_of(one, f"{self.name} clamped {edge}", "in m") for edge, one in self.clamped.items()}
         object.__setattr__(self, "clamped", covered)
+        if self.bounce is not None:
+            object.__setattr__(self, "bounce", quantity_of(self.bounce, f"{self.name} bounce", "in Hz"))
 
     @classmethod
     def from_frequencies(
@@ -147,7 +175,8 @@ class Setup:
         unlabelled: Sequence[Peak | Quantity | ArrayLike] = (),
         attached: Sequence[AttachedItem] = (),
         hammer: tuple[float, float] | None = None,
-        air: DeclaredAir | None = None,
+        fluid: DeclaredFluid | None = None,
+        bounce: Quantity | ArrayLike | None = None,
         published_coefficients: CoefficientCard | None = None,
     ) -> Setup:
         """A setup from numbers and arrays.
@@ -176,7 +205,10 @@ class Setup:
             Peaks without a label.
         attached : sequence of AttachedItem
         hammer : tuple of float, optional, m
-        air : DeclaredAir, optional
+        fluid : DeclaredFluid, optional
+            The air or the water around the board.
+        bounce : Quantity, number or array of readings, optional, Hz
+            At which the free board moves as a whole on its support.
         published_coefficients : CoefficientCard, optional
 
         Returns
@@ -200,7 +232,7 @@ class Setup:
             ("unlabelled", unlabelled, isinstance(unlabelled, list | tuple | np.ndarray), "a list of peaks"),
             ("attached", attached, are(attached, AttachedItem), "a list of AttachedItem"),
             ("hammer", hammer, hammer is None or is_place(hammer), "a place (x, y) in m"),
-            ("air", air, isinstance(air, DeclaredAir | None), "a DeclaredAir"),
+            ("fluid", fluid, isinstance(fluid, DeclaredFluid | None), "a DeclaredFluid"),
             ("published_coefficients", published_coefficients,
              isinstance(published_coefficients, CoefficientCard | None), "a CoefficientCard"),
         )))  # fmt: skip
@@ -243,7 +275,8 @@ class Setup:
             published_coefficients=published_coefficients,
             attached=tuple(attached),
             hammer=hammer,
-            air=air,
+            fluid=fluid,
+            bounce=None if bounce is None else quantity_of(bounce, f"{name} bounce", "in Hz"),
         )
         return made.assuming_noise() if noise is None else made
 

@@ -8,7 +8,7 @@ from itertools import takewhile
 from bayesplate.cards import MISSED, SPURIOUS
 from bayesplate.cards.writing import array, density_numbers, number, quantity, table, text, unstatable
 from bayesplate.errors import Fault, InputError
-from bayesplate.plate.board import Board
+from bayesplate.plate.board import WARPS, Board
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.setup import NOISE_WANTED, AttachedItem, Peak, Setup
 from bayesplate.quantities import Kind, Quantity
@@ -46,6 +46,9 @@ def card_text(board: Board) -> str:
     inputs = {one.name: one.prior for one in own}
     faults = [fault for place, one, kind in _uncertain(board) for fault in unstatable(place, one, kind)]
     exact = (setup.name for setup in board.setups if setup.noise.is_exact)
+    faults += [
+        fault for name, one in board.warp.items() for fault in unstatable(f"warp {name}", one, "normal", WARPS[name])
+    ]
     faults += [Fault(f"{name} noise", NOISE_WANTED, "an exact number") for name in exact]
     if faults:
         raise InputError(faults)
@@ -55,6 +58,8 @@ def card_text(board: Board) -> str:
         lines.append(f"effects = {array(text(name) for name in board.effects)}")
     lines += ["", "[plate]"]
     lines += [f"{key} = {quantity(inputs[name], f, f)}" for name, (key, f) in _INPUT_KEYS.items() if name in inputs]
+    if board.warp:
+        lines.append(f"warp_mm = {table({name: quantity(rise, _MILLI) for name, rise in board.warp.items()})}")
     lines += ["", "[material]"]
     lines += [f"poisson_xy = {quantity(inputs['poisson_xy'], 1.0)}"] if "poisson_xy" in inputs else []
     lines += [f"prior = {text(board.prior)}"]
@@ -81,10 +86,13 @@ def _uncertain(board: Board) -> Iterator[tuple[str, Quantity, Kind]]:
         for i, peak in enumerate(setup.peaks, start=1):
             yield f"{setup.name} peak {i}", peak.frequency, "log-normal"
         for i, item in enumerate(setup.attached, start=1):
-            if item.mass is not None:
-                yield f"{setup.name} attached {i}", item.mass, "log-normal"
-        if setup.air is not None and setup.air.density is not None:
-            yield f"{setup.name} air", setup.air.density, "log-normal"
+            for stated in (item.mass, item.coil, item.suspension, item.resonance):
+                if stated is not None:
+                    yield f"{setup.name} attached {i}", stated, "log-normal"
+        if setup.fluid is not None and setup.fluid.density is not None:
+            yield f"{setup.name} fluid", setup.fluid.density, "log-normal"
+        if setup.bounce is not None:
+            yield f"{setup.name} bounce", setup.bounce, "log-normal"
 
 
 def _setup(setup: Setup) -> Iterator[str]:
@@ -105,10 +113,12 @@ def _setup(setup: Setup) -> Iterator[str]:
         yield f"noise_percent = {table(dict(zip(('median', 'factor'), noise, strict=True)))}"
     if setup.hammer is not None:
         yield f"hammer = {table({'at_mm': _place(setup.hammer)})}"
-    if setup.air is not None:
-        air = {} if setup.air.density is None else {"density_kg_m3": quantity(setup.air.density, 1.0)}
-        air |= {} if setup.air.baffle is None else {"baffle": text(setup.air.baffle)}
-        yield f"air = {table(air)}"
+    if setup.fluid is not None:
+        fluid = {} if setup.fluid.density is None else {"density_kg_m3": quantity(setup.fluid.density, 1.0)}
+        fluid |= {} if setup.fluid.baffle is None else {"baffle": text(setup.fluid.baffle)}
+        yield f"fluid = {table(fluid)}"
+    if setup.bounce is not None:
+        yield f"support = {table({'bounce_hz': quantity(setup.bounce, 1.0)})}"
     if setup.attached:
         yield f"attached = {array(_item(item) for item in setup.attached)}"
     yield f"frequencies_hz = {_by_label(setup)}"
@@ -152,8 +162,16 @@ def _by_label(setup: Setup) -> str:
 
 def _item(item: AttachedItem) -> str:
     places = [_place(place) for place in item.places]
-    entries = {"kind": text(item.kind), "at_mm": places[0] if len(places) == 1 else array(places)}
-    return table(entries | ({} if item.mass is None else {"mass_g": quantity(item.mass, _MILLI)}))
+    entries = {"kind": text(item.kind)}
+    entries |= {"at_mm": places[0] if len(places) == 1 else array(places)} if places else {}
+    stated = (
+        ("mass_g", item.mass, _MILLI),
+        ("coil_mass_g", item.coil, _MILLI),
+        ("suspension_n_per_m", item.suspension, 1.0),
+        ("resonance_hz", item.resonance, 1.0),
+    )
+    entries |= {key: quantity(one, scale) for key, one, scale in stated if one is not None}
+    return table(entries | ({} if item.magnet == "free" else {"magnet": text(item.magnet)}))
 
 
 def _place(place: Sequence[float]) -> str:

@@ -298,7 +298,7 @@ def exact_models(
 
 def worst_cents(models: Sequence[SetupModel]) -> float:
     """Largest error of the exact laws against full solves that they were not trained on, cents."""
-    return max(model.exact.reduced.worst_cents for model in models if model.exact is not None)
+    return max(model.worst_cents for model in models)
 
 
 def linearisation_errors(board: Board, models: Sequence[SetupModel], theta: Floats) -> Floats:

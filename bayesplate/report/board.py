@@ -48,7 +48,7 @@ def board_picture(board: Board) -> Picture:
     scale = min(_WIDEST / length, _TALLEST / width)
     above = _ABOVE + (_HEADING if len(board.setups) > 1 else 0.0)
     row = above + width * scale + _BELOW
-    has_legend = any(setup.hammer or setup.attached for setup in board.setups)
+    has_legend = any(setup.hammer or any(item.places for item in setup.attached) for setup in board.setups)
     height = row * len(board.setups) + (0.3 if has_legend else 0.0)
     figure = Figure(figsize=(WIDTH, height))
     handles: dict[str, Any] = {}
@@ -209,6 +209,8 @@ def _draw_items(panel: Axes, setup: Setup, outline: _Outline) -> dict[str, Any]:
     handles: dict[str, Any] = {}
     for kind in dict.fromkeys(item.kind for item in setup.attached):
         places = [(x, y + corner) for item in setup.attached if item.kind == kind for x, y in item.places]
+        if not places:
+            continue
         handles[kind] = _points(panel, places, _MARKERS[kind], kind, mfc=VERMILLION, **style)
     if setup.hammer is not None:
         handles["hammer"] = _points(

@@ -12,7 +12,7 @@ from typing import TypeGuard, get_args
 import numpy as np
 
 from bayesplate.cards import BoardCard, CampaignCard, PriorCard
-from bayesplate.cards.words import EFFECT_NAMES, did_you_mean, quoted, shown
+from bayesplate.cards.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
 from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
@@ -156,14 +156,15 @@ def _effects(name: str, value: object) -> Iterator[Fault]:
     if value is None:
         return
     if not isinstance(value, list | tuple):
-        remedy = f'{name}=["{value}"]' if value in EFFECT_NAMES else ""
+        remedy = f'{name}=["{value}"]' if value in (*EFFECT_NAMES, *OTHER_EFFECT_NAMES) else ""
         yield Fault(name, "a list of names of effects", _shown(value), remedy)
         return
-    for number, effect in enumerate(value, start=1):
+    known = [effect_named(one) if isinstance(one, str) else one for one in value]
+    for number, effect in enumerate(known, start=1):
         if effect not in EFFECT_NAMES:
             near = did_you_mean(effect, EFFECT_NAMES) if isinstance(effect, str) else ""
             yield Fault(f"{name} {number}", f"one of {', '.join(EFFECT_NAMES)}", _shown(effect), near)
-        elif effect in value[: number - 1]:
+        elif effect in known[: number - 1]:
             yield Fault(f"{name} {number}", "each name once", f"{quoted(effect)} again")
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bayesplate.cards import is_campaign
-from bayesplate.cards.words import EFFECT_NAMES
+from bayesplate.cards.words import EFFECT_NAMES, effect_named
 from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.joint import full_search
@@ -136,6 +136,7 @@ def plan(
         card=card, goal=goal, costs=costs, between=between, out=out, effects=effects, seed=seed, force=force,
         progress=progress,
     )  # fmt: skip
+    between = None if between is None else [effect_named(name) for name in between]
     classes = Costs(**(costs or {}))
     given = _given(card, effects)
     files = () if out is None else require_new(Path(out), _names(), force=force)

@@ -22,6 +22,7 @@ from bayesplate.cards import (
     remarks,
 )
 from bayesplate.cards.shelf import find
+from bayesplate.cards.words import effect_named
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import coefficient_faults, require_sides
@@ -145,7 +146,7 @@ def _require_card(card: object) -> None:
 def prepared_card(read: BoardCard, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:
     """The same of cards that were read already: no file is looked at; raises as `prepare`."""
     stated = board_from_card(read, named.prior, named.tables)
-    listed = (*stated.effects, *implied_effects(stated)) if effects is None else effects
+    listed = (*stated.effects, *implied_effects(stated)) if effects is None else map(effect_named, effects)
     board = replace(stated, effects=tuple(dict.fromkeys(listed)))
     faults = [*physical_faults(read), *named.faults, *label_faults(board), *effect_faults(board)]
     if not faults:

@@ -80,9 +80,9 @@ CASES: dict[str, Case] = {
         others=("clamped_x0",),
         times=5,
     ),
-    "air_loading": Case(
+    "fluid_loading": Case(
         "clamped-9",
-        lambda v, p, at: planted.AirLoading(v["density"], v["baffle"]),
+        lambda v, p, at: planted.FluidLoading(v["density"], v["baffle"]),
         "baffle",
         {"air": "{ density_kg_m3 = { mean = 1.2, sd = 0.06 } }"},
     ),

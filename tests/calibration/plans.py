@@ -54,11 +54,11 @@ CHOSEN = ("cantilever-6", "cantilever-6", "clamped-9")
 """Designs of the boards, in turn."""
 ASKED = {
     "cantilever-6": (
-        "transverse_shear", "air_loading", "attached_mass", "clamp_rotation", "clamp_translation", "density_gradient",
+        "transverse_shear", "fluid_loading", "attached_mass", "clamp_rotation", "clamp_translation", "density_gradient",
         "stiffness_gradient", "thickness_profile", "grain_angle",
     ),
     "clamped-9": (
-        "transverse_shear", "air_loading", "attached_mass", "clamp_rotation", "clamp_translation", "support_mass",
+        "transverse_shear", "fluid_loading", "attached_mass", "clamp_rotation", "clamp_translation", "support_mass",
         "grain_angle",
     ),
 }  # fmt: skip

@@ -92,8 +92,8 @@ def test_effects_of_the_campaign_are_declared_on_every_board_as_its_own(tmp_path
         own.problems
     )
     assert {one.effect for one in own.shared} == {"attached_mass"}
-    replaced = bayesplate.Campaign.from_card(path, effects=("air_loading",))
-    assert {one.prepared.board.effects for one in replaced.problems} == {("air_loading", "attached_mass")}
+    replaced = bayesplate.Campaign.from_card(path, effects=("fluid_loading",))
+    assert {one.prepared.board.effects for one in replaced.problems} == {("fluid_loading", "attached_mass")}
     path.write_text(text.replace("\n[[shared]]", '\neffects = ["clamp_rotation"]\n[[shared]]', 1))
     with pytest.raises(InputError, match=r"together.toml boards 1 -> board-0.toml .*clamp_rotation"):
         bayesplate.Campaign.from_card(path)

@@ -107,12 +107,12 @@ def test_what_is_claimed_is_said_and_what_is_not_is_said_too(diagnosis):
 
 def test_of_a_group_the_sentence_names_what_the_boards_were_fitted_with(diagnosis):
     both = Explanation("shared", ("transverse_shear", "attached_mass"), "", 0.0, 0.6)
-    other = Explanation("shared", ("transverse_shear", "air_loading"), "", 0.0, 0.4)
+    other = Explanation("shared", ("transverse_shear", "fluid_loading"), "", 0.0, 0.4)
     group = replace(
         diagnosis,
         verdict="indistinguishable group",
         claim=False,
-        effects=("transverse_shear", "attached_mass", "air_loading"),
+        effects=("transverse_shear", "attached_mass", "fluid_loading"),
         explanations=(both, other),
     )
 

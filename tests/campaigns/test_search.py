@@ -191,12 +191,12 @@ def test_what_a_fit_could_not_share_is_not_searched_for(tmp_path):
     campaign = searching(tmp_path)
     found = shareable(campaign)
 
-    single = {"transverse_shear", "attached_mass", "air_loading", "support_stiffness"}
+    single = {"transverse_shear", "attached_mass", "fluid_loading", "support_stiffness"}
     assert {each for each in found if len(each) == 1} == {(name,) for name in single}
     assert {frozenset(each) for each in found if len(each) == 2} == {frozenset(two) for two in combinations(single, 2)}
     for effects in found:
         assert _sharing(campaign, effects).shared
-    assert [one.name for one in _sharing(campaign, ("air_loading",)).shared] == ["air_loading.baffle"]
+    assert [one.name for one in _sharing(campaign, ("fluid_loading",)).shared] == ["fluid_loading.baffle"]
 
 
 def test_an_effect_that_each_setup_has_at_a_size_of_its_own_is_not_searched_for(tmp_path):

@@ -44,7 +44,7 @@ noise_percent = { median = 0.5, factor = 2 }
 [setup.hammer]
 at_mm = [60, 20]
 
-[setup.air]
+[setup.fluid]
 density_kg_m3 = 1.2
 baffle = "none"
 

@@ -71,7 +71,7 @@ REST = [
     ('name = "my-board"', 'name = "other"', "name", '"my-board", the name of the file', '"other"'),
     ('title = "A test board"', "title = 3", "title", "a text in quotes", "3"),
     ('title = "A test board"', 'title = "\\u001b[2J"', "title", "a text without control characters", '"\\x1b[2J"'),
-    ('["transverse_shear"]', '["transverse_sheer"]', "effects 1", '"transverse_shear", "air_loading"',
+    ('["transverse_shear"]', '["transverse_sheer"]', "effects 1", '"transverse_shear", "fluid_loading"',
      '"transverse_sheer" (did you mean transverse_shear?)'),
     ('["transverse_shear"]', '["grain_angle", "grain_angle"]', "effects", "each name once", '"grain_angle" twice'),
     ('["transverse_shear"]', '"grain_angle"', "effects", "a list of names of effects", '"grain_angle"'),
@@ -131,12 +131,11 @@ REST = [
     ('"(1,0)" = "+"', '"(3,0)" = "+"', '[setup] signs."(3,0)"', "a label among the frequencies_hz", "(3,0)"),
     ('kind = "accelerometer"', 'kind = "acelerometer"', SETUP + "attached 1 kind", '"accelerometer", "exciter"',
      '"acelerometer" (did you mean accelerometer?)'),
-    ("at_mm = [200, 20]", "", SETUP + "attached 1 at_mm", "its place [x, y] in mm", "nothing"),
     ("at_mm = [200, 20]", "at_mm = [[200, 20], [3]]", SETUP + "attached 1 at_mm 2", "a place [x, y] in mm",
      "a list of 1"),
     ("mass_g = { mean = 0.6, sd = 0.1 }", "mass_g = -1", SETUP + "attached 1 mass_g", "a positive number", "-1"),
-    ("density_kg_m3 = 1.2", "density_kg_m3 = -1.2", SETUP + "air.density_kg_m3", "a positive number", "-1.2"),
-    ('baffle = "none"', 'baffle = "half"', SETUP + "air.baffle", '"none" or "full"', '"half"'),
+    ("density_kg_m3 = 1.2", "density_kg_m3 = -1.2", SETUP + "fluid.density_kg_m3", "a positive number", "-1.2"),
+    ('baffle = "none"', 'baffle = "half"', SETUP + "fluid.baffle", '"none" or "full"', '"half"'),
     ("[[setup.attached]]", "[setup.attached]", SETUP + "attached",
      "tables below [[setup.attached]], in double brackets",
      "a table with kind, mass_g, at_mm"),
@@ -205,8 +204,8 @@ def test_all_faults_are_reported_at_once(spoiled: Spoil) -> None:
     assert sorted(fault.place for fault in caught.value.faults) == [
         "my-board.toml [plate]",
         "my-board.toml [plate] length_x_mm",
-        "my-board.toml [setup] air.bafle",
         "my-board.toml [setup] first_label",
+        "my-board.toml [setup] fluid.bafle",
         'my-board.toml [setup] signs."(9,9)"',
     ]
 
@@ -215,7 +214,7 @@ def test_a_flood_of_faults_is_cut(spoiled: Spoil) -> None:
     flood = "\n".join(f"key{number} = 1" for number in range(500))
 
     with pytest.raises(InputError, match="450 more faults, not listed") as caught:
-        read_board_text(spoiled("[setup.air]", f"[setup.air]\n{flood}"), "my-board")
+        read_board_text(spoiled("[setup.fluid]", f"[setup.air]\n{flood}"), "my-board")
 
     assert len(caught.value.faults) == 51
 

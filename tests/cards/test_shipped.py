@@ -48,7 +48,7 @@ def test_a_shipped_board_is_sound_and_declares_nothing(name: str) -> None:
     assert card.material.prior == "weakly-informative"
     assert card.source
     for setup in card.setups:
-        assert setup.air is None
+        assert setup.fluid is None
         assert all(item.mass_g is None for item in setup.attached)
 
 

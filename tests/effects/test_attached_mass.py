@@ -217,3 +217,26 @@ def test_refusals():
     heavy = replace(UNKNOWN, mass=Quantity.exact(2e-3))
     assert "above 2% of the board roved" in AttachedMass.refusal(*board_with(heavy))
     assert setup_of(FREE).attached == ()
+
+
+def test_an_exciter_is_no_point_mass():
+    """Its magnet hangs on a spring: with a mass or without, it neither implies the effect nor forbids a search."""
+    board, setup = board_with(AttachedItem("exciter", ((0.1, 0.1),), 0.05), AttachedItem("exciter"))
+    assert not AttachedMass.is_implied(board)
+    assert "no [[setup.attached]]" in AttachedMass.refusal(board, setup)
+    tried = [form.detail for form in AttachedMass.forms(board)]
+    assert tried == [form.detail for form in AttachedMass.forms(board_with()[0])]
+
+
+def test_a_thing_that_is_somewhere_is_tried_at_the_likely_places():
+    """With the prior of its kind, where a forgotten one would be; declared, it has to be somewhere."""
+    board, setup = board_with(AttachedItem("accelerometer"))
+    forms, forgotten = AttachedMass.forms(board), AttachedMass.forms(board_with()[0])
+    assert [form.detail for form in forms] == [form.detail for form in forgotten]
+    assert [form.effects[0].items[0].mass.median for form in forms] == pytest.approx([1.4e-3] * len(forms))
+    assert "no [[setup.attached]] says what is fixed to the board and where" in AttachedMass.refusal(board, setup)
+    beside, setup = board_with(KNOWN, AttachedItem("weight"))
+    assert [item.mass for item in AttachedMass.of(replace(beside, effects=("attached_mass",)), setup).items] == [
+        KNOWN.mass
+    ]
+    assert [len(one.items) for one in AttachedMass.candidates(beside, setup)] == [2] * len(forgotten)

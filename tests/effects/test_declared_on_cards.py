@@ -173,10 +173,10 @@ CASES: dict[str, Declared] = {
         values=lambda p, plate: {"stiffness": p["stiffness"]},
     ),
     "air without a baffle": Declared(
-        "air_loading", ALL, _times("density"), _air("none"), fixed=lambda design, size: {"baffle": 0.0}
+        "fluid_loading", ALL, _times("density"), _air("none"), fixed=lambda design, size: {"baffle": 0.0}
     ),
     "air with a full baffle": Declared(
-        "air_loading", ALL, _times("density"), _air("full"), fixed=lambda design, size: {"baffle": 1.0}
+        "fluid_loading", ALL, _times("density"), _air("full"), fixed=lambda design, size: {"baffle": 1.0}
     ),
     "read thickness": Declared(
         "thickness_profile", ALL, _times("taper_x"), _grid, fixed=lambda design, size: {"taper_y": 0.02}

@@ -15,10 +15,10 @@ from generator.plate import FINE_SHEAR
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
-from bayesplate.effects.air_loading import AirLoading
 from bayesplate.effects.attached_items import Item
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.field_components import FieldProfile
+from bayesplate.effects.fluid_loading import FluidLoading
 from bayesplate.effects.membrane_tension import MembraneTension
 from bayesplate.effects.outline_profile import OutlineProfile
 from bayesplate.effects.support_mass import SupportMass
@@ -115,12 +115,13 @@ def test_a_narrower_board_is_the_smaller_rectangle(plate, factor):
 
 
 BRIDGE = replace(FREE, edges=FREE.edges | {"x0": "clamped", "x1": "clamped"})
+AIR = FluidLoading(MADE, FREE.L_x / FREE.L_y)
 TERMS = {
     "foundation": (FREE, SupportStiffness(MADE), {"support_stiffness.stiffness": 2e4}),
     "tension": (BRIDGE, MembraneTension(MADE, "x"), {"membrane_tension.N": 500.0}),
     "frame": (BRIDGE, SupportMass(MADE), {"support_mass.mass": 1.0}),
-    "open air": (FREE, AirLoading(MADE, FREE.L_x / FREE.L_y), {"air_loading.density": 1.2, "air_loading.baffle": 0.0}),
-    "wall": (FREE, AirLoading(MADE, FREE.L_x / FREE.L_y), {"air_loading.density": 1.2, "air_loading.baffle": 1.0}),
+    "open air": (FREE, AIR, {"fluid_loading.density": 1.2, "fluid_loading.baffle": 0.0}),
+    "wall": (FREE, AIR, {"fluid_loading.density": 1.2, "fluid_loading.baffle": 1.0}),
 }
 
 
@@ -140,9 +141,9 @@ extrapolated from those and 18 to panels without end, which leaves half a cent."
 def test_air_of_a_board_that_narrows():
     """By a quarter of its width."""
     narrow = outline(FREE, (0.0, 0.2 / 0.58, 0.75, 1.0), (1.0, 0.99, 0.9, 0.74))
-    air = AirLoading(MADE, FREE.L_x / FREE.L_y)
+    air = FluidLoading(MADE, FREE.L_x / FREE.L_y)
     for baffle, expected in AIR.items():
-        values = {"air_loading.density": 1.2, "air_loading.baffle": baffle}
+        values = {"fluid_loading.density": 1.2, "fluid_loading.baffle": baffle}
         wet, dry = (hertz(FREE, effects, values, len(expected)) for effects in ([narrow, air], [narrow]))
         assert 1200 * np.log2(wet / dry) == pytest.approx(np.array(expected), abs=1.0)
 

@@ -20,6 +20,7 @@ from made_boards import board_of
 from bayesplate.cards import read_board_text
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
+from bayesplate.effects.attached_items import item_on_board
 from bayesplate.plate.from_card import board_from_card
 from bayesplate.plate.setup import AttachedItem
 from bayesplate.quantities import Quantity
@@ -36,8 +37,8 @@ PRIORS = {
     ("membrane_tension", "N"): ("N/m", "normal", 0.0, 500.0, HALF),
     ("support_mass", "mass"): ("kg", "log-normal", 8.0, log(3.0), ANY),
     ("support_stiffness", "stiffness"): ("N/m^3", "normal", 0.0, 2e4, HALF),
-    ("air_loading", "density"): ("kg/m^3", "exact", 1.2, 0.0, ANY),
-    ("air_loading", "baffle"): ("1", "normal", 0.5, 1.0, (0.0, 1.0)),
+    ("fluid_loading", "density"): ("kg/m^3", "exact", 1.2, 0.0, ANY),
+    ("fluid_loading", "baffle"): ("1", "normal", 0.5, 1.0, (0.0, 1.0)),
     ("thickness_profile", "taper_x"): ("1", "normal", 0.0, 0.05, ANY),
     ("thickness_profile", "taper_y"): ("1", "normal", 0.0, 0.05, ANY),
     ("density_gradient", "gradient"): ("1", "normal", 0.0, 0.05, ANY),
@@ -102,11 +103,13 @@ def test_prior_and_unit_of_a_parameter(name, parameter):
 def test_mass_of_a_thing_that_the_card_does_not_weigh(kind):
     board = BOARDS[1]
     setup = replace(board.setups[0], attached=(AttachedItem(kind, ((0.1, 0.1),)),))
-    (found,) = EFFECTS["attached_mass"].of(replace(board, effects=("attached_mass",)), setup).parameters()
+    declared = replace(board, effects=("attached_mass",))
     median, factor = MASSES[kind]
+    item = item_on_board(board, setup, setup.attached[0])
 
-    assert found.unit == "kg"
-    assert same(found.prior, "log-normal", median, log(factor), ANY), told(found.prior)
+    assert same(item.mass, "log-normal", median, log(factor), ANY), told(item.mass)
+    found = EFFECTS["attached_mass"].of(declared, setup).parameters()
+    assert [(one.unit, one.prior) for one in found] == ([] if kind == "exciter" else [("kg", item.mass)])
 
 
 def test_mass_of_a_thing_that_nobody_mentioned():

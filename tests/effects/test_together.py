@@ -21,7 +21,7 @@ from bayesplate.effects import EFFECTS, declare
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.solve import solve
 from bayesplate.plate.board import Board
-from bayesplate.plate.setup import AttachedItem, DeclaredAir
+from bayesplate.plate.setup import AttachedItem, DeclaredFluid
 from bayesplate.quantities import Quantity
 
 PLATES = {
@@ -43,7 +43,7 @@ NOTHING = {
     "membrane_tension": 0.0,
     "support_mass": 1e9,
     "support_stiffness": 0.0,
-    "air_loading": 0.0,
+    "fluid_loading": 0.0,
     "thickness_profile": 0.0,
     "outline_profile": 0.0,
     "density_gradient": 0.0,
@@ -55,7 +55,7 @@ NOTHING = {
 KINDS = {
     "stiffness": {"clamp_rotation", "clamp_translation", "membrane_tension", "support_stiffness"},
     "mass": {"attached_mass"},
-    "projected mass": {"air_loading", "support_mass"},
+    "projected mass": {"fluid_loading", "support_mass"},
     "field": {"thickness_profile", "outline_profile", "density_gradient", "stiffness_gradient"},
     "theory": {"transverse_shear"},
     "material": {"grain_angle", "poisson_ratio"},
@@ -153,7 +153,7 @@ def differing(plate: Plate, board: Board, pairs: Iterable[tuple[str, str]]) -> d
 @pytest.mark.usefixtures("coarse")
 def test_three_masses_in_any_order_give_the_same_frequencies():
     """A sensor, the air and a frame: sparse matrices and projected ones by turns."""
-    orders = permutations(("attached_mass", "air_loading", "support_mass"))
+    orders = permutations(("attached_mass", "fluid_loading", "support_mass"))
     found = np.array([hertz(FIEMME, BOARDS["CCCC"], order) for order in orders])
 
     assert np.abs(found / found[0] - 1.0).max() < 1e-9
@@ -243,7 +243,7 @@ def test_three_effects_that_do_nothing_leave_the_bare_plate(edges):
 KNOWN_PAIRS = {
     "a sensor and the air on a free board": (
         replace(FINNISH, L_x=0.253, edges=ALL_FREE),
-        ("attached_mass", "air_loading"),
+        ("attached_mass", "fluid_loading"),
         0.07,
     ),
     "a frame and a sensor on a clamped board": (FIEMME, ("support_mass", "attached_mass"), 0.02),
@@ -255,12 +255,12 @@ def test_a_pair_against_the_generator(which):
     """Both orders against an independent solver; a point mass leaves its polynomials an error of the square of n."""
     plate, effects, share = KNOWN_PAIRS[which]
     board = board_like(plate, kind="shaker", share=share)
-    if "air_loading" in effects:
-        board = replace(board, setups=(replace(board.setups[0], air=DeclaredAir(baffle="none")),))
+    if "fluid_loading" in effects:
+        board = replace(board, setups=(replace(board.setups[0], fluid=DeclaredFluid(baffle="none")),))
     mass = share * plate.rho * plate.h * plate.L_x * plate.L_y
     independent = {
         "attached_mass": generator.effects.AttachedMass(mass, ((PLACE[0] * plate.L_x, PLACE[1] * plate.L_y),)),
-        "air_loading": generator.effects.AirLoading(1.2, 0.0),
+        "fluid_loading": generator.effects.FluidLoading(1.2, 0.0),
         "support_mass": generator.effects.SupportMass(2.0),
     }
     n_rigid = 3 if plate.edges == ALL_FREE else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from generator.effects import AirLoading
+from generator.effects import FluidLoading
 from generator.naming import Label
 from generator.plate import EDGES, Plate
 
@@ -51,9 +51,9 @@ class Setup:
     tank: float = 0.0
 
     @property
-    def surroundings(self) -> tuple[AirLoading, ...]:
+    def surroundings(self) -> tuple[FluidLoading, ...]:
         """What acts in this setup whatever is planted, and is known: the liquid of a tank."""
-        return (AirLoading(self.tank, 0.0),) if self.tank else ()
+        return (FluidLoading(self.tank, 0.0),) if self.tank else ()
 
     def label(self, beams: Label) -> Label:
         """The laboratory's label of beam orders."""
@@ -150,7 +150,7 @@ _CLAMPED_SIZES = {
     "warp": 0.2,  # a frame presses a board nearly flat
     "exciter": 1.0,
 }
-_ANYWHERE = ("transverse_shear", "air_loading", "attached_mass", "grain_angle", "poisson_ratio")
+_ANYWHERE = ("transverse_shear", "fluid_loading", "attached_mass", "grain_angle", "poisson_ratio")
 _TAPERED = ("thickness_profile", "density_gradient", "stiffness_gradient")
 """What differs from end to end along x: of second order, and invisible, where the board is held alike at both."""
 _CLAMP = ("clamp_rotation", "clamp_translation")

@@ -53,7 +53,7 @@ class TransverseShear(NoEffect):
 
 
 @dataclass(frozen=True)
-class AirLoading(NoEffect):
+class FluidLoading(NoEffect):
     """A fluid of a density, kg m^-3, on both faces, air or water; baffle 0 is open, 1 a rigid wall around the plate."""
 
     density: float = 1.2

@@ -153,7 +153,7 @@ def _make(effect: type[NoEffect]) -> Callable[[Parameters], NoEffect]:
 
 LIBRARY: dict[str, Recipe] = {
     "transverse_shear": Recipe(_shear, _make(effects.TransverseShear)),
-    "air_loading": Recipe(_air, _make(effects.AirLoading), lambda setup: not setup.tank),
+    "fluid_loading": Recipe(_air, _make(effects.FluidLoading), lambda setup: not setup.tank),
     "attached_mass": Recipe(_attached, _make(effects.AttachedMass)),
     "exciter": Recipe(_exciter, _make(Exciter)),
     "warp": Recipe(_warp, _make(Warp)),
@@ -190,7 +190,7 @@ OUTSIDE: dict[str, Recipe] = {
 """The effects that it does not know."""
 
 RECIPES = LIBRARY | OUTSIDE
-KNOWN_SIZE = ("transverse_shear", "air_loading")
+KNOWN_SIZE = ("transverse_shear", "fluid_loading")
 """Effects whose size nature sets: they are left alone when a size is asked for, unless that is asked for too."""
 OF_WOOD = ("grain_angle", "poisson_ratio", "stiffness_gradient")
 """Effects that an isotropic plate cannot have: they would leave it one no longer."""

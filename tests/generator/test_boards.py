@@ -15,7 +15,7 @@ from generator.__main__ import main
 from generator.boards import plant
 from generator.card import told
 from generator.designs import DESIGNS, STEEL_DESIGNS
-from generator.effects import AirLoading
+from generator.effects import FluidLoading
 from generator.naming import frequencies, named
 from generator.plate import solve
 from generator.recipes import OUTSIDE, RECIPES
@@ -150,7 +150,7 @@ def test_random_boards_have_random_effects_sizes_and_noise(rng: np.random.Genera
 
 def test_air_and_shear_keep_their_physical_size_unless_told(rng: np.random.Generator) -> None:
     physical, doubled = (
-        plant(rng, "free-12", ["air_loading"], 2.0, scale_known=scale).truth.effects["air_loading"]["density"]
+        plant(rng, "free-12", ["fluid_loading"], 2.0, scale_known=scale).truth.effects["fluid_loading"]["density"]
         for scale in (False, True)
     )
 
@@ -270,10 +270,10 @@ def test_steel_plates_are_isotropic(design, rng: np.random.Generator) -> None:
 def test_a_plate_in_a_tank_is_in_water_whatever_is_planted(rng: np.random.Generator) -> None:
     """Its card says so, and air acts in the other setup alone; a fifth to a third lower than in air."""
     design = STEEL_DESIGNS["steel-air-water"]
-    board = plant(rng, design, ["air_loading"], noise_cents=0.0)
+    board = plant(rng, design, ["fluid_loading"], noise_cents=0.0)
     in_air, in_water = tomllib.loads(board.card_text())["setup"]
     setup = design.setups[1]
-    wet = frequencies(design.plate(setup, board.truth.constants), [AirLoading(997.0, 0.0)], setup.beams)[0]
+    wet = frequencies(design.plate(setup, board.truth.constants), [FluidLoading(997.0, 0.0)], setup.beams)[0]
 
     assert board.readings["water"] == wet
     assert in_water["fluid"] == {"density_kg_m3": 997, "baffle": "none"}

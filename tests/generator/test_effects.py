@@ -11,11 +11,11 @@ import scipy.optimize
 
 from generator.designs import ALL_FREE
 from generator.effects import (
-    AirLoading,
     AttachedMass,
     ClampRotation,
     ClampTranslation,
     DensityGradient,
+    FluidLoading,
     GrainAngle,
     MembraneTension,
     NoEffect,
@@ -55,7 +55,7 @@ def gain(plate: Plate, w, effect: NoEffect) -> np.ndarray:
 PHYSICS = {
     "shear, cantilever": (FINNISH, TransverseShear(0.62e9, 0.023e9), [-2, -24, -15, -30, -35, -62]),
     "shear, clamped": (FIEMME, TransverseShear(0.62e9, 0.023e9), [-6, -19, -6, -15, -36, -31]),
-    "air open, cantilever": (FINNISH, AirLoading(), [-42, -22, -32, -25, -21, -17]),
+    "air open, cantilever": (FINNISH, FluidLoading(), [-42, -22, -32, -25, -21, -17]),
     "grain, cantilever": (FINNISH, GrainAngle(np.radians(3.0)), [-17.6, 4.9, -8.9, -7.2, 4.5, -6.5]),
     "taper": (FINNISH, ThicknessProfile(0.05), [-54, -23, -13, 7, -6, 1]),
     "density": (FINNISH, DensityGradient(0.05), [-13, -12, -5, -10, -4, -4]),

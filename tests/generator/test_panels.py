@@ -7,7 +7,7 @@ import pytest
 import scipy.integrate
 
 from generator.designs import ALL_FREE
-from generator.effects import AirLoading
+from generator.effects import FluidLoading
 from generator.known_boards import BEAMS, FIEMME, FINNISH, cents, field
 from generator.naming import frequencies
 from generator.panels import air_mass, source_pairs
@@ -68,9 +68,9 @@ def test_lattices_have_converged() -> None:
 
 
 def test_baffle_lies_between_its_ends() -> None:
-    shifts = [cents(FINNISH, [AirLoading(1.2, baffle)], BEAMS["cantilever"]) for baffle in (0.0, 0.5, 1.0)]
+    shifts = [cents(FINNISH, [FluidLoading(1.2, baffle)], BEAMS["cantilever"]) for baffle in (0.0, 0.5, 1.0)]
 
     assert np.all(shifts[0] > shifts[1])
     assert np.all(shifts[1] > shifts[2])
-    none = frequencies(FINNISH, [AirLoading(0.0)], BEAMS["cantilever"])[0]
+    none = frequencies(FINNISH, [FluidLoading(0.0)], BEAMS["cantilever"])[0]
     assert none == pytest.approx(frequencies(FINNISH, (), BEAMS["cantilever"])[0])

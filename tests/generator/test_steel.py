@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.effects import AirLoading, NoEffect, TransverseShear
+from generator.effects import FluidLoading, NoEffect, TransverseShear
 from generator.known_boards import BEAMS, STEEL
 from generator.naming import frequencies
 from generator.panels import air_mass
@@ -19,7 +19,7 @@ from generator.plate import Plate, solve
 
 AIR = np.array([641.0, 712.0, 1577.0, 1766.0, 2139.0])
 WATER = np.array([497.0, 575.0, 1293.0, 1408.0, 1758.0])
-TANK = AirLoading(997.0, baffle=0.0)
+TANK = FluidLoading(997.0, baffle=0.0)
 SHEAR = TransverseShear()
 
 

@@ -16,7 +16,7 @@ def explained(words, *members):
     return SimpleNamespace(words=words, members=members)
 
 
-TWO = SimpleNamespace(explanations=(explained("no effect"), explained("air loading", "air_loading")), entropy=0.6)
+TWO = SimpleNamespace(explanations=(explained("no effect"), explained("fluid loading", "fluid_loading")), entropy=0.6)
 ONE = SimpleNamespace(explanations=TWO.explanations[:1], entropy=0.0)
 
 
@@ -28,7 +28,7 @@ def test_doubt_and_intervals_are_told_with_their_numbers():
     one = gain((0.5, 0.8, 0.99), 0.3, 0.01)
 
     assert first_line("Do it", one, TWO, None) == (
-        "Do it: the doubt between no effect and air loading would fall by 50 % (0.30 ± 0.01 of 0.60 nats) and the "
+        "Do it: the doubt between no effect and fluid loading would fall by 50 % (0.30 ± 0.01 of 0.60 nats) and the "
         "intervals of E_x and E_y would shrink to 0.50 and 0.80 of what they are."
     )
     assert first_line("Do it", one, ONE, None) == (
@@ -95,7 +95,7 @@ def entry(shared):
 
 
 def test_a_campaign_is_told_what_its_boards_share_or_their_constants():
-    shared = {"transverse_shear.G_xz / E_x": 0.9, "attached_mass.mass": 0.034, "air_loading.density": 0.99}
+    shared = {"transverse_shear.G_xz / E_x": 0.9, "attached_mass.mass": 0.034, "fluid_loading.density": 0.99}
 
     assert campaign_line([entry(shared)], None) == (
         "Weigh it: the interval would shrink, of G_xz / E_x to 0.9 and attached mass to 0.034 of what it is."
@@ -103,9 +103,9 @@ def test_a_campaign_is_told_what_its_boards_share_or_their_constants():
     of_constants = "Weigh it: the interval would shrink, of E_x to 0.5 of what it is."
     assert campaign_line([entry({})], None) == of_constants
     assert campaign_line([entry(shared)], "E_x") == campaign_line([entry(shared)], "constants") == of_constants
-    assert campaign_line([entry({"air_loading.density": 0.96})], None) == campaign_line([], None) == ""
+    assert campaign_line([entry({"fluid_loading.density": 0.96})], None) == campaign_line([], None) == ""
     assert campaign_line([entry(shared)], "E_y") == ""
-    assert shared_words("air_loading.density") == "density of air loading"
+    assert shared_words("fluid_loading.density") == "density of fluid loading"
 
 
 def test_the_first_line_is_of_the_best_proposal_that_would_help():

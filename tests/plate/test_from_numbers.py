@@ -172,7 +172,7 @@ def test_a_number_is_exact_wherever_a_quantity_is_meant():
 
     assert board().with_priors({"mass": 0.04}).inputs["mass"] == Q.exact(0.04)
     assert bayesplate.AttachedItem("weight", ((0.2, 0.1),), 0.001).mass == exact
-    assert bayesplate.DeclaredAir(1.2).density == Q.exact(1.2)
+    assert bayesplate.DeclaredFluid(1.2).density == Q.exact(1.2)
     assert replace(reading, frequency=135.0).frequency == Q.exact(135.0)
     assert replace(setup(), clamped={"x0": 0.001}).clamped == {"x0": exact}
     with pytest.raises(bayesplate.InputError, match="free noise: wanted a relative noise"):
@@ -226,11 +226,11 @@ BAD = {
                "free unlabelled 3: wanted finite numbers, in Hz, or a Peak, got nan"]),
     "a peak": (lambda: bayesplate.Peak(np.nan), ["frequency of a peak: wanted finite numbers, in Hz, got nan"]),
     "types of a setup": (lambda: setup(name=1, edges=None, noise=None, first_label=1, clamped=[0.03], signs="+",
-                                       unlabelled=448.8, attached="weight", hammer=0.1, air=1.2),
+                                       unlabelled=448.8, attached="weight", hammer=0.1, fluid=1.2),
                          ["1 name: wanted a text, got 1", "1 edges: wanted a word", "1 first_label: wanted a pair",
                           "1 clamped: wanted a dict of lengths by edge, got [0.03]", "1 signs: wanted a dict",
                           "1 unlabelled: wanted a list of peaks, got 448.8", "1 attached: wanted a list of Attach",
-                          "1 hammer: wanted a place (x, y) in m, got 0.1", "1 air: wanted a DeclaredAir, got 1.2"]),
+                          "1 hammer: wanted a place (x, y) in m, got 0.1", "1 fluid: wanted a DeclaredFluid, got 1.2"]),
     "frequencies in a list": (lambda: bayesplate.Setup.from_frequencies([134], edges="free"),
                               ["setup frequencies: wanted a dict of frequencies by label, got [134]"]),
     "types of a board": (lambda: board(setups=None, length_x=None, prior=3, effects="transverse_shear", title=None),

@@ -12,7 +12,7 @@ from bayesplate.errors import InputError
 from bayesplate.labels import Label
 from bayesplate.plate.board import made_board
 from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.setup import AttachedItem, DeclaredAir, Peak, Reading, Setup
+from bayesplate.plate.setup import AttachedItem, DeclaredFluid, Peak, Reading, Setup
 from bayesplate.plate.writing import card_text
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
@@ -82,11 +82,21 @@ def everything():
         attached=(
             AttachedItem("accelerometer", ((0.2, 0.02),), Quantity.from_mean(0.6e-3, 0.1e-3)),
             AttachedItem("weight", ((0.1, 0.02), (0.2, 0.1))),
+            AttachedItem("weight"),
+            AttachedItem(
+                "exciter",
+                mass=Quantity.from_mean(0.048, 0.001),
+                coil=Quantity.exact(1.6e-3),
+                suspension=Quantity.from_mean(2700.0, 300.0),
+                magnet="held",
+            ),
+            AttachedItem("exciter", ((0.1, 0.05),), resonance=Quantity.from_readings([28.3, 28.5])),
         ),
         hammer=(0.02, 0.02),
-        air=DeclaredAir(Quantity.exact(1.2), "none"),
+        fluid=DeclaredFluid(Quantity.exact(1.2), "none"),
     )
-    free = Setup("free", ("free", "free"), ("free", "free"), (), Quantity.from_median(0.003, 1.65))
+    free = Setup("free", ("free", "free"), ("free", "free"), (), Quantity.from_median(0.003, 1.65),
+                 fluid=DeclaredFluid(Quantity.from_mean(997.0, 2.0)), bounce=Quantity.from_mean(4.5, 1.0))  # fmt: skip
     inputs = {
         "length_x": Quantity.exact(0.253),
         "length_y": Quantity.from_readings([0.114, 0.1138], 0.0, [0.0, 0.2]),
@@ -95,6 +105,11 @@ def everything():
         "poisson_xy": Quantity.from_mean(0.4, 0.1, "normal"),
     }
     more = {"title": 'Fichte, "quer" – ÄÖÜ', "source": "line\nbreak", "effects": ("grain_angle",), "prior": "spruce"}
+    more["warp"] = {
+        "cup": Quantity.from_mean(0.8e-3, 0.5e-3, "normal", lower=0.0),
+        "bow": Quantity.from_readings([-1.0e-3, -1.4e-3], 1e-4, kind="normal"),
+        "twist": Quantity.exact(0.0),
+    }
     setups = (replace(free, readings=(Reading(Label(1, 1), (1, 1), Quantity.exact(134.0)),)), held)
     return made_board("whole", inputs, setups, shear_xz=Quantity.exact(0.6e9), shear_yz=Quantity.exact(3e7), **more)
 
@@ -120,6 +135,19 @@ def test_what_no_card_can_state_is_refused(name):
     known = {"thickness": Quantity.from_range(2e-3, 4e-3), "poisson_xy": Quantity.from_mean(0.4, 0.1, "normal", 0.0)}
     with pytest.raises(InputError, match=f"{name}: wanted a .*normal quantity without bounds, as cards state it, got"):
         card_text(everything().with_priors({name: known[name]}))
+
+
+@pytest.mark.parametrize(
+    ("name", "rise"),
+    [
+        ("cup", Quantity.from_mean(1e-3, 2e-4)),
+        ("cup", Quantity.from_mean(1e-3, 2e-4, "normal")),
+        ("bow", Quantity.from_mean(1e-3, 2e-4, "normal", lower=0.0)),
+    ],
+)
+def test_a_warp_of_another_density_is_refused(name, rise):
+    with pytest.raises(InputError, match=f"warp {name}: wanted a normal quantity (from 0 on|without bounds), as cards"):
+        card_text(replace(everything(), warp={name: rise}))
 
 
 def test_peaks_and_what_is_believed_of_them_are_written_where_they_say_something():

@@ -200,7 +200,7 @@ def test_what_an_effect_shifts_is_told_beside_the_discrepancies():
     """`check` and `diagnose` tell the same; the air makes every mode lower, whatever the board does otherwise."""
     problem = pose(board(is_rough=True), load_prior("weakly-informative"), law="linear")
     base = baseline_of(problem)
-    raw, _, _ = nominal_shift(base, form_law(base, forms(problem.board)["air_loading"][0]).placed(base))
-    (told,) = signatures(problem, ["air_loading"])
+    raw, _, _ = nominal_shift(base, form_law(base, forms(problem.board)["fluid_loading"][0]).placed(base))
+    (told,) = signatures(problem, ["fluid_loading"])
     assert (told.raw < 0.0).all()
     assert cents(raw) == pytest.approx(told.raw, abs=0.3)

@@ -149,7 +149,8 @@ def test_each_verdict_is_told_in_plain_words(clamped, verdict):
         "none needed": ("need no further effect", "no more than their noise"),
         "named": ("An effect was found", "point to membrane tension.", "its low modes ring higher", "is reduced",
                   "every condition of that claim is met"),
-        "indistinguishable group": ("cannot tell which: membrane tension or air loading.", "No improvement is claimed"),
+        "indistinguishable group": ("cannot tell which: membrane tension or fluid loading.",
+                                    "No improvement is claimed"),
         "unexplained": ("Something is missing that was not found", "Check the labels"),
         "undetectable": ("These readings could not show it",),
     }  # fmt: skip
@@ -226,7 +227,7 @@ def test_the_first_lines_are_of_the_constants_to_quote(clamped, verdict):
 def test_a_page_says_what_known_effects_do_to_the_error(clamped):
     page = Read(clamped.page("A board", diagnosis=DIAGNOSES["named"]))
     text = " ".join(page.text.split())
-    assert "air loading raises it from 46 to 94 cents" in text
+    assert "fluid loading raises it from 46 to 94 cents" in text
     assert "What physics knows, computed and not fitted" in text
     assert "What physics knows" not in Read(clamped.page("A board", diagnosis=DIAGNOSES["none needed"])).text
 

@@ -23,7 +23,7 @@ from bayesplate.results.contract import Constants, Elastic, as_json
 from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
 from bayesplate.workflow.shown import show_check, show_modes
 
-EFFECT = CheckedEffect("air_loading", {}, 44.1, 10.6, True, Elastic(-7.3, -2.4, 0.1), ("clamp_rotation", "tension"))
+EFFECT = CheckedEffect("fluid_loading", {}, 44.1, 10.6, True, Elastic(-7.3, -2.4, 0.1), ("clamp_rotation", "tension"))
 REPORT = CheckReport(
     name="made",
     title="",
@@ -63,7 +63,7 @@ def test_check_shows_what_its_report_holds():
     assert constants.rows[1] == ("E_y, across grain", "0.674", "± 4.2 %")
     assert modes.rows == (("(1,0)", "52", "+20.5", "100 / -0 / 0", "0.62"),)
     assert effects.rows == (
-        ("air_loading", "44.1", "10.6 *", "-7.3/-2.4/+0.1", "clamp_rotation\ntension"),
+        ("fluid_loading", "44.1", "10.6 *", "-7.3/-2.4/+0.1", "clamp_rotation\ntension"),
         ("grain_angle", "44.1", "10.6  ", "-7.3/-2.4/+0.1", "–"),
     )
     assert len(check_tables(replace(REPORT, signatures=()))) == 2

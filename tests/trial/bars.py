@@ -41,7 +41,7 @@ PLANNED = frozenset(
     (
         "clamp_rotation",
         "attached_mass",
-        "air_loading",
+        "fluid_loading",
         "transverse_shear",
         "grain_angle",
         "thickness_profile",

@@ -11,7 +11,7 @@ from trial.made_records import GROUP, found_right, made
 
 N = 400
 SIX, NINE, BOTH = "cantilever-6", "cantilever-9", "cantilever-6-free-6"
-A, B, FURTHER = "air_loading", "attached_mass", "clamp_translation"
+A, B, FURTHER = "fluid_loading", "attached_mass", "clamp_translation"
 
 
 def large(design, kind="one"):

@@ -180,7 +180,7 @@ def test_records_of_other_code_are_gone_on_with_only_if_they_come_out_the_same(f
     out.write_text("\n".join([head, *map(json.dumps, few)]) + "\n")
     assert run(FEW, out, quiet=True) == few
 
-    inclusion = few[-1]["inclusion"] | {"air_loading": few[-1]["inclusion"]["air_loading"] + 0.01}
+    inclusion = few[-1]["inclusion"] | {"fluid_loading": few[-1]["inclusion"]["fluid_loading"] + 0.01}
     out.write_text("\n".join([head, json.dumps(few[-1] | {"inclusion": inclusion})]) + "\n")
     with pytest.raises(SystemExit, match="comes out otherwise since the code has changed"):
         run(FEW, out, quiet=True)

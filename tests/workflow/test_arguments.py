@@ -21,10 +21,10 @@ BAD = [
     ({"law": "linaer"}, "(did you mean linear?)"),
     ({"law": True}, "law: wanted"),
     ({"effects": "transverse_shear"}, f'effects: wanted {LIST}, got "transverse_shear" (effects=["transverse_shear"])'),
-    ({"effects": {"air_loading"}}, f"effects: wanted {LIST}, got set"),
+    ({"effects": {"fluid_loading"}}, f"effects: wanted {LIST}, got set"),
     ({"effects": ["grain_angel"]}, "(did you mean grain_angle?)"),
     ({"effects": [3]}, "effects 1: wanted one of transverse_shear"),
-    ({"effects": ["air_loading", "air_loading"]}, 'effects 2: wanted each name once, got "air_loading" again'),
+    ({"effects": ["fluid_loading", "fluid_loading"]}, 'effects 2: wanted each name once, got "fluid_loading" again'),
     ({"seed": None}, f"seed: wanted {WHOLE}, got None"),
     ({"seed": -1}, f"seed: wanted {WHOLE}, got -1"),
     ({"seed": True}, f"seed: wanted {WHOLE}, got True"),
@@ -49,10 +49,10 @@ BAD = [
 GOOD = [
     {"law": None, "seed": 0, "effects": None, "out": None, "progress": None, "coefficients": None},
     {"law": "linear", "seed": np.int64(3), "effects": (), "out": Path("x"), "progress": print},
-    {"law": "exact", "effects": ["air_loading", "grain_angle"], "card": Path("x.toml"), "n_null": 49},
+    {"law": "exact", "effects": ["fluid_loading", "grain_angle"], "card": Path("x.toml"), "n_null": 49},
     {"coefficients": "published", "force": True, "resume": False},
     {"resume": True, "out": "results/x"},
-    {"goal": "constants", "costs": {"board": 45}, "between": ["air_loading"]},
+    {"goal": "constants", "costs": {"board": 45}, "between": ["fluid_loading"]},
     {"goal": None, "costs": None, "between": None},
 ]
 FUNCTIONS = {

@@ -101,7 +101,7 @@ def test_diagnosis_json_keeps_its_contract(which, request):
         assert one["amplitude"] is None or set(one["amplitude"]) >= {"q05", "q50", "q95", "unit"}
         assert one["bias_percent"] is None or set(one["bias_percent"]) == MODULI
     assert [one["effects"] for one in found["known"]] == [
-        [], ["transverse_shear"], ["air_loading"], ["transverse_shear", "air_loading"],
+        [], ["transverse_shear"], ["fluid_loading"], ["transverse_shear", "fluid_loading"],
     ]  # fmt: skip
     assert all(set(one["change_percent"]) == MODULI and one["without"] == [] for one in found["known"])
     assert 0.0 <= found["gain_null_percentile"] <= 100.0
@@ -130,7 +130,7 @@ def test_known_effects_are_computed_before_anything_is_fitted_again(with_shear, 
     assert shear["in_sample_rms_cents"] < both["in_sample_rms_cents"] < air["in_sample_rms_cents"]
     printed = " ".join(calm.stdout.split())
     assert "transverse shear lowers the left-out error from" in printed
-    assert "air loading raises it from" in printed
+    assert "fluid loading raises it from" in printed
     assert "Where the error rises, something that acts the other way is lacking" in printed
 
 

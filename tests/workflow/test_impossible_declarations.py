@@ -40,7 +40,7 @@ def item(*lines: str) -> Change:
 
 def air(line: str) -> Change:
     """Air around the board."""
-    return "[[setup.attached]]", f"[setup.air]\n{line}\n\n[[setup.attached]]"
+    return "[[setup.attached]]", f"[setup.fluid]\n{line}\n\n[[setup.attached]]"
 
 
 NO_CLAMP = "no edge is clamped"
@@ -54,7 +54,7 @@ OFF_BOARD = (
     "y 0 to 114 mm, got [300, 20] (from the corner of x0 and y0 of the whole board)"
 )
 TOO_HEAVY = "my-board.toml [setup] attached 1 mass_g: wanted less than the board's own 41 g, got 50 g"
-VACUUM = "wanted a positive number, got {} (air at the ground is 1.2 kg/m3)"
+VACUUM = "wanted a positive number, got {} (air at the ground is 1.2 kg/m3, water is 997)"
 
 CASES: dict[str, tuple[list[Change], list[str]]] = {
     "a clamp that turns on a free board": (
@@ -102,11 +102,11 @@ CASES: dict[str, tuple[list[Change], list[str]]] = {
         [declaring("attached_mass"), (PLACE, "at_mm = [[200, 20], [20, 20]]")], [refused("attached_mass", ROVED)],
     ),
     "air lighter than nothing": (
-        [air("density_kg_m3 = -1.2")], ["my-board.toml [setup] air.density_kg_m3: " + VACUUM.format("-1.2")],
+        [air("density_kg_m3 = -1.2")], ["my-board.toml [setup] fluid.density_kg_m3: " + VACUUM.format("-1.2")],
     ),
-    "no air": ([air("density_kg_m3 = 0")], ["my-board.toml [setup] air.density_kg_m3: " + VACUUM.format("0")]),
+    "no air": ([air("density_kg_m3 = 0")], ["my-board.toml [setup] fluid.density_kg_m3: " + VACUUM.format("0")]),
     "half a baffle": (
-        [air('baffle = "half"')], ['my-board.toml [setup] air.baffle: wanted "none" or "full", got "half"'],
+        [air('baffle = "half"')], ['my-board.toml [setup] fluid.baffle: wanted "none" or "full", got "half"'],
     ),
     "shear moduli below nothing": (
         [declaring("transverse_shear"), ("poisson_xy = 0.4", "poisson_xy = 0.4\nshear_xz_gpa = -1\nshear_yz_gpa = 0")],

@@ -119,9 +119,9 @@ def test_a_plan_is_no_run_and_fit_says_what_it_lacks(planned):
         (["--between", "grain_angel"], 3, "did you mean grain_angle?"),
         (["--between", "clamp_rotation"], 3, "between: wanted a board on which clamp_rotation can act, got no edge is"),
         (["--between", "none"], 3, "between: wanted one name of an effect or more, or None, got an empty list"),
-        (["--between", "air_loading", "--effects", "air_loading"], 3, "between: wanted effects that are not declared"),
+        (["--between", "air_loading", "--effects", "fluid_loading"], 3, "between: wanted effects that are not dec"),
         (
-            ["--between", "air_loading"],
+            ["--between", "fluid_loading"],
             3,
             "between: wanted the frequencies of a board, by which effects are told apart",
         ),
@@ -138,7 +138,7 @@ def test_what_cannot_be_asked_is_refused_and_leaves_nothing(arguments, code, sai
 
 def test_every_bad_argument_is_told_at_once():
     with pytest.raises(InputError, match="goal") as caught:
-        bayesplate.plan(7, goal="x", costs={"board": "dear"}, between="air_loading", seed=-1, force=2)
+        bayesplate.plan(7, goal="x", costs={"board": "dear"}, between="fluid_loading", seed=-1, force=2)
     assert {fault.place for fault in caught.value.faults} == {
         "card", "goal", "costs board", "between", "seed", "force",
     }  # fmt: skip
@@ -148,7 +148,7 @@ def test_a_campaign_does_not_tell_explanations_apart():
     with pytest.raises(InputError, match="plan one of its boards"):
         bayesplate.plan("spruce-half-tops", goal="explanations")
     with pytest.raises(InputError, match=r"between: wanted the frequencies of a board.*got a campaign"):
-        bayesplate.plan("spruce-half-tops", between=["air_loading"])
+        bayesplate.plan("spruce-half-tops", between=["fluid_loading"])
 
 
 class TestTooFewReadings:
@@ -165,7 +165,7 @@ class TestTooFewReadings:
         assert found.basis == "prior"
         assert found.notes[0].startswith("planned from the prior alone")
 
-    @pytest.mark.parametrize("asked", [{"between": ["air_loading"]}, {"goal": "explanations"}])
+    @pytest.mark.parametrize("asked", [{"between": ["fluid_loading"]}, {"goal": "explanations"}])
     def test_effects_are_not_told_apart(self, board, asked):
         with pytest.raises(NotIdentifiableError):
             bayesplate.plan(board, **asked)
@@ -179,7 +179,7 @@ class TestFinishedDiagnosis:
         prepared = prepare(BOARD)
         answers = [
             {"effects": ["membrane_tension"], "probability": 0.4, "words": ""},
-            {"effects": ["air_loading"], "probability": 0.05, "words": ""},
+            {"effects": ["fluid_loading"], "probability": 0.05, "words": ""},
             {"effects": ["grain_angle"], "probability": 0.03, "words": ""},
         ]
         return {
@@ -193,16 +193,16 @@ class TestFinishedDiagnosis:
 
     def test_those_within_a_factor_ten_survive(self, tmp_path, told):
         found = self.finished(tmp_path, told)
-        assert set(found.support) == {("membrane_tension",), ("air_loading",)}
+        assert set(found.support) == {("membrane_tension",), ("fluid_loading",)}
         assert found.none == 0.5
 
     def test_and_those_that_a_group_lists(self, tmp_path, told):
         listed = {"verdict": "indistinguishable group", "effects": ["membrane_tension", "grain_angle"]}
         found = self.finished(tmp_path, told | listed)
-        assert set(found.support) == {("membrane_tension",), ("air_loading",), ("grain_angle",)}
+        assert set(found.support) == {("membrane_tension",), ("fluid_loading",), ("grain_angle",)}
 
     @pytest.mark.parametrize(
-        "other", [{"card_sha256": "0"}, {"declared": ["air_loading"]}, {"verdict": "unexplained"}, {"answers": []}]
+        "other", [{"card_sha256": "0"}, {"declared": ["fluid_loading"]}, {"verdict": "unexplained"}, {"answers": []}]
     )
     def test_another_card_model_or_verdict_is_not_taken_up(self, tmp_path, told, other):
         assert self.finished(tmp_path, told | other) is None
@@ -212,10 +212,10 @@ class TestFinishedDiagnosis:
         [
             {"probability_of_none": float("nan")},
             {"probability_of_none": -0.5},
-            {"answers": [{"effects": ["air_loading"], "probability": 1.5}]},
-            {"answers": [{"effects": ["air_loading"], "probability": "much"}]},
+            {"answers": [{"effects": ["fluid_loading"], "probability": 1.5}]},
+            {"answers": [{"effects": ["fluid_loading"], "probability": "much"}]},
             {"answers": [{"effects": ["witchcraft"], "probability": 0.5}]},
-            {"answers": [{"effects": [["air_loading"]], "probability": 0.5}]},
+            {"answers": [{"effects": [["fluid_loading"]], "probability": 0.5}]},
             {"answers": 3},
             {"verdict": "indistinguishable group", "effects": 7},
         ],
@@ -247,4 +247,4 @@ class TestFinishedDiagnosis:
         monkeypatch.setattr(home.Problem, "posed", SimpleNamespace())
         with pytest.raises(Seen):
             bayesplate.plan(BOARD, out=tmp_path)
-        assert kept == [["air_loading", "membrane_tension"]]
+        assert kept == [["fluid_loading", "membrane_tension"]]

@@ -21,7 +21,7 @@ UNCERTAIN = "spruce-free-2R"
 @pytest.fixture(scope="module")
 def problem() -> bayesplate.Problem:
     """A board whose sizes, mass and Poisson ratio are uncertain, with effects whose priors have one bound and two."""
-    return bayesplate.Problem.from_card(UNCERTAIN, effects=["air_loading", "support_stiffness"])
+    return bayesplate.Problem.from_card(UNCERTAIN, effects=["fluid_loading", "support_stiffness"])
 
 
 @pytest.fixture(scope="module")

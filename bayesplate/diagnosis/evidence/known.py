@@ -37,9 +37,9 @@ Floats = NDArray[np.float64]
 Models = Sequence[SetupModel]
 Rows = NDArray[np.intp]
 
-COMPUTED = ("transverse_shear", "air_loading")
+COMPUTED = ("transverse_shear", "fluid_loading")
 """Effects of every board whose sizes are known: from its own size, and from what is published."""
-STATED = ("attached_mass", "air_loading")
+STATED = ("attached_mass", "fluid_loading")
 """Effects that a card may state in full, so that they are declared."""
 
 _MOST_LABELLINGS = 4

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.shifts.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.shifts.following import Following
 from bayesplate.diagnosis.shifts.forms import Form
-from bayesplate.frequencies.laws import ExactLaw, log_frequency
+from bayesplate.frequencies.laws import ExactLaw, log_frequency, mean_log_frequency
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import Place
@@ -37,13 +37,14 @@ class FormLaw:
     form : Form
     models : tuple of SetupModel
         With the exact law.
-    following : tuple of tuple of Following
-        For each setup, one per block where the effect breaks the symmetry; empty where it does not.
+    following : tuple of tuple of tuple of Following
+        For each setup and each station of its model, one per block where the effect breaks the symmetry; empty where it
+        does not.
     """
 
     form: Form
     models: tuple[SetupModel, ...]
-    following: tuple[tuple[Following, ...], ...] = ()
+    following: tuple[tuple[tuple[Following, ...], ...], ...] = ()
 
     def log_frequencies(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
         """ln f (Hz) of all labelled modes: (n, n_modes) array.
@@ -63,8 +64,13 @@ class FormLaw:
         inputs = _inputs(baseline, self.form)
         constants = dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))
         there: Values = inputs | dict(values) | constants
-        followed = self.following or ((),) * len(self.models)
-        parts = [_log_frequencies(model, each, there) for model, each in zip(self.models, followed, strict=True)]
+        followed = self.following or tuple(((),) * len(model.stations) for model in self.models)
+        parts = [
+            mean_log_frequency(
+                [_log_frequencies(one, each, there) for one, each in zip(model.stations, by_station, strict=True)]
+            )
+            for model, by_station in zip(self.models, followed, strict=True)
+        ]
         return np.concatenate(parts, axis=1) + baseline.every.discrepancy
 
     def placed(self, baseline: Baseline) -> FormLaw:
@@ -75,16 +81,22 @@ class FormLaw:
         """
         models, following = [], []
         for i, model in enumerate(self.models):
-            of_base = baseline.every.places[i]
-            keeps = symmetry_of([model])[0] == baseline.symmetry[i]
-            places = of_base if keeps else self._by_frequency(baseline, i)
-            assert model.exact is not None
-            labelled = len(model.setup.readings)
-            others = tuple(OtherMode(place, None) for place in places[labelled:])
-            exact = ExactLaw(replace(model.exact.reduced, places=places))
-            models.append(replace(model, places=places[:labelled], others=others, exact=exact))
-            following.append(() if keeps else self._followed(baseline, models[-1], of_base))
+            (first, *rest), followed = zip(*(self._placed(baseline, i, one) for one in model.stations), strict=True)
+            models.append(replace(first, roved=tuple(rest)))
+            following.append(followed)
         return replace(self, models=tuple(models), following=tuple(following))
+
+    def _placed(self, baseline: Baseline, setup: int, model: SetupModel) -> tuple[SetupModel, tuple[Following, ...]]:
+        """One station of a setup with the modes of a baseline, and the shapes that are followed."""
+        of_base = baseline.every.places[setup]
+        keeps = symmetry_of([model])[0] == baseline.symmetry[setup]
+        places = of_base if keeps else self._by_frequency(baseline, setup, model)
+        assert model.exact is not None
+        labelled = len(model.setup.readings)
+        others = tuple(OtherMode(place, None) for place in places[labelled:])
+        exact = ExactLaw(replace(model.exact.reduced, places=places))
+        placed = replace(model, places=places[:labelled], others=others, exact=exact)
+        return placed, () if keeps else self._followed(baseline, placed, of_base)
 
     def _followed(self, baseline: Baseline, model: SetupModel, of_base: Sequence[Place]) -> tuple[Following, ...]:
         """Shapes without the effect, block by block."""
@@ -110,11 +122,11 @@ class FormLaw:
         constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities)[:, None], strict=True))
         return _inputs(baseline, self.form) | nothing | constants
 
-    def _by_frequency(self, baseline: Baseline, setup: int) -> tuple[Place, ...]:
+    def _by_frequency(self, baseline: Baseline, setup: int, model: SetupModel) -> tuple[Place, ...]:
         """Where the modes of a setup stand on the plate with the effect absent, each at a place of its own."""
         from scipy.optimize import linear_sum_assignment
 
-        model, of_base = self.models[setup], baseline.every.places[setup]
+        of_base = baseline.every.places[setup]
         assert model.exact is not None
         weights = model.system.weights(self._without(baseline))
         start = baseline.every.starts[setup]
@@ -174,6 +186,9 @@ def merged(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:
 
 def _with_others(model: SetupModel, baseline: Baseline, setup: int) -> SetupModel:
     """A model of as many modes of each class as the baseline has of those that fall into it."""
+    if model.roved:
+        first, *rest = (_with_others(one, baseline, setup) for one in model.stations)
+        return replace(first, roved=tuple(rest))
     of_base = baseline.every.places[setup]
     n_readings = len(model.setup.readings)
     if len(of_base) == n_readings:
@@ -187,7 +202,7 @@ def _with_others(model: SetupModel, baseline: Baseline, setup: int) -> SetupMode
 
 
 def _log_frequencies(model: SetupModel, following: Sequence[Following], values: Values) -> Floats:
-    """ln f of all modes of a setup: by rank, or followed by their shapes."""
+    """ln f of all modes of a station: by rank, or followed by their shapes."""
     if not following:
         return model.every_log_frequency(values, "exact")
     weights = model.system.weights(values)

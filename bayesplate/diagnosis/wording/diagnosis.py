@@ -179,7 +179,7 @@ class Diagnosis:
         Effects that were part of the model from the beginning.
     known : tuple of KnownModel
         What physics knows of the others, computed before the search and not fitted: the board as it stands first, then
-        with transverse shear, with air loading, with both, and without each effect that the card itself states.
+        with transverse shear, with fluid loading, with both, and without each effect that the card itself states.
     probability_of_none : float
     probability_of_none_with_halved_priors, probability_of_none_with_doubled_priors : float
     p_value : PValues

@@ -26,7 +26,7 @@ from bayesplate.workflow.check import check
 from bayesplate.workflow.problem import Problem
 
 FIEMME = "fiemme-spruce-clamped"
-SHEAR, AIR, MASS = "transverse_shear", "air_loading", "attached_mass"
+SHEAR, AIR, MASS = "transverse_shear", "fluid_loading", "attached_mass"
 SHEAR_LINES = ("shear_xz_gpa", "shear_yz_gpa")
 ATTACHED = '\n[[setup.attached]]\nkind = "accelerometer"\nmass_g = {mass}\nat_mm = [450, 100]\n'
 UNWEIGHED = '\n[[setup.attached]]\nkind = "accelerometer"\nat_mm = [100, 200]\n'
@@ -187,8 +187,8 @@ def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path):
         (ATTACHED.format(mass=0.6), (), ()),
         (ATTACHED.format(mass=0.6) + UNWEIGHED, None, ()),
         (UNWEIGHED, (MASS,), ()),
-        ('\n[setup.air]\nbaffle = "none"\n', None, (AIR,)),
-        ("\n[setup.air]\ndensity_kg_m3 = 1.1\n", None, ()),
+        ('\n[setup.fluid]\nbaffle = "none"\n', None, (AIR,)),
+        ("\n[setup.fluid]\ndensity_kg_m3 = 1.1\n", None, ()),
     ],
 )
 def test_what_a_card_states_in_full_and_nothing_else_counts_as_stated(tmp_path, after, effects, expected):
@@ -254,7 +254,7 @@ def test_an_error_that_rises_where_something_opposes_is_told(tmp_path):
     assert known_air.in_sample_rms_cents > 1.5 * as_it_stands.in_sample_rms_cents
     assert known_air.leave_one_out_rms_cents > 1.5 * as_it_stands.leave_one_out_rms_cents
     told = known_sentence((as_it_stands, known_air))
-    assert "air loading raises the left-out error from" in told
+    assert "fluid loading raises the left-out error from" in told
     assert "Where the error rises, something that acts the other way is lacking" in told
 
 

@@ -55,7 +55,8 @@ def test_a_forgotten_mass_is_tried_at_places_on_the_free_part(board):
 
 def test_forms_declared_together_keep_what_each_needs(board):
     found = forms(board)
-    pairs = (("transverse_shear", "attached_mass"), ("attached_mass", "clamp_rotation"), ("air_loading", "grain_angle"))
+    mass = "attached_mass"
+    pairs = (("transverse_shear", mass), (mass, "clamp_rotation"), ("fluid_loading", "grain_angle"))
     for names in pairs:
         chosen = [found[name][0] for name in names]
         both = with_forms(board, chosen)

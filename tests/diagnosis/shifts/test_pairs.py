@@ -17,7 +17,7 @@ from bayesplate.diagnosis.shifts.tables import together
 from bayesplate.frequencies.laws import cents
 from bayesplate.workflow.problem import Problem
 
-PAIR = ("membrane_tension", "air_loading")
+PAIR = ("membrane_tension", "fluid_loading")
 CENT = 1.0
 
 

@@ -101,7 +101,7 @@ def test_every_effect_on_the_clamped_board_is_as_full_solves_have_it(fiemme):
 
 def test_another_size_is_not_within_a_cent(finnish):
     """Negative control: the comparison sees a change of the size by a tenth of its prior."""
-    (law,) = finnish.ground.candidates["air_loading"].laws
+    (law,) = finnish.ground.candidates["fluid_loading"].laws
     z = np.zeros((1, 1))
     base = finnish.ground.baseline
     exact, _ = full_refit(base, law.form.board, values_at(law.form, z + 0.3), 1 / base.scales)
@@ -146,7 +146,7 @@ def test_two_effects_add_on_the_cantilever(finnish):
         assert np.abs((alone - exact) / base.scales).max() > 0.1, names
 
 
-@pytest.mark.parametrize("name", ["air_loading", "thickness_profile", "grain_angle"])
+@pytest.mark.parametrize("name", ["fluid_loading", "thickness_profile", "grain_angle"])
 def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish, name):
     """The same sizes, constants half as large again: made there with a wide region, placed here."""
     base = finnish.ground.baseline

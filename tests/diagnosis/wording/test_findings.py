@@ -32,7 +32,7 @@ from bayesplate.quantities import Quantity
 from bayesplate.results.contract import Elastic
 from bayesplate.results.folder import json_text
 
-SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "air_loading", "grain_angle")
+SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "fluid_loading", "grain_angle")
 FIGURES = replace(
     SUMMARY,
     seed=3,
@@ -315,7 +315,7 @@ def test_a_named_effect_that_was_refitted():
 
 
 @pytest.mark.parametrize(("members", "told"), [
-    ((AIR,), 'Declare it, effects = ["air_loading"], and diagnose again to look for what else is lacking.'),
+    ((AIR,), 'Declare it, effects = ["fluid_loading"], and diagnose again to look for what else is lacking.'),
     ((RELABELLING,), "for a mode left out."),
 ])  # fmt: skip
 def test_what_comes_nearest_is_told_though_it_is_not_enough(members, told):
@@ -335,7 +335,7 @@ def test_what_comes_nearest_is_told_though_it_is_not_enough(members, told):
     declared = replace(base, board=replace(base.board, effects=("thickness_profile",)))
     beside = replace(found, ground=replace(found.ground, baseline=declared))
     (sentence,) = diagnosis_of(replace(case, found=beside, after=case.before)).sentences
-    assert ('effects = ["thickness_profile", "air_loading"]' in sentence) is (members == (AIR,))
+    assert ('effects = ["thickness_profile", "fluid_loading"]' in sentence) is (members == (AIR,))
 
 
 def test_only_what_is_needed_and_not_enough_comes_nearest():
@@ -477,12 +477,12 @@ def test_two_effects_that_are_one_alternative_stay_together():
     found = Found(ground, found.residual, np.log(shares), shares)
     told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
     assert (told.verdict, told.effects) == ("indistinguishable group", (SHEAR, AIR, GRAIN))
-    assert told.words == "transverse shear and air loading, or grain angle"
+    assert told.words == "transverse shear and fluid loading, or grain angle"
 
 
 def test_two_effects_come_nearest_where_one_comes_nearest():
     found = made({}, residual=np.zeros(6))
     case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
     told = _nearest_sentence(case, Answer((SHEAR, AIR), 1, 0.9), MOVED)
-    assert told.startswith("Transverse shear and air loading come nearest: with them the error goes from")
-    assert 'Declare them, effects = ["transverse_shear", "air_loading"],' in told
+    assert told.startswith("Transverse shear and fluid loading come nearest: with them the error goes from")
+    assert 'Declare them, effects = ["transverse_shear", "fluid_loading"],' in told

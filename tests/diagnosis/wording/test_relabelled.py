@@ -30,7 +30,7 @@ def test_only_labels_that_changed_are_told():
 
 def test_nothing_is_told_where_nothing_changed():
     board = board_of({(1, 1): 60.0, (3, 0): 199.67})
-    assert relabelled_sentence(board, board, "air loading") == ""
+    assert relabelled_sentence(board, board, "fluid loading") == ""
 
 
 def test_the_setup_is_told_where_there_are_several():

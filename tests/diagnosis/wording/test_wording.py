@@ -117,7 +117,7 @@ def test_every_word_of_the_verdict_and_every_error_has_its_words():
         ("none needed", "no more than their noise would make them"),
         ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
          "the left-out error fell from 46 to 12 cents, and every condition of that claim is met."),
-        ("indistinguishable group", "cannot tell which: membrane tension or air loading."),
+        ("indistinguishable group", "cannot tell which: membrane tension or fluid loading."),
         ("unexplained", "no effect that was tried explains it"),
         ("undetectable", "could not show them even if they were there"),
     ],
@@ -197,14 +197,14 @@ def test_the_probabilities_sum_to_one_as_they_are_printed():
 
 
 def test_what_looks_like_the_named_effect_is_told():
-    alike = replace(TENSION, look_alikes=("air_loading", "attached_mass"))
+    alike = replace(TENSION, look_alikes=("fluid_loading", "attached_mass"))
     one = replace(NAMED, candidates=(alike, AIR))
     assert alike_sentence(one).startswith(
-        "Air loading and attached mass would look much the same (likeness above 0.95)"
+        "Fluid loading and attached mass would look much the same (likeness above 0.95)"
     )
     assert alike_sentence(one) in verdict_sentences(one)
     assert alike_sentence(one) in show_diagnosis(one).remarks
-    both = replace(one, effects=("membrane_tension", "air_loading"), candidates=(alike, AIR))
+    both = replace(one, effects=("membrane_tension", "fluid_loading"), candidates=(alike, AIR))
     assert alike_sentence(both).startswith("Attached mass would look")  # a member of the verdict is no rival
     assert alike_sentence(NAMED) == alike_sentence(replace(one, verdict="indistinguishable group")) == ""
 
@@ -238,11 +238,11 @@ def test_the_sizes_of_what_was_fitted_again():
 def test_where_two_explanations_were_fitted_each_size_says_in_which_it_was():
     """The same effect alone and beside another has two sizes, which nobody could tell apart otherwise."""
     (alone,) = NAMED.finalists
-    both = replace(alone, effects=(*alone.effects, "air_loading"))
+    both = replace(alone, effects=(*alone.effects, "fluid_loading"))
     table = sizes_table(replace(NAMED, finalists=(both, alone)))
 
     assert table.columns[:2] == ("fitted with", "effect")
-    assert [row[0] for row in table.rows] == ["membrane tension and air loading", "membrane tension"]
+    assert [row[0] for row in table.rows] == ["membrane tension and fluid loading", "membrane tension"]
     assert {row[1] for row in table.rows} == {"membrane tension, clamped"}
 
 
@@ -273,14 +273,14 @@ def test_candidates_stand_in_the_order_of_their_probability():
     wide, narrow = candidates_table(NAMED), candidates_table(NAMED, narrow=True)
     by_name = {row[0]: dict(zip(wide.columns, row, strict=True)) for row in wide.rows}
 
-    assert list(by_name) == ["membrane tension", "relabelling (1,0) and (0,1)", "air loading", "grain angle"]
+    assert list(by_name) == ["membrane tension", "relabelling (1,0) and (0,1)", "fluid loading", "grain angle"]
     assert by_name["membrane tension"] == {
         "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "inclusion probability": "0.970",
         "E_x / E_y / G_xy off by, %": "+1.5 / -2.5 / +0.5", "size (90 %)": "tension 120 N/m (10 to 230)",
         "looks like": "–", "rejected because": "–",
     }  # fmt: skip
-    assert by_name["air loading"]["looks like"] == "attached mass"
-    assert by_name["air loading"]["size (90 %)"] == by_name["relabelling (1,0) and (0,1)"]["shift"] == "–"
+    assert by_name["fluid loading"]["looks like"] == "attached mass"
+    assert by_name["fluid loading"]["size (90 %)"] == by_name["relabelling (1,0) and (0,1)"]["shift"] == "–"
     assert narrow.rows[0][-2:] == ("tension 120 N/m (10 to 230)", "in the verdict")
     assert not any("probab" in column for column in narrow.columns)
     assert [row[-1] for row in narrow.rows] == ["in the verdict", "less probable", "not detectable", "less probable"]
@@ -295,8 +295,8 @@ def test_an_exchange_of_labels_that_is_out_of_the_question_is_not_shown():
 
 
 def test_a_setup_is_named_where_there_are_several():
-    several = replace(NAMED, candidates=(candidate("air_loading", "one"), candidate("air_loading", "two")))
-    assert [row[0] for row in candidates_table(several).rows] == ["air loading, one", "air loading, two"]
+    several = replace(NAMED, candidates=(candidate("fluid_loading", "one"), candidate("fluid_loading", "two")))
+    assert [row[0] for row in candidates_table(several).rows] == ["fluid loading, one", "fluid loading, two"]
 
 
 def test_the_terminal_shows_only_tables_that_there_are():
@@ -385,6 +385,6 @@ def test_a_text_stays_a_text_in_a_notebook(payload):
 def test_a_plate_with_declared_effects_is_not_called_ideal():
     calm = DIAGNOSES["none needed"]
     assert meaning(calm).startswith("The readings differ from those of an ideal plate by no more than their noise")
-    told = meaning(replace(calm, declared=("grain_angle", "air_loading")))
-    assert "those of a plate with grain angle and air loading by no more than" in told
+    told = meaning(replace(calm, declared=("grain_angle", "fluid_loading")))
+    assert "those of a plate with grain angle and fluid loading by no more than" in told
     assert "No further effect is needed" in told

@@ -12,19 +12,19 @@ from effect_plates import MADE, hertz_apart, modes_of, posed, setup_of, shifts
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from made_boards import board_of
 
-from bayesplate.effects.air_loading import BAFFLES, DEFAULT_DENSITY, UNKNOWN_BAFFLE, AirLoading
+from bayesplate.effects.fluid_loading import BAFFLES, DEFAULT_DENSITY, UNKNOWN_BAFFLE, FluidLoading
 from bayesplate.modes.air import air_mass
 from bayesplate.modes.line import line
-from bayesplate.plate.setup import DeclaredAir
+from bayesplate.plate.setup import DeclaredFluid
 from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 
-OPEN = {"air_loading.density": 1.2, "air_loading.baffle": 0.0}
-WALL = {"air_loading.density": 1.2, "air_loading.baffle": 1.0}
+OPEN = {"fluid_loading.density": 1.2, "fluid_loading.baffle": 0.0}
+WALL = {"fluid_loading.density": 1.2, "fluid_loading.baffle": 1.0}
 
 
 def air(plate, baffle=UNKNOWN_BAFFLE):
-    return AirLoading(MADE, plate.L_x / plate.L_y, baffle=baffle)
+    return FluidLoading(MADE, plate.L_x / plate.L_y, baffle=baffle)
 
 
 def piston(aspect_ratio, is_baffled):
@@ -79,13 +79,13 @@ def test_open_strip_carries_a_cylinder_of_air():
 @pytest.mark.parametrize("plate", [FIEMME, FINNISH, FREE], ids=["clamped", "cantilever", "free"])
 def test_against_the_generator(plate, density, baffle):
     """At five times the density the air weighs more than the plate."""
-    parameters = {"air_loading.density": density, "air_loading.baffle": baffle}
-    independent = generator.effects.AirLoading(density, baffle)
+    parameters = {"fluid_loading.density": density, "fluid_loading.baffle": baffle}
+    independent = generator.effects.FluidLoading(density, baffle)
     assert hertz_apart(plate, [air(plate)], parameters, [independent], 6) == pytest.approx(0.0, abs=0.5)
 
 
 def test_against_the_generator_with_shear():
-    independent = generator.effects.AirLoading(1.2, 1.0)
+    independent = generator.effects.FluidLoading(1.2, 1.0)
     assert hertz_apart(FIEMME, [air(FIEMME)], WALL, [independent], 6, is_sheared=True) == pytest.approx(0.0, abs=0.5)
 
 
@@ -116,18 +116,18 @@ def test_a_known_baffle_needs_one_term():
 def test_takes_what_the_card_declares():
     setup = setup_of(FINNISH)
     board = board_of(ritz.FINNISH, [setup])
-    declared = replace(setup, air=DeclaredAir(Quantity.exact(1.1), "full"))
+    declared = replace(setup, fluid=DeclaredFluid(Quantity.exact(1.1), "full"))
 
-    assert AirLoading.of(board, setup) == AirLoading(MADE, 0.223 / 0.114, DEFAULT_DENSITY, UNKNOWN_BAFFLE)
-    effect = AirLoading.of(board, declared)
+    assert FluidLoading.of(board, setup) == FluidLoading(MADE, 0.223 / 0.114, DEFAULT_DENSITY, UNKNOWN_BAFFLE)
+    effect = FluidLoading.of(board, declared)
     assert (effect.density.mean, effect.baffle) == (1.1, Quantity.exact(1.0))
-    assert not AirLoading.is_implied(board)
-    assert AirLoading.is_implied(replace(board, setups=(declared,)))
+    assert not FluidLoading.is_implied(board)
+    assert FluidLoading.is_implied(replace(board, setups=(declared,)))
 
 
 @pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
 def test_reduced_order_model_is_exact(card):
-    assert worst_cents(posed(card, ["air_loading"]).posterior.models) < 0.5
+    assert worst_cents(posed(card, ["fluid_loading"]).posterior.models) < 0.5
 
 
 def test_edges_make_the_air():

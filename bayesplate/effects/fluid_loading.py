@@ -1,4 +1,4 @@
-"""Air loading: the board carries the air around it along, computed from its size, with or without a baffle."""
+"""Fluid loading: the board carries the air or the water around it along, computed from its size."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ from bayesplate.quantities import Quantity
 DEFAULT_DENSITY = Quantity.exact(1.2)
 UNKNOWN_BAFFLE = Quantity.from_mean(0.5, 1.0, "normal", lower=0.0, upper=1.0)
 BAFFLES = {"none": Quantity.exact(0.0), "full": Quantity.exact(1.0)}
+HEAVIEST_GAS = 100.0
+WATER, NEAR_WATER = 997.0, 50.0
+"""Densities, kg m^-3, by which the fluid is called air, water, or a fluid."""
 _SOURCES = (
     "air at 20 degrees Celsius near sea level, within 5 %",
     "nearly uniform from the open air (0) to a rigid wall around the board (1)",
@@ -26,8 +29,8 @@ _SOURCES = (
 
 
 @dataclass(frozen=True)
-class AirLoading(Effect):
-    """The mass of the air, between that of the board in the open and that of a board in a rigid wall.
+class FluidLoading(Effect):
+    """The mass of the fluid, between that of the board in the open and that of a board in a rigid wall.
 
     Nothing of its size is fitted but the baffle's share: potential flow gives it within 20 %.
 
@@ -47,15 +50,17 @@ class AirLoading(Effect):
     baffle: Quantity = UNKNOWN_BAFFLE
     edge: Outline | None = None
 
-    name: ClassVar[str] = "air_loading"
+    name: ClassVar[str] = "fluid_loading"
     scope: ClassVar[Scope] = "setup"
     is_of_campaign: ClassVar[bool] = True
-    sentence: ClassVar[str] = "The board carries air along, which makes it heavier, most of all in its low modes."
+    sentence: ClassVar[str] = (
+        "The board carries the air or the water around it along, which makes it heavier, most of all in its low modes."
+    )
 
     @classmethod
-    def of(cls, board: Board, setup: Setup) -> AirLoading:
-        """The effect with what the setup declares of its air."""
-        declared = setup.air
+    def of(cls, board: Board, setup: Setup) -> FluidLoading:
+        """The effect with what the setup declares of the fluid."""
+        declared = setup.fluid
         return cls(
             owner=setup.owner,
             aspect_ratio=_aspect_ratio(board, setup),
@@ -63,40 +68,51 @@ class AirLoading(Effect):
             baffle=BAFFLES[declared.baffle] if declared and declared.baffle else UNKNOWN_BAFFLE,
         )
 
-    def in_setup(self, board: Board, setup: Setup) -> AirLoading:
-        """The same air around the board of another setup."""
+    def in_setup(self, board: Board, setup: Setup) -> FluidLoading:
+        """The same fluid around the board of another setup, unless that states its own."""
+        if setup.fluid is not None:
+            return self.of(board, setup)
         return replace(self, owner=setup.owner, aspect_ratio=_aspect_ratio(board, setup))
 
     @classmethod
     def is_implied(cls, board: Board) -> bool:
-        """Whether a setup of the board declares its air."""
-        return any(setup.air is not None for setup in board.setups)
+        """Whether a setup of the board declares the fluid around it."""
+        return any(setup.fluid is not None for setup in board.setups)
+
+    @property
+    def fluid(self) -> str:
+        """What people call it."""
+        if self.density.mean < HEAVIEST_GAS:
+            return "air"
+        return "water" if abs(self.density.mean - WATER) < NEAR_WATER else "fluid"
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Density of the air and share of the baffle; without density there is no air, whatever the baffle."""
+        """Density of the fluid and share of the baffle; without density there is no fluid, whatever the baffle."""
         stated = self.density is not DEFAULT_DENSITY, self.baffle is not UNKNOWN_BAFFLE
         sources = ("" if is_stated else source for is_stated, source in zip(stated, _SOURCES, strict=True))
         of_density, of_baffle = sources
         return (
-            self.parameter("density", self.density, "kg/m^3", 0.0, of_density),
+            self.parameter("density", self.density, "kg/m^3", 0.0, of_density, f"density of the {self.fluid}"),
             self.parameter("baffle", self.baffle, "1", 0.0, of_baffle),
         )
 
-    def within(self, shaped: Effect) -> AirLoading:
+    def within(self, shaped: Effect) -> FluidLoading:
         """The same that ends with the plate."""
         return replace(self, edge=shaped.outline())
 
     def contributions(self) -> tuple[Contribution, ...]:
-        """The air of a plate in the open and of one in a wall, each with its share; one of them where that is known.
+        """The fluid of a plate in the open and of one in a wall, each with its share; one of them where that is known.
 
-        The mass of the air in a volume of the area to the power 3/2, relative to the plate's.
+        The mass of the fluid in a volume of the area to the power 3/2, relative to the plate's.
         """
 
         def weight(values: Values, setup: Setup, is_baffled: bool) -> Floats:
             length_x, length_y = vibrating_lengths(values, setup)
-            air = self.value(values, "density") * np.sqrt(length_x * length_y) / (density(values) * values["thickness"])
+            fluid = (
+                self.value(values, "density") * np.sqrt(length_x * length_y) / (density(values) * values["thickness"])
+            )
             baffle = self.value(values, "baffle")
-            return air * (baffle if is_baffled else 1.0 - baffle)
+            return fluid * (baffle if is_baffled else 1.0 - baffle)
 
         known = self.baffle.is_exact and self.baffle.mean in (0.0, 1.0)
         cases = (bool(self.baffle.mean),) if known else (False, True)

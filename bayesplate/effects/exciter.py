@@ -1,0 +1,363 @@
+"""Exciter: a coil that is glued to the board, and a magnet that hangs on it by a soft spring."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from bayesplate.effects.attached_items import Fractions, fractions_on, places_on
+from bayesplate.effects.base import Contribution, Effect, Floats, Masses, Scope, Stiffnesses
+from bayesplate.modes.line import Line
+from bayesplate.modes.plate import Beside, KronSum, Term
+from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.parameter import Parameter
+from bayesplate.plate.setup import AttachedItem, Ends, Setup
+from bayesplate.quantities import Quantity
+
+_MASS = Quantity.from_median(50e-3, 1.6), "log-normal: voice-coil exciters weigh 20-120 g"
+_COIL = Quantity.from_median(1.6e-3, 1.3), "log-normal: the coils of exciters of 25 mm weigh 1.5-1.8 g"
+_SUSPENSION = (
+    Quantity.from_median(2700.0, 1.5),
+    "log-normal: suspensions of exciters of 25 mm were measured at 2650-2810 N/m; others differ by half",
+)
+_ANYWHERE = "nearly uniform over the board, mirror places once"
+_LEAST_MAGNET = 0.05
+"""Share of the whole that is left to the magnet, however heavy a draw makes the coil."""
+_STANDS_STILL = 1e-3
+"""Lowest resonance, Hz: on no spring at all the magnet still has a frequency of its own, far below every mode."""
+_ACROSS = 4.0
+_FEWEST_ORDER = 2
+_QUADRATURE = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where an exciter may be along one side, as fractions of the vibrating part.
+
+    Attributes
+    ----------
+    low, high : float
+        The same where it is known.
+    n_nodes : int
+        Of the polynomial that the squared deflection is between them.
+    """
+
+    low: float
+    high: float
+    n_nodes: int = 1
+
+    @property
+    def nodes(self) -> Floats:
+        """Chebyshev's points of the second kind, or the place itself."""
+        if self.n_nodes == 1:
+            return np.array([self.low])
+        steps = np.cos(np.pi * np.arange(self.n_nodes) / (self.n_nodes - 1))
+        return np.asarray(self.low + 0.5 * (self.high - self.low) * (1.0 - steps))
+
+    def shares(self, at: Floats) -> Floats:
+        """What each node has of a polynomial's value at places: (..., n_nodes) array, summing to one.
+
+        Lagrange's polynomials in their barycentric form (Berrut and Trefethen, SIAM Review 46, 2004).
+        """
+        if self.n_nodes == 1:
+            return np.ones((*np.shape(at), 1))
+        nodes = self.nodes
+        signs = (-1.0) ** np.arange(self.n_nodes)
+        signs[[0, -1]] *= 0.5
+        apart = np.asarray(at)[..., None] - nodes
+        is_node = np.abs(apart) < 1e-12
+        weights = signs / np.where(is_node, 1.0, apart)
+        weights = np.where(is_node.any(axis=-1, keepdims=True), is_node, weights)
+        return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One exciter: what it weighs and how it hangs; a source is empty where the card states the value.
+
+    Attributes
+    ----------
+    mass, coil : (Quantity, str), kg
+        Of the whole, and of the coil with what is glued to the board.
+    suspension : (Quantity, str)
+        Stiffness in N/m, or the resonance of the magnet on its suspension in Hz.
+    is_resonance : bool
+    is_held : bool
+        Whether the magnet is held, so that the suspension is a spring to the ground.
+    places : tuple of (float, float)
+        As fractions of the vibrating sides; several are those over which it roved, none: anywhere.
+    """
+
+    mass: tuple[Quantity, str]
+    coil: tuple[Quantity, str]
+    suspension: tuple[Quantity, str]
+    is_resonance: bool = False
+    is_held: bool = False
+    places: Fractions = ()
+
+
+@dataclass(frozen=True)
+class Exciter(Effect):
+    """Voice-coil exciters: k (w(p) - z)^2 in stiffness, m_coil w(p)^2 + m_magnet z^2 in mass, z the magnet's rise.
+
+    Above the resonance of the magnet on its suspension the magnet stands still and the suspension is a spring to the
+    ground, which raises low modes; below it the magnet is a mass. The magnet's own motion is one more mode. A magnet
+    that is held is no coordinate.
+
+    An exciter that roved is one plate for each place (`stations`), and what is read is the mean of the frequencies.
+    One of which nobody says where it is has its place as two parameters: the squared deflection there is a polynomial
+    between a few places, so that the place is a weight like any other. Where both ends of a side are alike, mirror
+    places are one.
+
+    Attributes
+    ----------
+    drives : tuple of Drive
+    ends_x, ends_y : tuple of str
+        How the edges are held.
+    orders : (int, int)
+        Highest orders of the beam functions that are read along x and along y.
+    """
+
+    drives: tuple[Drive, ...] = ()
+    ends_x: Ends = ("free", "free")
+    ends_y: Ends = ("free", "free")
+    orders: tuple[int, int] = (_FEWEST_ORDER, _FEWEST_ORDER)
+
+    name: ClassVar[str] = "exciter"
+    scope: ClassVar[Scope] = "setup"
+    is_of_campaign: ClassVar[bool] = True
+    refines: ClassVar[float] = 1.4
+    sentence: ClassVar[str] = (
+        "An exciter's magnet stands still on its spring, which holds the board and raises its lowest modes."
+    )
+    references: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def of(cls, board: Board, setup: Setup) -> Exciter:
+        """The effect with the setup's exciters."""
+        drives = tuple(_drive(board, setup, item) for item in setup.attached if item.kind == cls.name)
+        return cls(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
+
+    @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """Refused where the setup has no exciter."""
+        if any(item.kind == cls.name for item in setup.attached):
+            return ""
+        return 'no [[setup.attached]] of kind = "exciter" says that one was fixed to the board'
+
+    @classmethod
+    def is_implied(cls, board: Board) -> bool:
+        """Whether the board states what an exciter weighs."""
+        return any(cls.is_wanted(setup) for setup in board.setups)
+
+    @classmethod
+    def is_wanted(cls, setup: Setup) -> bool:
+        """Whether the setup states what an exciter weighs."""
+        return any(item.kind == cls.name and item.mass is not None for item in setup.attached)
+
+    @classmethod
+    def candidates(cls, board: Board, setup: Setup) -> tuple[Exciter, ...]:
+        """The setup's exciters, with the usual coil: a search need not try others."""
+        if cls.refusal(board, setup):
+            return ()
+        whole = cls.of(board, setup)
+        return (replace(whole, drives=tuple(_with_known_coil(drive) for drive in whole.drives)),)
+
+    def in_setup(self, board: Board, setup: Setup) -> Exciter | None:
+        """The same exciters at the same places of the board, held another way; none where none is fixed to it."""
+        if self.refusal(board, setup):
+            return None
+        own = board.setup(self.owner.name)
+        drives = tuple(
+            replace(drive, places=fractions_on(board, setup, places_on(board, own, drive.places)))
+            for drive in self.drives
+        )
+        return Exciter(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
+
+    def at_known_size(self) -> Exciter:
+        """The same where places that nobody knows are four, as those of Gauss's rule over the board."""
+        spots = ([low + share * (high - low) for share in _QUADRATURE] for low, high in self._ranges)
+        along_x, along_y = spots
+        four = tuple((float(x), float(y)) for x in along_x for y in along_y)
+        return replace(self, drives=tuple(replace(drive, places=drive.places or four) for drive in self.drives))
+
+    def within(self, shaped: Effect) -> Exciter:
+        """The same exciters on the true outline."""
+        drives = (replace(one, places=tuple(shaped.placed(*each) for each in one.places)) for one in self.drives)
+        return replace(self, drives=tuple(drives))
+
+    def stations(self) -> tuple[Exciter, ...]:
+        """The exciters at each place over which one of them roved, the others where they are."""
+        n_places = max((len(drive.places) for drive in self.drives), default=0)
+        if n_places < 2:
+            return (self,)
+        return tuple(
+            replace(self, drives=tuple(replace(one, places=_turn(one.places, k)) for one in self.drives))
+            for k in range(n_places)
+        )
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Of each exciter its mass, its coil, its suspension (or resonance), and its place where nobody knows it."""
+        return tuple(parameter for i in range(len(self.drives)) for parameter in self._parameters_of(i))
+
+    def _parameters_of(self, i: int) -> tuple[Parameter, ...]:
+        drive = self.drives[i]
+        found = [self._parameter(i, "coil", drive.coil, "kg", 0.0, "mass of the coil")]
+        if drive.is_resonance or not drive.is_held:
+            found.append(self._parameter(i, "mass", drive.mass, "kg", drive.mass[0].median, "mass"))
+        key, unit = ("resonance", "Hz") if drive.is_resonance else ("suspension", "N/m")
+        found.append(self._parameter(i, key, drive.suspension, unit, 0.0, key))
+        if not drive.places:
+            for axis, (low, high) in zip("xy", self._ranges, strict=True):
+                middle, words = 0.5 * (low + high), f"place along {axis}"
+                prior = Quantity.from_mean(middle, 2.0 * (high - low), "normal", lower=low, upper=high)
+                found.append(self._parameter(i, f"place_{axis}", (prior, _ANYWHERE), "1", middle, words))
+        return tuple(found)
+
+    def _parameter(
+        self, i: int, key: str, stated: tuple[Quantity, str], unit: str, null: float, words: str
+    ) -> Parameter:
+        prior, source = stated
+        return self.parameter(self._key(i, key), prior, unit, null, source, words)
+
+    def _key(self, i: int, key: str) -> str:
+        return key if len(self.drives) == 1 else f"{key}_{i + 1}"
+
+    @property
+    def _ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where along both sides a place may be, mirror places once."""
+        return (_range(self.ends_x), _range(self.ends_y))
+
+    def _spots(self, drive: Drive) -> tuple[Spot, Spot]:
+        if drive.places:
+            x, y = drive.places[0]
+            return Spot(x, x), Spot(y, y)
+        return tuple(  # type: ignore[return-value]
+            Spot(low, high, int(np.ceil(np.pi * (order + 1) * (high - low) + _ACROSS)))
+            for (low, high), order in zip(self._ranges, self.orders, strict=True)
+        )
+
+    def keeps_symmetry(self) -> tuple[bool, bool]:
+        """The halves differ: even in the middle of the board, the magnet's mode belongs to one class alone."""
+        return False, False
+
+    def contributions(self) -> tuple[Contribution, ...]:
+        """For each exciter its suspension between coil and magnet, and their masses."""
+        coordinates = np.cumsum([0, *(not drive.is_held for drive in self.drives)]).tolist()
+        return tuple(
+            contribution for i in range(len(self.drives)) for contribution in self._contributions_of(i, coordinates[i])
+        )
+
+    def _contributions_of(self, i: int, coordinate: int) -> tuple[Contribution, ...]:
+        """The magnet's coordinate is its rise times the root of its share in the vibrating mass.
+
+        So it keeps a frequency of its own, and does not vanish from the problem where the spring or the magnet does.
+        """
+        drive = self.drives[i]
+        spots = self._spots(drive)
+
+        def squares(x: Line, y: Line) -> tuple[KronSum, ...]:
+            return tuple(((on_x.T @ on_x, on_y.T @ on_y),) for on_x, on_y in _rows(x, y, spots))
+
+        def springs(x: Line, y: Line) -> tuple[Term, ...]:
+            if drive.is_held:
+                return squares(x, y)
+            between = tuple(Beside(coordinate, (row,)) for row in _rows(x, y, spots))
+            return (*squares(x, y), *between, Beside(coordinate))
+
+        def inertias(x: Line, y: Line) -> tuple[KronSum | Beside, ...]:
+            return squares(x, y) if drive.is_held else (*squares(x, y), Beside(coordinate))
+
+        def stiffness(values: Values, setup: Setup) -> Floats:
+            whole, shares = _vibrating_mass(values, setup), self._shares(i, spots, values)
+            magnet = self._magnet(i, values)
+            pulsation = self._pulsation(i, values, magnet)
+            spring = (magnet * pulsation**2 / whole)[..., None] * shares
+            if drive.is_held:
+                return spring
+            pull = -(np.sqrt(magnet / whole) * pulsation**2)[..., None] * shares
+            return _joined(spring, pull, (pulsation**2)[..., None])
+
+        def inertia(values: Values, setup: Setup) -> Floats:
+            whole, shares = _vibrating_mass(values, setup), self._shares(i, spots, values)
+            coil = (self.value(values, self._key(i, "coil")) / whole)[..., None] * shares
+            return coil if drive.is_held else _joined(coil, np.ones(1))
+
+        return Stiffnesses(springs, stiffness), Masses(inertias, inertia)
+
+    def _magnet(self, i: int, values: Values) -> Floats:
+        """Mass of the magnet, kg."""
+        if self.drives[i].is_held and not self.drives[i].is_resonance:
+            return np.ones(1)
+        mass = self.value(values, self._key(i, "mass"))
+        return np.maximum(mass - self.value(values, self._key(i, "coil")), _LEAST_MAGNET * mass)
+
+    def _pulsation(self, i: int, values: Values, magnet: Floats) -> Floats:
+        """Angular frequency of the magnet on its suspension, 1/s."""
+        least = 2.0 * np.pi * _STANDS_STILL
+        if self.drives[i].is_resonance:
+            return np.maximum(2.0 * np.pi * self.value(values, self._key(i, "resonance")), least)
+        return np.maximum(np.sqrt(self.value(values, self._key(i, "suspension")) / magnet), least)
+
+    def _shares(self, i: int, spots: Sequence[Spot], values: Values) -> Floats:
+        """What the squared deflection at each node has of that at the exciter's place: (..., n_x * n_y) array."""
+        along = []
+        for axis, spot in zip("xy", spots, strict=True):
+            at = spot.low if self.drives[i].places else self.value(values, self._key(i, f"place_{axis}"))
+            along.append(spot.shares(np.asarray(at)))
+        each = along[0][..., :, None] * along[1][..., None, :]
+        return np.asarray(each.reshape(*each.shape[:-2], -1))
+
+
+def _drive(board: Board, setup: Setup, item: AttachedItem) -> Drive:
+    """An exciter of the card, with the priors of its kind for what the card does not say."""
+    suspension = item.suspension if item.resonance is None else item.resonance
+    return Drive(
+        mass=_MASS if item.mass is None else (item.mass, ""),
+        coil=_COIL if item.coil is None else (item.coil, ""),
+        suspension=_SUSPENSION if suspension is None else (suspension, ""),
+        is_resonance=item.resonance is not None,
+        is_held=item.magnet == "held",
+        places=fractions_on(board, setup, item.places),
+    )
+
+
+def _with_known_coil(drive: Drive) -> Drive:
+    coil, source = drive.coil
+    return replace(drive, coil=(Quantity.exact(coil.median), "")) if source else drive
+
+
+def _turn(places: Fractions, k: int) -> Fractions:
+    return (places[k % len(places)],) if places else ()
+
+
+def _orders(setup: Setup) -> tuple[int, int]:
+    """Highest orders of the beam functions among the readings."""
+    beams = [reading.beams for reading in setup.readings]
+    highest = [max((one[axis] for one in beams), default=0) for axis in (0, 1)]
+    return max(highest[0], _FEWEST_ORDER), max(highest[1], _FEWEST_ORDER)
+
+
+def _range(ends: Ends) -> tuple[float, float]:
+    return (0.0, 0.5) if ends[0] == ends[1] else (0.0, 1.0)
+
+
+def _rows(x: Line, y: Line, spots: Sequence[Spot]) -> list[tuple[Floats, Floats]]:
+    """Values of the functions along x and along y at every pair of nodes: (1, n_dof) arrays."""
+    along_x, along_y = (line.shapes(spot.nodes).toarray() for line, spot in zip((x, y), spots, strict=True))
+    return [(on_x[None], on_y[None]) for on_x in along_x for on_y in along_y]
+
+
+def _vibrating_mass(values: Values, setup: Setup) -> Floats:
+    length_x, length_y = vibrating_lengths(values, setup)
+    return np.asarray(density(values) * values["thickness"] * length_x * length_y)
+
+
+def _joined(*parts: Floats) -> Floats:
+    """Columns of several terms side by side, one draw where all have one."""
+    n_draws = max((one.shape[0] for one in parts if one.ndim > 1), default=0)
+    wide = [np.broadcast_to(one, (n_draws, one.shape[-1])) for one in parts] if n_draws else list(parts)
+    return np.concatenate(wide, axis=-1)

@@ -1,0 +1,176 @@
+"""Warp: a board that is not flat stretches where it bends, and its lowest modes ring higher."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, ProjectedStiffnesses, Scope
+from bayesplate.modes.fields import Field
+from bayesplate.modes.membrane import Curvature, curvature_pairs, membrane_terms
+from bayesplate.modes.plate import Projection
+from bayesplate.plate.board import Board, Values, density, vibrating_lengths
+from bayesplate.plate.parameter import BOARD, Parameter
+from bayesplate.plate.setup import Setup
+from bayesplate.quantities import Quantity
+
+RISES: tuple[Curvature, ...] = ("cup", "bow", "twist")
+"""The rises that a maker reads: across the width, along the length, of the fourth corner."""
+
+_SPREADS = {"cup": 0.005, "bow": 0.004, "twist": 0.01}
+_WORDS = {
+    "cup": "half-normal: half a per cent of the width; turning the board over changes nothing",
+    "bow": "normal: 0.4 per cent of the length; below zero the board is a saddle, above a dome",
+    "twist": "half-normal: one per cent of the longer side; turning the board over changes nothing",
+}
+_SEEN = 2.0 * np.log(2.0) / 1200.0
+"""Relative rise of omega^2 that is one cent of frequency."""
+
+
+@dataclass(frozen=True)
+class Warp(Effect):
+    """A stress-free shape of three constant curvatures, as read with a straightedge and feeler gauges.
+
+    Cup, the rise across the width, makes k_y = 8 cup / L_y^2; bow, the rise along the length, k_x = 8 bow / L_x^2;
+    twist, the lift of the fourth corner off a table, k_xy = twist / (L_x L_y), the sides of the whole board. All of a
+    plate's membrane is in `bayesplate.modes.membrane`: the in-plane fields are those of the moduli where the plate is
+    solved. Edges that are clamped hold the board in its plane, others do not; inertia in the plane is left out, so is
+    an angle of the grain there.
+
+    All signs at once change nothing, and that of the twist alone nothing either: cup and twist are positive, the sign
+    of the bow tells a dome from a saddle.
+
+    Attributes
+    ----------
+    rises : tuple of (str, Quantity, str)
+        Name, rise in m, and where its prior comes from (empty: the card); those that are absent are none.
+    aspect_ratio : float
+        L_x / L_y of the vibrating part.
+    """
+
+    rises: tuple[tuple[Curvature, Quantity, str], ...] = ()
+    aspect_ratio: float = 1.0
+
+    name: ClassVar[str] = "warp"
+    scope: ClassVar[Scope] = "board"
+    sentence: ClassVar[str] = (
+        "The board is not flat, so its lowest modes ring higher: lay a straightedge across it, and along it."
+    )
+    references: ClassVar[tuple[str, ...]] = (
+        "Donnell, L. H., Stability of thin-walled tubes under torsion, NACA report 479 (1933), for the shallow shell",
+    )
+
+    @classmethod
+    def of(cls, board: Board, setup: Setup) -> Warp:
+        """The effect with what the board states of its rises, and priors for the others."""
+        rises = ((name, *_rise(board, name)) for name in RISES)
+        kept = tuple(one for one in rises if not (one[1].is_exact and one[1].mean == 0.0))
+        return cls(BOARD, kept, _aspect_ratio(board, setup))
+
+    @classmethod
+    def is_implied(cls, board: Board) -> bool:
+        """Whether the board states a rise."""
+        return bool(board.warp)
+
+    @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """Refused where nothing is stated and a usual rise would not show."""
+        if board.warp or _shows(board):
+            return ""
+        return "the board is so thick that the warp of a sawn board would move no mode by a cent"
+
+    @classmethod
+    def forms(cls, board: Board) -> tuple[EffectForm, ...]:
+        """Curved along and across, or twisted; as stated where anything is."""
+        acting = [setup for setup in board.setups if not cls.refusal(board, setup)]
+        if board.warp or not acting:
+            return super().forms(board)
+        whole = [cls.of(board, setup) for setup in acting]
+        return tuple(
+            EffectForm(words, tuple(replace(one, rises=tuple(r for r in one.rises if r[0] in names)) for one in whole))
+            for words, names in (("cup and bow", ("cup", "bow")), ("twist", ("twist",)))
+        )
+
+    @property
+    def detail(self) -> str:
+        """Which rises, where not all."""
+        names = [name for name, *_ in self.rises]
+        return "" if len(names) == len(RISES) else " and ".join(names)
+
+    def in_setup(self, board: Board, setup: Setup) -> Warp | None:
+        """The same shape of what vibrates in another setup."""
+        return None if self.refusal(board, setup) else replace(self, aspect_ratio=_aspect_ratio(board, setup))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The rises that the board may have, m."""
+        return tuple(self.parameter(name, rise, "m", 0.0, source) for name, rise, source in self.rises)
+
+    def keeps_symmetry(self) -> tuple[bool, bool]:
+        """The halves stay alike, but for a twist with a curvature beside it: together they tell corners apart."""
+        is_both = len(self.rises) > 1 and any(name == "twist" for name, *_ in self.rises)
+        return not is_both, not is_both
+
+    def contributions(self) -> tuple[Contribution, ...]:
+        """Membrane energies: the product of two curvatures and a modulus, over the density."""
+        curvatures = tuple(name for name, *_ in self.rises)
+        if not curvatures:
+            return ()
+
+        def projection(values: Values, field: Field | None) -> Projection:
+            moduli = tuple(float(one) for one in np.ravel(_moduli(values)[..., :4]))
+            return partial(
+                membrane_terms,
+                aspect_ratio=self.aspect_ratio,
+                moduli=tuple(round(one / max(moduli), 6) for one in moduli),
+                curvatures=curvatures,
+                thickness=field,
+            )
+
+        def weight(values: Values, setup: Setup) -> Floats:
+            moduli = _moduli(values) / np.asarray(density(values))[..., None]
+            bent = self._curvatures(values)
+            pairs = [np.asarray(bent[one] * bent[other])[..., None] for one, other in curvature_pairs(curvatures)]
+            columns = [pair * moduli for pair in pairs]
+            return np.concatenate(np.broadcast_arrays(*columns), axis=-1)
+
+        return (ProjectedStiffnesses(projection, weight),)
+
+    def _curvatures(self, values: Values) -> Mapping[Curvature, Floats]:
+        """Curvatures of the board by the name of the rise, 1/m."""
+        length_x, length_y = (np.asarray(values[f"length_{axis}"]) for axis in "xy")
+        per_rise = {"cup": 8.0 / length_y**2, "bow": 8.0 / length_x**2, "twist": 1.0 / (length_x * length_y)}
+        return {name: self.value(values, name) * per_rise[name] for name, *_ in self.rises}
+
+
+def _rise(board: Board, name: Curvature) -> tuple[Quantity, str]:
+    """A rise as stated, or the prior of a sawn board."""
+    if name in board.warp:
+        return board.warp[name], ""
+    length_x, length_y = (board.inputs[f"length_{axis}"].mean for axis in "xy")
+    side = {"cup": length_y, "bow": length_x, "twist": max(length_x, length_y)}[name]
+    lower = -np.inf if name == "bow" else 0.0
+    return Quantity.from_mean(0.0, _SPREADS[name] * side, "normal", lower=lower), _WORDS[name]
+
+
+def _shows(board: Board) -> bool:
+    """Whether a rise c of its prior's spread stiffens a section, by (4/45) c^2 / (h^2 / 12), as much as one cent."""
+    length_x, length_y, thickness = (board.inputs[name].mean for name in ("length_x", "length_y", "thickness"))
+    rise = max(_SPREADS["cup"] * length_y, _SPREADS["bow"] * length_x)
+    return bool(4.0 / 45.0 * 12.0 * (rise / thickness) ** 2 > _SEEN)
+
+
+def _moduli(values: Values) -> Floats:
+    """Q_11, Q_12, Q_22 and Q_66 of plane stress, Pa: (..., 4) array."""
+    cube = 12.0 / np.asarray(values["thickness"]) ** 3
+    D_x, D_y, D_s = (np.asarray(values[name]) for name in ("D_x", "D_y", "D_s"))
+    parts = (D_x * cube, np.asarray(values["poisson_xy"]) * D_y * cube, D_y * cube, 0.25 * D_s * cube)
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def _aspect_ratio(board: Board, setup: Setup) -> float:
+    length_x, length_y = vibrating_lengths(board.nominal(), setup)
+    return float(length_x / length_y)
