@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from generator.boards import PlantedBoard, plant
+from generator.card import told
 from generator.designs import DESIGNS, Design
 from generator.naming import Label, frequencies
 from generator.plate import FINE_SHEAR, Plate
@@ -134,6 +135,18 @@ def _compact(design: Design, size: float) -> Parameters:
     return {"mass": mass, "rotary_radius": diameter * (1.0 / 16.0 + 1.0 / 3.0) ** 0.5}
 
 
+def _half_warp(parameters: Parameters) -> Parameters:
+    return {name: 0.5 * rise for name, rise in parameters.items()}
+
+
+def _half_exciter(parameters: Parameters) -> Parameters:
+    return {**parameters, **{name: 0.5 * parameters[name] for name in ("mass", "coil_mass", "suspension")}}
+
+
+def _told(effect: str) -> Callable[[Parameters, PlantedBoard], dict[str, str]]:
+    return lambda p, board: told({effect: p})
+
+
 def _air(baffle: str) -> Callable[[Parameters, PlantedBoard], dict[str, str]]:
     return lambda p, board: {"air": f'{{ density_kg_m3 = {_number(p["density"])}, baffle = "{baffle}" }}'}
 
@@ -196,6 +209,12 @@ CASES: dict[str, Declared] = {
     ),
     "stiffness_gradient": Declared(
         "stiffness_gradient", ALL, _times("gradient"), values=lambda p, plate: {"gradient": p["gradient"]}
+    ),
+    "warp": Declared("warp", ALL, _half_warp, _told("warp")),
+    "exciter": Declared("exciter", ALL, _half_exciter, _told("exciter"), n=((18, 18), (24, 24))),
+    "exciter whose magnet is held": Declared(
+        "exciter", ALL, _half_exciter, _told("exciter"), n=((18, 18), (24, 24)),
+        fixed=lambda design, size: {"magnet": "held"},
     ),
     "grain_angle": Declared("grain_angle", ALL, _times("angle"), values=lambda p, plate: {"angle": p["angle"]}),
     "poisson_ratio": Declared("poisson_ratio", ALL, _half_poisson, values=lambda p, plate: {"nu_xy": p["nu_xy"]}),

@@ -216,7 +216,8 @@ def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator
     board = plant(
         rng, "clamped-9", ["attached_mass", "exciter", "warp"], n_places=2, fixed={"exciter": {"magnet": "held"}}
     )
-    card = tomllib.loads(board.card_text(told(board.truth.effects) | {"fluid": "{ density_kg_m3 = 1.2 }"}))
+    text = board.card_text(told(board.truth.effects) | {"fluid": '{ density_kg_m3 = 1.2, baffle = "none" }'})
+    card = tomllib.loads(text)
     warp, drive = (board.truth.effects[effect] for effect in ("warp", "exciter"))
     sensor, exciter = card["setup"][0]["attached"]
 
@@ -234,7 +235,8 @@ def test_card_states_what_scales_and_a_straightedge_say(rng: np.random.Generator
         "at_mm": [[pytest.approx(1e3 * x, rel=1e-5), pytest.approx(1e3 * y, rel=1e-5)] for x, y in drive["places"]],
     }
     assert len(exciter["at_mm"]) == len(sensor["at_mm"]) == 2
-    assert card["setup"][0]["fluid"] == {"density_kg_m3": 1.2}
+    assert card["setup"][0]["fluid"] == {"density_kg_m3": 1.2, "baffle": "none"}
+    assert not list(physical_faults(read_board_text(text, "planted.toml")))
     somewhere = plant(rng, "clamped-9", ["exciter"], places_known=False)
     (only,) = tomllib.loads(somewhere.card_text(told(somewhere.truth.effects)))["setup"][0]["attached"]
     assert "at_mm" not in only

@@ -18,6 +18,7 @@ from generator.plate import EDGES, matrices, solve
 
 QUARTER = ((0.25 * DRIVEN.L_x, 0.25 * DRIVEN.L_y),)
 THIRD = ((DRIVEN.L_x / 3.0, DRIVEN.L_y / 3.0),)
+MIDDLE = ((0.5 * DRIVEN.L_x, 0.5 * DRIVEN.L_y),)
 TABLE = {
     "28 Hz": (28.0, QUARTER, [20.3, 11.1, 3.2, -1.9, -1.3, -9.3]),
     "38.6 Hz": (38.6, QUARTER, [46.5, 27.2, 12.7, 14.4, 4.2, -1.8]),
@@ -130,17 +131,17 @@ class TestLimits:
         assert self.hertz(Exciter.at_resonance(120.0, 10e-3, QUARTER, 0.1e-3, "held"))[0] > bare
 
 
-@pytest.mark.parametrize("resonance", [10.0, 28.0, 38.6])
-def test_the_magnets_own_mode_takes_no_label(resonance: float) -> None:
-    """It bends the board like (0,0), so that without the board's share of the motion it may take that label."""
-    exciter = Exciter.at_resonance(resonance, 48e-3, QUARTER)
+@pytest.mark.parametrize(("resonance", "places"), [(10.0, QUARTER), (38.6, QUARTER), (38.6, MIDDLE)])
+def test_the_magnets_own_mode_takes_no_label(resonance: float, places) -> None:
+    """It bends the board like (0,0): in the middle, by its shape alone, it would take that label from the board."""
+    exciter = Exciter.at_resonance(resonance, 48e-3, places)
     modes = solve(DRIVEN, [exciter], 14)
     labels = named(modes, DRIVEN.edges)
     lowest = modes.frequencies[0]
 
     assert modes.shares[0] < 0.2
     assert np.all(modes.shares[1:] > 0.8)
-    assert lowest == pytest.approx(resonance, rel=0.15)
+    assert 0.7 * resonance < lowest < resonance  # the board gives way too
     assert lowest not in [labels[mode][0] for mode in BEAMS["clamped"]]
     assert solve(DRIVEN, [replace(exciter, magnet="held")], 14).shares == pytest.approx(1.0)
 
