@@ -51,7 +51,12 @@ def _chosen(board: Board, setup: Setup, name: str) -> list[Effect]:
 
 
 def implied_effects(board: Board) -> tuple[str, ...]:
-    """Effects that the card declares by what it states, where they can act or a setup wants them to."""
+    """Effects that the card declares by what it states, where they can act or a setup wants them to.
+
+    None where it declares nothing in so many words, by an empty list of effects.
+    """
+    if not board.implies:
+        return ()
     return tuple(
         name
         for name, effect in EFFECTS.items()

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
+import numpy as np
+
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
 from bayesplate.modes.fields import Outline
 from bayesplate.modes.thin import within_outline
@@ -28,9 +30,11 @@ class SupportStiffness(Effect):
     ----------
     edge : Outline or None
         Where the plate ends; None: the whole rectangle.
+    stiffness : Quantity, N/m^3
     """
 
     edge: Outline | None = None
+    stiffness: Quantity = _PRIOR
 
     name: ClassVar[str] = "support_stiffness"
     scope: ClassVar[Scope] = "setup"
@@ -39,8 +43,22 @@ class SupportStiffness(Effect):
 
     @classmethod
     def of(cls, board: Board, setup: Setup) -> SupportStiffness:
-        """The effect under the whole board."""
-        return cls(setup.owner)
+        """The effect under the whole board, as stiff as the frequency says at which the board bounces."""
+        return cls(setup.owner, stiffness=_PRIOR if setup.bounce is None else stiffness_of(board, setup.bounce))
+
+    @classmethod
+    def is_implied(cls, board: Board) -> bool:
+        """Whether a setup states at which frequency the board bounces."""
+        return any(map(cls.is_wanted, board.setups))
+
+    @classmethod
+    def is_wanted(cls, setup: Setup) -> bool:
+        """Whether the setup states that frequency."""
+        return setup.bounce is not None
+
+    def in_setup(self, board: Board, setup: Setup) -> Effect | None:
+        """The same support in another setup, unless that states its own."""
+        return self.of(board, setup) if self.is_wanted(setup) else super().in_setup(board, setup)
 
     @classmethod
     def refusal(cls, board: Board, setup: Setup) -> str:
@@ -51,7 +69,8 @@ class SupportStiffness(Effect):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Stiffness per area."""
-        return (self.parameter("stiffness", _PRIOR, "N/m^3", 0.0, _SOURCE),)
+        source = _SOURCE if self.stiffness is _PRIOR else ""
+        return (self.parameter("stiffness", self.stiffness, "N/m^3", 0.0, source),)
 
     def within(self, shaped: Effect) -> SupportStiffness:
         """The same that ends with the plate."""
@@ -64,3 +83,12 @@ class SupportStiffness(Effect):
             return self.value(values, "stiffness") / (density(values) * values["thickness"])
 
         return (Stiffness(partial(within_outline, a=(0, 0), b=(0, 0), outline=self.edge), weight),)
+
+
+def stiffness_of(board: Board, bounce: Quantity) -> Quantity:
+    """Stiffness per area, N/m^3, of a support on which the board bounces at a frequency, Hz: rho h (2 pi f)^2."""
+    nominal = board.nominal()
+    scale = float(density(nominal) * nominal["thickness"]) * (2.0 * np.pi) ** 2
+    if bounce.is_exact:
+        return Quantity.exact(scale * bounce.mean**2)
+    return Quantity.from_median(scale * bounce.median**2, bounce.factor**2)

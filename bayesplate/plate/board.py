@@ -58,6 +58,9 @@ class Board:
     title, source : str
     effects : tuple of str
         Declared effects.
+    implies : bool
+        Whether what is stated of the board (a sensor's mass, the fluid, a bounce) declares effects beside these; an
+        empty list of effects that somebody wrote down says that it does not.
     chosen : tuple
         Effects (`bayesplate.effects.Effect`) in another form than the card itself would give them.
     shear_xz, shear_yz : Quantity or None, Pa
@@ -76,6 +79,7 @@ class Board:
     title: str = ""
     source: str = ""
     effects: tuple[str, ...] = ()
+    implies: bool = True
     chosen: tuple[Any, ...] = ()
     shear_xz: Quantity | None = None
     shear_yz: Quantity | None = None
@@ -160,7 +164,7 @@ class Board:
         density: Quantity | ArrayLike | None = None,
         poisson_xy: Quantity | ArrayLike | None = None,
         prior: str | os.PathLike[str] | PriorCard = "weakly-informative",
-        effects: Sequence[str] = (),
+        effects: Sequence[str] | None = None,
         shear_xz: Quantity | ArrayLike | None = None,
         shear_yz: Quantity | ArrayLike | None = None,
         warp: Mapping[str, Quantity | ArrayLike] | None = None,
@@ -186,8 +190,8 @@ class Board:
             Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
             what uses the board: `Problem.from_card(board, prior=prior)`. What is not stated of noise and Poisson ratio
             is taken from the prior that is given there.
-        effects : sequence of str
-            Declared effects.
+        effects : sequence of str, optional
+            Declared effects, beside those that are implied by what is stated; an empty list declares nothing at all.
         shear_xz, shear_yz : Quantity, number or array of readings, Pa
         warp : dict of Quantity, number or array of readings, m
             "cup", "bow" and "twist", as far as they were read with a straightedge; a quantity is a normal one.
@@ -216,7 +220,7 @@ class Board:
             ("name", name, isinstance(name, str), "a text"),
             ("setups", setups, isinstance(setups, Setup) or are(setups, Setup), "a Setup or a list of them"),
             ("prior", prior, isinstance(prior, str | os.PathLike | PriorCard), "a name, a path or a PriorCard"),
-            ("effects", effects, are(effects, str), "a list of names of effects"),
+            ("effects", effects, effects is None or are(effects, str), "a list of names of effects"),
             ("title", title, isinstance(title, str), "a text"),
             ("source", source, isinstance(source, str), "a text"),
             ("warp", warp, isinstance(warp, Mapping | None), "a dict of heights by cup, bow and twist"),
@@ -241,7 +245,8 @@ class Board:
             [setup.assuming_noise(card) if setup.is_noise_assumed else setup for setup in held],
             assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or DEFAULT_POISSON,
             prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
-            effects=tuple(effects),
+            effects=tuple(effects or ()),
+            implies=effects is None or bool(effects),
             title=title,
             source=source,
             warp=warps,

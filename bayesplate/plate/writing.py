@@ -54,7 +54,7 @@ def card_text(board: Board) -> str:
         raise InputError(faults)
     lines = ["format = 1", f"name = {text(board.name)}"]
     lines += [f"{key} = {text(said)}" for key, said in (("title", board.title), ("source", board.source)) if said]
-    if board.effects:
+    if board.effects or not board.implies:
         lines.append(f"effects = {array(text(name) for name in board.effects)}")
     lines += ["", "[plate]"]
     lines += [f"{key} = {quantity(inputs[name], f, f)}" for name, (key, f) in _INPUT_KEYS.items() if name in inputs]

@@ -146,8 +146,10 @@ def _require_card(card: object) -> None:
 def prepared_card(read: BoardCard, named: NamedCards, effects: Sequence[str] | None = None) -> Prepared:
     """The same of cards that were read already: no file is looked at; raises as `prepare`."""
     stated = board_from_card(read, named.prior, named.tables)
-    listed = (*stated.effects, *implied_effects(stated)) if effects is None else map(effect_named, effects)
-    board = replace(stated, effects=tuple(dict.fromkeys(listed)))
+    implied = implied_effects(stated)
+    listed = (*stated.effects, *implied) if effects is None else map(effect_named, effects)
+    declared = tuple(dict.fromkeys(listed))
+    board = replace(stated, effects=declared, implies=bool(declared) or (stated.implies and not implied))
     faults = [*physical_faults(read), *named.faults, *label_faults(board), *effect_faults(board)]
     if not faults:
         require_sides(board)

@@ -21,8 +21,10 @@ from bayesplate.cards import (
 )
 from bayesplate.cards.shelf import shelf_folder
 from bayesplate.labels import Label
+from bayesplate.workflow.prepare import prepare
 
-FREE = tuple(f"spruce-free-{number}{side}" for number in (1, 2, 3) for side in "LR")
+FREE = tuple(f"spruce-free-{number}{side}" for number in (1, 2, 3, 4, 5) for side in "LR")
+PANELS = ("steel-air-water", "foam-panel-exciter", "acrylic-panel")
 CANTILEVER = [(1, 0), (1, 1), (2, 0), (1, 2), (2, 1), (2, 2)]
 CLAMPED = [(0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2)]
 PAPER = {
@@ -34,22 +36,30 @@ PAPER = {
 
 
 def test_the_shelf() -> None:
-    assert card_names("boards") == tuple(sorted((*PAPER, *FREE, "nemus-D")))
+    assert card_names("boards") == tuple(sorted((*PAPER, *FREE, *PANELS, "nemus-D")))
     assert card_names("priors") == ("spruce", "weakly-informative")
     assert card_names("coefficients") == ("paper-cantilever", "paper-clamped")
 
 
 @pytest.mark.parametrize("name", card_names("boards"))
-def test_a_shipped_board_is_sound_and_declares_nothing(name: str) -> None:
+def test_a_shipped_board_is_sound_and_names_no_effect(name: str) -> None:
     card = load_board(name)
 
     assert physical_faults(card) == []
     assert card.effects == ()
     assert card.material.prior == "weakly-informative"
     assert card.source
-    for setup in card.setups:
-        assert setup.fluid is None
-        assert all(item.mass_g is None for item in setup.attached)
+
+
+PROFILES = ("support_stiffness", "thickness_profile", "outline_profile")
+DECLARED = dict.fromkeys(FREE, PROFILES) | {"foam-panel-exciter": ("fluid_loading",)}
+
+
+@pytest.mark.parametrize("name", card_names("boards"))
+def test_what_a_shipped_board_declares_by_what_it_states(name: str) -> None:
+    """The free boards their support and shape, the foam its air; what a board of the paper states it does not declare."""
+    declared = prepare(name).board.effects
+    assert tuple(one for one in declared if one != "exciter") == DECLARED.get(name, ())
 
 
 @pytest.mark.parametrize("name", PAPER)
@@ -84,6 +94,10 @@ def test_the_boards_of_the_paper(name: str) -> None:
         ("spruce-free-2R", 256.8, 9, 7, {(0, 2): 159.14, (4, 1): 448.79}, 0.98),
         ("spruce-free-3L", 235.2, 7, 10, {(1, 2): 178.89, (2, 2): 265.41}, 0.7),
         ("spruce-free-3R", 253.2, 6, 11, {(1, 1): 60.35, (2, 2): 292.24}, 0.9),
+        ("spruce-free-4L", 225.6, 8, 9, {(0, 2): 159.72, (2, 2): 283.93}, 0.98),
+        ("spruce-free-4R", 211.2, 7, 9, {(1, 2): 198.36, (2, 2): 283.49}, 0.9),
+        ("spruce-free-5L", 272.8, 8, 10, {(0, 2): 162.87, (2, 2): 292.36}, 0.98),
+        ("spruce-free-5R", 269.2, 8, 8, {(0, 2): 163.75, (2, 2): 291.12}, 0.98),
     ],
 )
 def test_the_free_boards(
@@ -111,6 +125,10 @@ PEAKS = {
     "spruce-free-2R": {404.01: (0.175, "+", 0.5), 707.01: (0.1, "+", 0.44), 995.25: (0.53, "+", 0.32)},
     "spruce-free-3L": {361.36: (0.11, "+", 0.835), 397.11: (0.1, "-", 0.895), 936.0: (0.545, "-", 0.32)},
     "spruce-free-3R": {158.94: (1.18, "+", 0.115), 683.31: (0.275, "+", 0.43), 993.05: (0.33, "-", 0.335)},
+    "spruce-free-4L": {404.36: (0.13, "-", 0.75), 741.7: (0.735, "+", 0.42), 944.07: (0.25, "-", 0.04)},
+    "spruce-free-4R": {368.47: (0.28, "-", 0.035), 712.08: (0.135, "+", 0.085), 993.58: (0.64, "+", 0.165)},
+    "spruce-free-5L": {192.38: (0.545, "-", 0.41), 711.51: (0.1, "-", 0.385), 888.22: (0.725, "", 0.11)},
+    "spruce-free-5R": {412.63: (0.515, "-", 0.14), 700.29: (0.1, "-", 0.41), 886.95: (0.23, "", 0.1)},
 }
 """Some peaks of each board, Hz: sd (Hz), sign and damping (%)."""
 
@@ -125,6 +143,53 @@ def test_peaks_of_the_free_boards(name: str) -> None:
     assert list(read) == sorted(read)
     assert min(sd for sd, _, _ in read.values()) >= 0.1
     assert not {quantity.mean for quantity in setup.frequencies_hz.values()} & set(read)
+
+
+RIGID = {
+    "1L": (3.5, 5.0), "1R": (3.5, 5.0), "2L": (3.5, 4.5), "2R": (3.0, 5.0), "3L": (3.5, 5.0), "3R": (3.5, 5.0),
+    "4L": (3.5, 5.5), "4R": (3.0, 6.0), "5L": (3.0, 5.0), "5R": (3.5, 4.5),
+}  # fmt: skip
+"""Peaks of the record below the first mode, Hz."""
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_the_bounce_of_the_free_boards_is_one_of_two_peaks(name: str) -> None:
+    (setup,) = load_board(name).setups
+    assert setup.support is not None
+    bounce = setup.support.bounce_hz
+    assert bounce is not None
+    assert (bounce.mean - bounce.sd, bounce.mean + bounce.sd) == RIGID[name[-2:]]
+
+
+def test_the_panels() -> None:
+    """Ratios of the steel's frequencies in air and in water, the even modes of the others, the exciter's parts."""
+    air, water = load_board("steel-air-water").setups
+    added = [
+        (air.frequencies_hz[label].mean / water.frequencies_hz[label].mean) ** 2 - 1 for label in air.frequencies_hz
+    ]
+    assert [round(share, 3) for share in added] == [0.663, 0.533, 0.488, 0.573, 0.480]
+    for name, count in (("foam-panel-exciter", 7), ("acrylic-panel", 10)):
+        card = load_board(name)
+        (setup,) = card.setups
+        assert len(setup.frequencies_hz) == count
+        assert all(label.m % 2 == label.n % 2 == 0 for label in setup.frequencies_hz)
+        (exciter,) = setup.attached
+        plate = card.plate
+        assert exciter.at_mm == ((plate.length_x_mm.mean / 2, plate.length_y_mm.mean / 2),)
+        assert exciter.suspension_n_per_m is not None
+        assert exciter.suspension_n_per_m.mean == pytest.approx(1000 / 0.37, abs=1.0)
+        assert exciter.magnet == "held"
+    (setup,) = load_board("fiemme-spruce-clamped").setups
+    (exciter,) = setup.attached
+    assert exciter.mass_g is not None
+    assert (exciter.kind, exciter.at_mm, exciter.mass_g.mean) == ("exciter", (), 48)
+
+
+def test_the_campaigns_of_the_half_tops() -> None:
+    aside, every = load_campaign("spruce-half-tops-set-aside"), load_campaign("spruce-half-tops-all")
+    assert (aside.boards, every.boards) == (FREE[6:], FREE)
+    assert (aside.shared, every.shared, aside.effects, every.effects) == ((), (), (), ())
+    assert "24 November 2026" in aside.title
 
 
 def test_the_board_of_three_sessions() -> None:

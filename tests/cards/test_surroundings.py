@@ -9,9 +9,12 @@ import pytest
 
 import bayesplate
 from bayesplate.cards import EFFECT_NAMES, load_campaign, physical_faults, read_board_text
+from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.effects import implied_effects
 from bayesplate.errors import InputError
 from bayesplate.plate.from_card import board_from_card
 from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
 
 FLUID = '[setup.fluid]\ndensity_kg_m3 = 1.2\nbaffle = "none"\n'
 PLATE, ITEM = "mass_g = 41.0", 'kind = "accelerometer"\nmass_g = { mean = 0.6, sd = 0.1 }\nat_mm = [200, 20]'
@@ -163,3 +166,26 @@ def test_the_former_name_of_an_effect_is_accepted_wherever_one_is_named(spoiled,
     path.write_text(boards + '[[shared]]\neffect = "air_loading"\n[[shared]]\neffect = "fluid_loading"\n')
     with pytest.raises(InputError, match='wanted each effect once, got "fluid_loading" again'):
         load_campaign(path)
+
+
+def test_an_empty_list_of_effects_declares_nothing_not_even_what_is_implied(spoiled):
+    """As `--effects none` does: what is stated stays a candidate, with the size that is stated."""
+    stated, none = 'effects = ["transverse_shear"]', read(spoiled('effects = ["transverse_shear"]', "effects = []"))
+    implied = ("fluid_loading", "attached_mass")
+    assert prepare(read(spoiled(stated, ""))).board.effects == implied
+    prepared = prepare(none)
+    assert prepared.board.effects == ()
+    assert "fluid_loading" in forms(prepared.board)
+    assert "\neffects = []\n" in none.to_card()
+    assert prepare(prepared.board).board.effects == ()
+    taken = prepare(read(spoiled(stated, "")), effects=[]).board
+    assert (taken.effects, prepare(taken).board.effects) == ((), ())
+    assert prepare(none, effects=["grain_angle"]).board.effects == ("grain_angle",)
+
+
+def test_an_empty_list_of_effects_in_python_is_that_of_a_card():
+    setup = bayesplate.Setup.from_frequencies({"(1,1)": 134.0}, edges="free", bounce=5.0)
+    sizes = {"length_x": 0.253, "length_y": 0.114, "thickness": 3e-3, "mass": 0.041, "setups": setup}
+    boards = [bayesplate.Board.from_numbers("my-board", effects=given, **sizes) for given in (None, [], ["warp"])]
+    assert [one.implies for one in boards] == [True, False, True]
+    assert [implied_effects(one) for one in boards] == [("support_stiffness",), (), ("support_stiffness",)]
