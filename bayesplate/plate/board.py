@@ -11,11 +11,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
+from bayesplate.cards import PriorCard, load_prior, usual_poisson
 from bayesplate.cards.stated import are, quantity_of, wrong_types
 from bayesplate.cards.words import did_you_mean
 from bayesplate.cards.writing import write_card
 from bayesplate.errors import Fault, InputError
+from bayesplate.plate.material import ISOTROPIC, ORTHOTROPIC, Symmetry
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
 from bayesplate.plate.setup import Setup
@@ -58,6 +59,8 @@ class Board:
     chosen : tuple
         Effects (`bayesplate.effects.Effect`) in another form than the card itself would give them.
     shear_xz, shear_yz : Quantity or None, Pa
+    isotropic : bool
+        One modulus in all directions: E_y = E_x = E and G_xy = E / (2 (1 + nu)), nu the input poisson_xy.
     notes : tuple of str
         What was assumed because the card does not say it.
     """
@@ -72,7 +75,13 @@ class Board:
     chosen: tuple[Any, ...] = ()
     shear_xz: Quantity | None = None
     shear_yz: Quantity | None = None
+    isotropic: bool = False
     notes: tuple[str, ...] = ()
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Which of its rigidities are free."""
+        return ISOTROPIC if self.isotropic else ORTHOTROPIC
 
     @cached_property
     def inputs(self) -> Mapping[str, Quantity]:
@@ -151,6 +160,7 @@ class Board:
         effects: Sequence[str] = (),
         shear_xz: Quantity | ArrayLike | None = None,
         shear_yz: Quantity | ArrayLike | None = None,
+        isotropic: bool = False,
         title: str = "",
         source: str = "",
     ) -> Board:
@@ -168,7 +178,8 @@ class Board:
             Or the density; exactly one of the two.
         density : Quantity, number or array of readings, kg m^-3
         poisson_xy : Quantity, number or array of readings
-            By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08.
+            By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08, or
+            0.3 ± 0.06 where the board is isotropic.
         prior : str, path or PriorCard
             Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
             what uses the board: `Problem.from_card(board, prior=prior)`. What is not stated of noise and Poisson ratio
@@ -176,6 +187,8 @@ class Board:
         effects : sequence of str
             Declared effects.
         shear_xz, shear_yz : Quantity, number or array of readings, Pa
+        isotropic : bool
+            One modulus in all directions, as of metal, glass, foam or MDF; then the prior is its density of E.
         title, source : str
 
         Returns
@@ -202,6 +215,7 @@ class Board:
             ("setups", setups, isinstance(setups, Setup) or are(setups, Setup), "a Setup or a list of them"),
             ("prior", prior, isinstance(prior, str | os.PathLike | PriorCard), "a name, a path or a PriorCard"),
             ("effects", effects, are(effects, str), "a list of names of effects"),
+            ("isotropic", isotropic, isinstance(isotropic, bool), "True or False"),
             ("title", title, isinstance(title, str), "a text"),
             ("source", source, isinstance(source, str), "a text"),
         )))  # fmt: skip
@@ -221,9 +235,10 @@ class Board:
             name,
             quantities,
             [setup.assuming_noise(card) if setup.is_noise_assumed else setup for setup in held],
-            assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or DEFAULT_POISSON,
+            assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or usual_poisson(isotropic),
             prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
             effects=tuple(effects),
+            isotropic=isotropic,
             title=title,
             source=source,
             **shear,
