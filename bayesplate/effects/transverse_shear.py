@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from bayesplate.effects.base import Effect, Floats, Ratio, Scope, Theory
+from bayesplate.effects.base import Effect, Ratio, Scope, Theory
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -72,11 +70,6 @@ class TransverseShear(Effect):
         )
 
     def adjusted(self, values: Values) -> Values:
-        """The values with the two moduli under the names that the shear-flexible plate knows."""
-        given = (("G_xz", self.xz), ("G_yz", self.yz))
-        return {**values, **{key: twist(values) if one is None else self.value(values, key) for key, one in given}}
-
-
-def twist(values: Values) -> Floats:
-    """The modulus G_xy of a plate, Pa: D_s = G_xy h^3 / 3."""
-    return np.asarray(3.0 * values["D_s"] / values["thickness"] ** 3)
+        """The values with the moduli that are not G_xy under the names that the shear-flexible plate knows."""
+        given = (key for key, one in (("G_xz", self.xz), ("G_yz", self.yz)) if one is not None)
+        return {**values, **{key: self.value(values, key) for key in given}}

@@ -63,6 +63,11 @@ class Identifiability:
         follows = list(self.symmetry.follows)
         return np.asarray(self.covariance[np.ix_(follows, follows)])
 
+    @property
+    def errors_of_rigidities(self) -> NDArray[np.float64]:
+        """Of the logarithms of D_x, D_y, D_s: (3,) array."""
+        return np.sqrt(np.diagonal(self.of_rigidities))
+
     def blind(self) -> tuple[str, ...]:
         """Constants that the readings do not determine within the factor `WITHIN_A_FACTOR`."""
         limit = np.log(WITHIN_A_FACTOR) / 1.96

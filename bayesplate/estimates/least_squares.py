@@ -182,7 +182,7 @@ def starting_rigidities(board: Board) -> NDArray[np.float64]:
     from scipy.optimize import nnls
 
     inputs = board.nominal()
-    columns = board.symmetry.columns(float(inputs["poisson_xy"]))
+    columns = board.symmetry.columns(inputs["poisson_xy"])
     rows = np.concatenate([_rayleigh_rows(setup, inputs) for setup in board.setups]) @ columns
     squared = np.exp(2.0 * (log_measured(board) + np.log(2.0 * np.pi)))
     alike = 1.0 / np.mean(rows.sum(axis=1) / squared)

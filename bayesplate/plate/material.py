@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Floats = NDArray[np.float64]
+
 RIGIDITIES = ("D_x", "D_y", "D_s")
 MODULI = ("E_x", "E_y", "G_xy")
 
@@ -60,29 +62,29 @@ class Symmetry:
         """Whether the material is the same in all directions."""
         return self.n == 1
 
-    def rigidities(self, free: Sequence[ArrayLike] | NDArray[np.float64], nu_xy: ArrayLike) -> dict[str, ArrayLike]:
+    def rigidities(self, free: Sequence[Floats] | Floats, nu_xy: Floats) -> dict[str, Floats]:
         """D_x, D_y, D_s by name, N m.
 
         Parameters
         ----------
-        free : (n, ...) array_like, N m
+        free : (n, ...) array or n arrays, N m
             The free rigidities.
-        nu_xy : array_like
+        nu_xy : number or array
         """
-        found = dict(zip(RIGIDITIES, (free[i] for i in self.follows), strict=True))
+        found = {name: free[i] for name, i in zip(RIGIDITIES, self.follows, strict=True)}
         if self.is_isotropic:
-            found["D_s"] = 2.0 * (1.0 - np.asarray(nu_xy)) * found["D_s"]
+            found["D_s"] = np.asarray(2.0 * (1.0 - nu_xy) * found["D_s"])
         return found
 
-    def free_of(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    def free_of(self, values: Mapping[str, Floats]) -> Floats:
         """The free rigidities of one plate, N m: (n,) array from D_x, D_y, D_s by name."""
-        return np.array([float(np.asarray(values[RIGIDITIES[self.follows.index(i)]])) for i in range(self.n)])
+        return np.array([float(values[RIGIDITIES[self.follows.index(i)]]) for i in range(self.n)])
 
-    def columns(self, nu_xy: float) -> NDArray[np.float64]:
+    def columns(self, nu_xy: Floats) -> Floats:
         """The matrix that takes the free rigidities to (D_x, D_y, D_s): (3, n) array."""
         return np.array([list(self.rigidities(unit, nu_xy).values()) for unit in np.eye(self.n)]).T
 
-    def along(self, by_rigidity: NDArray[np.float64]) -> NDArray[np.float64]:
+    def along(self, by_rigidity: Floats) -> Floats:
         """Slopes by the logarithms of the free rigidities from those by ln D_x, D_y, D_s: (..., n) from (..., 3)."""
         return by_rigidity if not self.is_isotropic else by_rigidity.sum(axis=-1, keepdims=True)
 

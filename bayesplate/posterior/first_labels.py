@@ -161,7 +161,7 @@ def only_way(ways: Sequence[Way]) -> Way:
 def _constants_words(way: Way) -> str:
     nominal = way.board.nominal()
     found = way.board.symmetry.rigidities(np.exp(way.log_rigidities), nominal["poisson_xy"])
-    elastic = moduli(*(found[name] for name in RIGIDITIES), nominal["thickness"], nominal["poisson_xy"])
+    elastic = moduli(found["D_x"], found["D_y"], found["D_s"], nominal["thickness"], nominal["poisson_xy"])
     return ", ".join(f"{name} {1e-9 * float(value):.3g}" for name, value in zip(MODULI, elastic, strict=True)) + " GPa"
 
 

@@ -141,7 +141,7 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
     """Where the uncertainty of each constant comes from."""
     board = inference.problem.board
     shares = budget(draws, board)
-    alone = dict(zip(CONSTANTS, inference.problem.identifiability.standard_errors, strict=True))
+    alone = dict(zip(CONSTANTS, inference.problem.identifiability.errors_of_rigidities, strict=True))
     rows = []
     for name in CONSTANTS:
         entry = summary.elastic[name]

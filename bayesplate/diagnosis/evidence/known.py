@@ -173,7 +173,8 @@ def known_fit(
     misfit = normal_misfit(target, scales)
     errors = prediction_errors(law.of(labelled), target, misfit, fitted[None, :], modes=modes)
     found = _values(board, fitted, inputs)
-    constants = np.array(moduli(*(found[name] for name in RIGIDITIES), inputs["thickness"], inputs["poisson_xy"]))
+    D_x, D_y, D_s = (found[name] for name in RIGIDITIES)
+    constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
     return KnownFit(tuple(effects), tuple(without), fitted, constants, errors)
 
 
