@@ -11,7 +11,6 @@ from bayesplate.cards.setup import edge_letters
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
 from bayesplate.plate.board import Board
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
 
@@ -71,7 +70,7 @@ def common_residuals(summaries: Mapping[str, Summary], boards: Mapping[str, Boar
         and by the letters of the edges where one name stands for several ways to hold a board.
     """
     ways = _ways(summaries, boards)
-    spare = {board: max(len(summary.modes) - N_RIGIDITIES, 0) for board, summary in summaries.items()}
+    spare = {board: max(len(summary.modes) - boards[board].symmetry.n, 0) for board, summary in summaries.items()}
     found: dict[str, dict[str, tuple[float, float]]] = {}
     for board, summary in summaries.items():
         for row in summary.modes:

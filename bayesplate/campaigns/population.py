@@ -188,10 +188,12 @@ def require_moduli(prior: PriorCard, place: str) -> None:
     Raises
     ------
     InputError
-        If the prior card states D_x, D_y, D_s.
+        If the prior card states D_x, D_y, D_s, or E alone.
     """
+    wanted = "a prior card of E_x, E_y, G_xy"
+    if prior.is_of_isotropic:
+        raise InputError(Fault(place, wanted, f"{prior.name}, which states E alone"))
     if set(prior.constants) != set(MODULI):
-        wanted = "a prior card of E_x, E_y, G_xy"
         raise InputError(Fault(place, wanted, f"{prior.name}, one of D_x, D_y, D_s, which go with the thickness"))
 
 

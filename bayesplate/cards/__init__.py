@@ -1,13 +1,13 @@
 """Cards: boards, priors and coefficient tables in TOML, read into frozen models with every fault named at once."""
 
 from bayesplate.cards.board import (
-    DEFAULT_POISSON,
     BoardCard,
     MaterialSection,
     PlateSection,
     load_board,
     load_board_in,
     read_board_text,
+    usual_poisson,
 )
 from bayesplate.cards.campaign import CampaignCard, SharedSection, is_campaign, load_campaign
 from bayesplate.cards.coefficients import CoefficientCard, load_coefficients
@@ -33,7 +33,6 @@ from bayesplate.cards.words import EDGE_NAMES, EDGE_WORDS, EFFECT_NAMES
 from bayesplate.errors import plain
 
 __all__ = [
-    "DEFAULT_POISSON",
     "EDGE_NAMES",
     "EDGE_WORDS",
     "EFFECT_NAMES",
@@ -73,4 +72,5 @@ __all__ = [
     "readings_sha256",
     "remarks",
     "too_heavy",
+    "usual_poisson",
 ]

@@ -29,6 +29,7 @@ from bayesplate.cards.values import (
     read_list,
     read_name,
     read_reference,
+    read_switch,
     read_table,
     read_text,
 )
@@ -38,7 +39,11 @@ from bayesplate.quantities import Quantity
 
 DEFAULT_PRIOR = "weakly-informative"
 DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
+ISOTROPIC_POISSON = Quantity.from_mean(0.3, 0.06, "normal")
+"""Of an isotropic board: foams and glass lie near 0.2, most metals near 0.3, acrylic near 0.37."""
 LARGEST_POISSON = 1.5
+ISOTROPIC_RANGE = (-1.0, 0.5)
+"""Between which the Poisson ratio of a solid that is alike in all directions lies."""
 MOST_SETUPS = 20
 EffectNames = Annotated[tuple[str, ...], PlainValidator(read_effects)]
 """Effects that a card declares."""
@@ -82,19 +87,33 @@ class PlateSection(Section):
 
 
 class MaterialSection(Section):
-    """What is known of the material: nu_xy, thick-plate shear moduli in GPa, and the prior card of the constants."""
+    """What is known of the material: nu_xy, thick-plate shear moduli in GPa, and the prior card of the constants.
+
+    An isotropic one has E_y = E_x, and G_xy = E_x / (2 (1 + nu_xy)).
+    """
 
     poisson_xy: Annotated[
         Quantity, PlainValidator(QuantityReader(Number(-LARGEST_POISSON, LARGEST_POISSON), "normal"))
     ] = DEFAULT_POISSON
     shear_xz_gpa: Annotated[Quantity | None, PlainValidator(_SHEAR)] = None
     shear_yz_gpa: Annotated[Quantity | None, PlainValidator(_SHEAR)] = None
+    isotropic: Annotated[bool, PlainValidator(read_switch)] = False
     prior: Annotated[str, PlainValidator(read_reference)] = DEFAULT_PRIOR
 
     @property
     def poisson_is_default(self) -> bool:
         """Whether the card gives no Poisson ratio, so that the default stands in its place."""
         return "poisson_xy" not in self.model_fields_set
+
+    @property
+    def usual_poisson(self) -> Quantity:
+        """The Poisson ratio that stands where neither the card nor its prior gives one."""
+        return usual_poisson(self.isotropic)
+
+
+def usual_poisson(is_isotropic: bool) -> Quantity:
+    """The Poisson ratio of a board of which nothing is known: of wood, or of an isotropic material."""
+    return ISOTROPIC_POISSON if is_isotropic else DEFAULT_POISSON
 
 
 def _as_list(value: object) -> list[Any]:

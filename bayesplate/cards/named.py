@@ -75,8 +75,12 @@ def load_named(
     """
     file, beside = card.file, card.folder
     faults: list[Fault] = []
+    where = f"{file} [material] prior"
     if prior is None:
-        prior = _read(load_prior, card.material.prior, beside, f"{file} [material] prior", faults)
+        prior = _read(load_prior, card.material.prior, beside, where, faults)
+    if prior is not None:
+        name, prior = prior.name, prior.for_board(card.material.isotropic)
+        faults += [] if prior is not None else [_of_another_symmetry(where, name, card.material.isotropic)]
     if tables is not None:
         return NamedCards(prior, tables, tuple(faults))
     found: dict[str, CoefficientCard] = {}
@@ -86,6 +90,14 @@ def load_named(
             table = _read(load_coefficients, setup.published_coefficients, beside, place, faults)
             found |= {} if table is None else {setup.name: table}
     return NamedCards(prior, found, tuple(faults))
+
+
+def _of_another_symmetry(place: str, name: str, is_isotropic: bool) -> Fault:
+    """That a prior card does not state what the board has: one modulus, or three."""
+    if not is_isotropic:
+        return Fault(place, "a prior of three constants", f"{name}, which states E alone", "or isotropic = true?")
+    remedy = "weakly-informative states one, or a card of your own with [E]"
+    return Fault(place, "a prior of E, because isotropic = true", f"{name}, which states none", remedy)
 
 
 def _read(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 
-from bayesplate.cards.board import BoardCard
+from bayesplate.cards.board import ISOTROPIC_RANGE, BoardCard
 from bayesplate.cards.setup import SetupSection
 from bayesplate.cards.words import setup_places
 from bayesplate.errors import Fault
@@ -32,7 +32,7 @@ def physical_faults(card: BoardCard) -> list[Fault]:
         no mode of the board has where modes are computed, effects that cannot act where effects are known, not here.
     """
     file = card.file
-    faults = [*_plate_faults(card, file)]
+    faults = [*_plate_faults(card, file), *_isotropic_faults(card, file)]
     for setup, where in zip(card.setups, setup_places(file, [setup.name for setup in card.setups]), strict=True):
         faults += [
             *_clamp_faults(card, setup, where),
@@ -91,6 +91,15 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
                 if not 0 <= value <= limits[axis]:
                     wanted = f"a place on the board, 0 to {limits[axis]:g} mm"
                     yield Fault(f"{file} [plate] {key}.{axis} {number}", wanted, f"{value:g} mm")
+
+
+def _isotropic_faults(card: BoardCard, file: str) -> Iterator[Fault]:
+    """A Poisson ratio that no isotropic solid has; an orthotropic plate may have a larger one."""
+    nu, (low, high) = card.material.poisson_xy, ISOTROPIC_RANGE
+    if card.material.isotropic and not card.material.poisson_is_default and not low < nu.mean <= high:
+        wanted = f"more than {low:g} and at most {high:g} where isotropic = true"
+        remedy = "the ratio of an isotropic material, or isotropic = false"
+        yield Fault(f"{file} [material] poisson_xy", wanted, f"{nu.mean:g}", remedy)
 
 
 def _in_other_units(mass: float, density: float) -> Iterator[str]:

@@ -24,6 +24,11 @@ from bayesplate.quantities import Quantity
 
 ELASTIC = ("E_x", "E_y", "G_xy")
 RIGIDITY = ("D_x", "D_y", "D_s")
+OF_ISOTROPIC = "E"
+"""The one modulus of an isotropic board, stated beside the three or alone."""
+
+
+_CONSTANTS = (*ELASTIC, *RIGIDITY, OF_ISOTROPIC)
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,10 @@ _DENSITY = QuantityReader(DENSITY)
 
 
 class PriorCard(Section):
-    """Priors of E_x, E_y, G_xy or of D_x, D_y, D_s, and optionally the noise and nu_xy. `load_prior` makes one."""
+    """Priors of E_x, E_y, G_xy or of D_x, D_y, D_s, of E for isotropic boards, and optionally the noise and nu_xy.
+
+    `load_prior` makes one.
+    """
 
     format: Annotated[Literal[1], PlainValidator(read_format)] = Field(description="1")
     name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
@@ -96,6 +104,7 @@ class PriorCard(Section):
     D_x: _Rigidity = None
     D_y: _Rigidity = None
     D_s: _Rigidity = None
+    E: _Elastic = None
     stated_noise: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, read_noise))] = Field(
         default=None, alias="noise_percent"
     )
@@ -124,7 +133,8 @@ class PriorCard(Section):
         ----------
         name : str
         constants : dict of Quantity
-            E_x, E_y, G_xy in Pa, or D_x, D_y, D_s in N m; each from `Quantity.from_median` or `Quantity.from_range`.
+            E_x, E_y, G_xy in Pa, or D_x, D_y, D_s in N m, and E in Pa of isotropic boards, beside them or alone; each
+            from `Quantity.from_median` or `Quantity.from_range`.
         source : str or dict of str
             Where the numbers come from: one text, or one for each of them (also noise, poisson_xy, density_kg_m3).
         noise : Quantity, optional
@@ -156,8 +166,8 @@ class PriorCard(Section):
             raise InputError(faults)
         if not isinstance(source, str):  # as `sources` has it, for a prior that is made of another one
             source = {"noise" if key == "noise_percent" else key: one for key, one in source.items()}
-        faults = [Fault(f"{name} {key}", "one of E_x, E_y, G_xy, D_x, D_y, D_s", "an unknown name")
-                  for key in constants if key not in (*ELASTIC, *RIGIDITY)]  # fmt: skip
+        faults = [Fault(f"{name} {key}", f"one of {', '.join(_CONSTANTS)}", "an unknown name")
+                  for key in constants if key not in _CONSTANTS]  # fmt: skip
         known = "Quantity.from_median or Quantity.from_range, a constant known to some extent"
         for key, quantity, kinds, wanted in (
             *((key, one, ("log-normal", "log-uniform"), known) for key, one in constants.items()),
@@ -212,8 +222,23 @@ class PriorCard(Section):
 
     @property
     def stated_constants(self) -> dict[str, StatedPrior]:
-        """Name of the constant to its prior and source: all of E_x, E_y, G_xy or all of D_x, D_y, D_s."""
-        return {name: stated for name in (*ELASTIC, *RIGIDITY) if (stated := getattr(self, name)) is not None}
+        """Name of the constant to its prior and source: all of E_x, E_y, G_xy or all of D_x, D_y, D_s.
+
+        Of a prior of isotropic boards alone E_x, which is their E.
+        """
+        found = {name: stated for name in (*ELASTIC, *RIGIDITY) if (stated := getattr(self, name)) is not None}
+        return found if found or self.E is None else {"E_x": self.E}
+
+    @property
+    def is_of_isotropic(self) -> bool:
+        """Whether it is a prior of isotropic boards alone, which states E and nothing else of the constants."""
+        return self.E is not None and not any(getattr(self, name) for name in (*ELASTIC, *RIGIDITY))
+
+    def for_board(self, is_isotropic: bool) -> PriorCard | None:
+        """The prior as a board takes it: of E alone where that is isotropic; None where it states no such constants."""
+        if not is_isotropic:
+            return None if self.is_of_isotropic else self
+        return None if self.E is None else self.model_copy(update=dict.fromkeys((*ELASTIC, *RIGIDITY)))
 
     @property
     def constants(self) -> dict[str, Quantity]:
@@ -289,7 +314,7 @@ def _source_faults(name: str, source: str | Mapping[str, str], stated: Collectio
         if not source.strip():
             yield Fault(f"{name} source", wanted, "an empty text")
         return
-    known = (*ELASTIC, *RIGIDITY, "noise", "poisson_xy", "density_kg_m3")
+    known = (*_CONSTANTS, "noise", "poisson_xy", "density_kg_m3")
     for key in source:
         if key not in known:
             yield Fault(f"{name} source {key}", f"one of {', '.join(known)}", str(key), did_you_mean(str(key), known))
@@ -299,9 +324,9 @@ def _source_faults(name: str, source: str | Mapping[str, str], stated: Collectio
 
 
 def _set_faults(table: Mapping[str, Any], file: str) -> list[Fault]:
-    """Three priors that belong together, no mixture and no gap."""
+    """Three priors that belong together, no mixture and no gap; or that of an isotropic board alone."""
     given = [name for name in (*ELASTIC, *RIGIDITY) if name in table]
-    if tuple(given) in (ELASTIC, RIGIDITY):
+    if tuple(given) in (ELASTIC, RIGIDITY) or (not given and OF_ISOTROPIC in table):
         return []
     wanted = f"all of {', '.join(ELASTIC)} or all of {', '.join(RIGIDITY)}"
     return [Fault(file, wanted, ", ".join(given) or "none of them")]

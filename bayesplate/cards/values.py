@@ -188,6 +188,13 @@ def read_reference(value: object) -> str:
     return read_name(value)
 
 
+def read_switch(value: object) -> bool:
+    """Read true or false."""
+    if not isinstance(value, bool):
+        raise Refusal(Complaint("true or false", shown(value)))
+    return value
+
+
 def read_text(value: object) -> str:
     """A text for people: any writing, no control characters."""
     if not isinstance(value, str):

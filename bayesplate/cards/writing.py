@@ -36,7 +36,8 @@ def prior_text(prior: PriorCard) -> str:
         In card format 1.
     """
     lines = ["format = 1", f"name = {text(prior.name)}", *([f"title = {text(prior.title)}"] if prior.title else [])]
-    for name, stated in prior.stated_constants.items():
+    constants = {} if prior.is_of_isotropic else prior.stated_constants
+    for name, stated in (constants | ({} if prior.E is None else {"E": prior.E})).items():
         unit, scale = ("gpa", 1e9) if name[0] in "EG" else ("n_m", 1.0)
         lines += ["", f"[{name}]", *_density(stated.quantity, unit, scale), f"source = {text(stated.source)}"]
     if prior.stated_noise is not None:

@@ -61,8 +61,15 @@ class GrainAngle(Effect):
         return cls()
 
     @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """Only wood has a grain, and fibres a direction."""
+        return "the board is isotropic: turned by any angle it is the same" if board.isotropic else ""
+
+    @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[GrainAngle, ...]:
         """Both signs where they are two boards, in one setup at least."""
+        if cls.refusal(board, setup):
+            return ()
         return tuple(cls(sign=sign) for sign in ((1, -1) if _signs_differ(board) else (0,)))
 
     @property

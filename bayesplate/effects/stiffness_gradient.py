@@ -10,6 +10,8 @@ from bayesplate.effects.base import Variation
 from bayesplate.effects.gradients import GradientAlongX
 from bayesplate.effects.part import growing_along_x
 from bayesplate.modes.fields import Group
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 
@@ -27,6 +29,11 @@ class StiffnessGradient(GradientAlongX):
     sentence: ClassVar[str] = "The wood is stiffer towards one end, so modes that bend it there ring higher."
     default: ClassVar[Quantity] = Quantity.from_mean(0.0, 0.08, "normal")
     source: ClassVar[str] = "normal: E_x varies by some per cent along one plank; a board is not stiffer at a known end"
+
+    @classmethod
+    def refusal(cls, board: Board, setup: Setup) -> str:
+        """E_x alone grows, which then is no longer E_y."""
+        return "the board is isotropic: it cannot be stiffer along x alone" if board.isotropic else ""
 
     def variations(self) -> Mapping[Group, tuple[Variation, ...]]:
         """E_x that grows along x."""

@@ -27,12 +27,12 @@ class TransverseShear(Effect):
 
     Attributes
     ----------
-    xz, yz : Quantity, Pa
-        Transverse shear moduli.
+    xz, yz : Quantity or None, Pa
+        Transverse shear moduli; None where the material is alike in all directions, so that they are G_xy itself.
     """
 
-    xz: Quantity = DEFAULT_XZ
-    yz: Quantity = DEFAULT_YZ
+    xz: Quantity | None = DEFAULT_XZ
+    yz: Quantity | None = DEFAULT_YZ
 
     name: ClassVar[str] = "transverse_shear"
     scope: ClassVar[Scope] = "board"
@@ -56,16 +56,20 @@ class TransverseShear(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> TransverseShear:
         """The effect with the card's thick-plate constants where it gives them."""
+        if board.isotropic:
+            return cls(xz=board.shear_xz, yz=board.shear_yz)
         return cls(xz=board.shear_xz or DEFAULT_XZ, yz=board.shear_yz or DEFAULT_YZ)
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """G_xz and G_yz; a plate stiffer than any solid does not give way in shear."""
+        """G_xz and G_yz, where they are not G_xy; a plate stiffer than any solid does not give way in shear."""
         given = (("G_xz", self.xz, DEFAULT_XZ), ("G_yz", self.yz, DEFAULT_YZ))
         return tuple(
             self.parameter(key, prior, "Pa", _RIGID, _SOURCE if prior is default else "")
             for key, prior, default in given
+            if prior is not None
         )
 
     def adjusted(self, values: Values) -> Values:
-        """The values with the two moduli under the names that the shear-flexible plate knows."""
-        return {**values, **{key: self.value(values, key) for key in ("G_xz", "G_yz")}}
+        """The values with the moduli that are not G_xy under the names that the shear-flexible plate knows."""
+        given = (key for key, one in (("G_xz", self.xz), ("G_yz", self.yz)) if one is not None)
+        return {**values, **{key: self.value(values, key) for key in given}}

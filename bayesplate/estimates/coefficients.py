@@ -15,6 +15,7 @@ from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.shear_terms import shear_moduli
 from bayesplate.labels import Label
 from bayesplate.modes.naming import find
 from bayesplate.modes.plate import Beams
@@ -148,7 +149,8 @@ def _centre_of_training(model: SetupModel, values: Values) -> tuple[TrainingCons
     Its Poisson ratio and shear moduli are the board's own: the coefficients go with them, and so do the moduli.
     """
     there = model.system.adjusted(values)
-    shear = {name: float(there[name]) for name in ("G_xz", "G_yz") if model.system.theory == "shear-flexible"}
+    moduli_of_shear = zip(("G_xz", "G_yz"), shear_moduli(there), strict=True)
+    shear = {name: float(one) for name, one in moduli_of_shear if model.system.theory == "shear-flexible"}
     E_x, E_y, G_xy = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     own = TrainingConstants(float(E_x), float(E_y), float(G_xy), float(values["poisson_xy"]), **shear)
     table = model.setup.published_coefficients

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bayesplate.effects.words import joined
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.plate.board import Board
-from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.material import ORTHOTROPIC, Symmetry
 
 WITHIN_A_FACTOR = 2.0
 """A constant is identifiable if its 95 % interval at the expected noise stays within this factor of the estimate."""
@@ -20,47 +20,63 @@ HIGH_LEVERAGE = 0.9
 LOW_SHARE_PERCENT = 60.0
 _HELD = {"clamped", "supported"}
 """Edges that do not move: where all are, the integral of w_xx w_yy is that of w_xy^2."""
-_MODULUS = {"D_x": "E_x", "D_y": "E_y", "D_s": "G_xy"}
 _HELP = {
     "D_x": "a mode that bends along the grain",
     "D_y": "a mode that bends across the grain",
     "D_s": "a mode that twists",
+    "D": "any mode",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """How well n readings determine the three constants, to first order at the estimate.
+    """How well n readings determine the constants of a board, to first order at the estimate.
 
     Attributes
     ----------
     condition_number : float
         Of the weighted sensitivities d ln f / d ln D: dimensionless, free of the units of the constants.
-    covariance : (3, 3) array
-        Of ln D_x, ln D_y, ln D_s at the expected noise.
+    covariance : (n_constants, n_constants) array
+        Of the logarithms of the free rigidities, D_x, D_y, D_s unless the board is isotropic, at the expected noise.
     leverages : (n_modes,) array
-        Share of each reading in its own prediction, 0 to 1; they sum to 3.
+        Share of each reading in its own prediction, 0 to 1; they sum to the number of constants.
     shares : (n_modes, 3) array
-        Share of each constant in each mode's energy; rows sum to 1.
+        Share of D_x, D_y and D_s in each mode's energy; rows sum to 1.
+    symmetry : Symmetry
+        Of the board: which rigidities are free.
     """
 
     condition_number: float
     covariance: NDArray[np.float64]
     leverages: NDArray[np.float64]
     shares: NDArray[np.float64]
+    symmetry: Symmetry = ORTHOTROPIC
 
     @property
     def standard_errors(self) -> NDArray[np.float64]:
-        """Of the logarithms of D_x, D_y, D_s: (3,) array."""
+        """Of the logarithms of the free rigidities: (n_constants,) array."""
         return np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def of_rigidities(self) -> NDArray[np.float64]:
+        """Covariance of ln D_x, ln D_y, ln D_s: (3, 3) array, of rank one where they follow one of them."""
+        follows = list(self.symmetry.follows)
+        return np.asarray(self.covariance[np.ix_(follows, follows)])
+
+    @property
+    def errors_of_rigidities(self) -> NDArray[np.float64]:
+        """Of the logarithms of D_x, D_y, D_s: (3,) array."""
+        return np.sqrt(np.diagonal(self.of_rigidities))
 
     def blind(self) -> tuple[str, ...]:
         """Constants that the readings do not determine within the factor `WITHIN_A_FACTOR`."""
         limit = np.log(WITHIN_A_FACTOR) / 1.96
-        return tuple(n for n, error in zip(RIGIDITIES, self.standard_errors, strict=True) if not error <= limit)
+        return tuple(n for n, error in zip(self.symmetry.free, self.standard_errors, strict=True) if not error <= limit)
 
 
-def identifiability(sensitivities: NDArray[np.float64], scales: NDArray[np.float64]) -> Identifiability:
+def identifiability(
+    sensitivities: NDArray[np.float64], scales: NDArray[np.float64], symmetry: Symmetry = ORTHOTROPIC
+) -> Identifiability:
     """First-order identifiability from sensitivities and the relative uncertainties of the readings.
 
     Parameters
@@ -69,24 +85,28 @@ def identifiability(sensitivities: NDArray[np.float64], scales: NDArray[np.float
         d ln f / d ln D.
     scales : (n_modes,) array
         Relative uncertainty of each reading.
+    symmetry : Symmetry
+        Of the board.
 
     Returns
     -------
     Identifiability
         With infinite variances where the readings leave a direction open.
     """
-    weighted = sensitivities / scales[:, None]
+    n = symmetry.n
+    weighted = symmetry.along(sensitivities) / scales[:, None]
     left, singular, right = np.linalg.svd(weighted, full_matrices=False)
     seen = singular > 1e-10 * singular[0]
     with np.errstate(divide="ignore"):
-        inverse = np.where(seen, 1.0 / singular, np.inf) if seen.sum() == 3 else np.full(3, np.inf)
-    covariance = (right.T * inverse**2) @ right if np.isfinite(inverse).all() else np.diag(np.full(3, np.inf))
-    condition = float(singular[0] / singular[-1]) if seen.sum() == 3 else float("inf")
-    return Identifiability(condition, covariance, np.sum(left[:, seen] ** 2, axis=1), 2.0 * sensitivities)
+        inverse = np.where(seen, 1.0 / singular, np.inf) if seen.sum() == n else np.full(n, np.inf)
+    covariance = (right.T * inverse**2) @ right if np.isfinite(inverse).all() else np.diag(np.full(n, np.inf))
+    condition = float(singular[0] / singular[-1]) if seen.sum() == n else float("inf")
+    leverages = np.sum(left[:, seen] ** 2, axis=1)
+    return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry)
 
 
 def require_labels(board: Board) -> None:
-    """Refuse a board whose labelled modes are too few for three constants, or a setup without any.
+    """Refuse a board whose labelled modes are too few for its constants, or a setup without any.
 
     Raises
     ------
@@ -101,7 +121,7 @@ def require_labels(board: Board) -> None:
                 f"{board.name}: setup {setup.name!r} has no labelled mode, {peaks}; give at least one label"
             )
     n_modes = sum(len(setup.readings) for setup in board.setups)
-    if n_modes < 3:
+    if n_modes < board.symmetry.n:  # an isotropic board has one constant, and every setup one label
         raise NotIdentifiableError(
             f"{board.name}: {n_modes} labelled mode{'s' * (n_modes != 1)} for three constants D_x, D_y, D_s: at least "
             f"{3 - n_modes} more needed, bending along the grain, across it, and twisting between them"
@@ -121,10 +141,10 @@ def require_identifiable(board: Board, found: Identifiability) -> None:
     with np.errstate(over="ignore"):
         spread = np.exp(1.96 * found.standard_errors)
     parts = []
-    for name, factor in zip(RIGIDITIES, spread, strict=True):
+    for name, modulus, factor in zip(found.symmetry.free, found.symmetry.moduli, spread, strict=True):
         if name in blind:
             reach = f"only within a factor {factor:.3g}" if np.isfinite(factor) and factor < 1e6 else "not at all"
-            parts.append(f"{name} (so {_MODULUS[name]}) {reach}; add {_HELP[name]}")
+            parts.append(f"{name} (so {modulus}) {reach}; add {_HELP[name]}")
     raise NotIdentifiableError(
         f"{board.name}: the modes {_modes(board)} determine " + "; ".join(parts) + f" (condition number "
         f"{found.condition_number:.3g})"
@@ -147,10 +167,10 @@ def remarks(board: Board, found: Identifiability) -> tuple[str, ...]:
         for setup in board.setups
         for label in setup.labels
     ]
-    if len(names) == 3:
+    if len(names) == found.symmetry.n:
+        fix = "one mode fixes the one constant" if found.symmetry.is_isotropic else "three modes fix three constants"
         sentences.append(
-            "three modes fix three constants exactly: nothing is left to check the model with, and the noise comes "
-            "from its prior alone"
+            f"{fix} exactly: nothing is left to check the model with, and the noise comes from its prior alone"
         )
     else:
         for name, leverage in zip(names, found.leverages, strict=True):
@@ -161,20 +181,33 @@ def remarks(board: Board, found: Identifiability) -> tuple[str, ...]:
     if all(set(setup.edges.values()) <= _HELD for setup in board.setups):
         for setup in board.setups:
             held = "clamped" if set(setup.edges.values()) == {"clamped"} else "held"
-            sentences.append(
-                f"setup {setup.name} is {held} all round: only D_s + 2 nu_xy D_y is seen, so G_xy depends on nu_xy"
-            )
+            sentences.append(f"setup {setup.name} is {held} all round: {_seen_where_held(found.symmetry)}")
     return tuple(sentences)
 
 
+def _seen_where_held(symmetry: Symmetry) -> str:
+    """What a plate whose edges do not move shows of its constants: the integral of w_xx w_yy is that of w_xy^2."""
+    if symmetry.is_isotropic:
+        return "only D is seen, whatever nu is, so E = 12 (1 - nu^2) D / h^3 depends on nu"
+    return "only D_s + 2 nu_xy D_y is seen, so G_xy depends on nu_xy"
+
+
 def _weakest(found: Identifiability) -> str:
-    errors: Mapping[str, float] = dict(zip(RIGIDITIES, found.standard_errors, strict=True))
+    errors: Mapping[str, float] = dict(zip(found.symmetry.moduli, found.standard_errors, strict=True))
     weakest = max(errors, key=lambda name: errors[name])
-    share, error = 100 * found.shares[:, RIGIDITIES.index(weakest)].max(), 100 * errors[weakest]
+    if found.symmetry.is_isotropic:
+        return f"all modes tell one modulus: the expected noise alone leaves it {_per_cent(errors[weakest])} uncertain"
+    share = 100 * found.shares[:, found.symmetry.moduli.index(weakest)].max()
     sentence = (
-        f"the modes tell {_MODULUS[weakest]} least well: the expected noise alone leaves it "
-        f"{error:.{max(1 - int(np.floor(np.log10(min(error, 10.0)))), 0)}f} % uncertain"
+        f"the modes tell {weakest} least well: the expected noise alone leaves it {_per_cent(errors[weakest])} "
+        "uncertain"
     )
     if share < LOW_SHARE_PERCENT:
         sentence += f", because no mode has more than {share:.0f} % of its energy in it"
     return sentence
+
+
+def _per_cent(error: float) -> str:
+    """A relative error to two digits."""
+    error *= 100
+    return f"{error:.{max(1 - int(np.floor(np.log10(min(error, 10.0)))), 0)}f} %"

@@ -45,6 +45,7 @@ class Estimate:
         One a setup, solved at the estimate, whether the steps settled there or not.
     sensitivities : (n_modes, 3) array
         d ln f / d ln D of all readings, setup after setup.
+        Of an isotropic board too, whose own fit moves along their sum: `Symmetry.along`.
     residuals : (n_modes,) array
         ln measured - ln predicted.
     scales : (n_modes,) array
@@ -96,16 +97,18 @@ def weighted_least_squares(
         `converged` is False where the steps did not settle. Where they go round, as at a veering whose names swap back
         and forth, it is the best of the round. A direction that the readings do not determine keeps its starting value.
     """
-    inputs = board.nominal()
+    inputs, symmetry = board.nominal(), board.symmetry
+    nu_xy = inputs["poisson_xy"]
     systems = [system_of(board, setup) for setup in board.setups]
-    log_next = np.log(starting_rigidities(board) if start is None else start)
+    begin = starting_rigidities(board) if start is None else start
+    log_next = np.log(symmetry.free_of(dict(zip(RIGIDITIES, begin, strict=True))))
     target, scales = log_measured(board), reading_scales(board)
     settled, previous = False, np.inf
     tried: list[Estimate] = []
     before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     for _ in range(most_steps):
-        rigidities = np.exp(log_next)
-        values = inputs | dict(zip(RIGIDITIES, rigidities, strict=True))
+        values = inputs | symmetry.rigidities(np.exp(log_next), nu_xy)
+        rigidities = np.array([float(values[name]) for name in RIGIDITIES])
         models = tuple(setup_model(system, values) for system in systems)
         predicted = np.concatenate([m.log_frequencies(values, "linear")[0] for m in models])
         sensitivities = np.concatenate([m.sensitivities(values) for m in models])
@@ -115,10 +118,13 @@ def weighted_least_squares(
             break
         if of_round := _round(tried):
             return min(of_round, key=lambda one: float(np.sum((one.residuals / scales) ** 2)))
-        wanted = np.linalg.lstsq(sensitivities / scales[:, None], residuals / scales, rcond=1e-8)[0]
+        slopes = symmetry.along(sensitivities)
+        wanted = np.linalg.lstsq(slopes / scales[:, None], residuals / scales, rcond=1e-8)[0]
         step = wanted / (_overshoot(before, wanted) if before and _are_at_same_places(tried[-2:]) else 1.0)
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
-        while not _is_material(log_next + step, inputs) and np.abs(step).max() > _CONVERGED:
+        while np.abs(step).max() > _CONVERGED:
+            if _is_material(symmetry.rigidities(np.exp(log_next + step), nu_xy), inputs):
+                break
             step *= 0.5
         log_next = log_next + step
         before = wanted, step
@@ -153,9 +159,9 @@ def _are_at_same_places(two: Sequence[Estimate]) -> bool:
     return first == second
 
 
-def _is_material(log_rigidities: NDArray[np.float64], inputs: Values) -> bool:
+def _is_material(rigidities: Values, inputs: Values) -> bool:
     """Whether nu_xy nu_yx is below 1: beyond it a plate has no frequencies."""
-    return bool(inputs["poisson_xy"] ** 2 * np.exp(log_rigidities[1] - log_rigidities[0]) < 1.0)
+    return bool(inputs["poisson_xy"] ** 2 * rigidities["D_y"] / rigidities["D_x"] < 1.0)
 
 
 def has_settled(step: float, previous: float, accepted: float = _CONVERGED) -> bool:
@@ -176,13 +182,14 @@ def starting_rigidities(board: Board) -> NDArray[np.float64]:
     from scipy.optimize import nnls
 
     inputs = board.nominal()
-    rows = np.concatenate([_rayleigh_rows(setup, inputs) for setup in board.setups])
+    columns = board.symmetry.columns(inputs["poisson_xy"])
+    rows = np.concatenate([_rayleigh_rows(setup, inputs) for setup in board.setups]) @ columns
     squared = np.exp(2.0 * (log_measured(board) + np.log(2.0 * np.pi)))
     alike = 1.0 / np.mean(rows.sum(axis=1) / squared)
-    weighted = np.concatenate([alike * rows / squared[:, None], _PULL * np.eye(len(RIGIDITIES))])
-    wanted = np.concatenate([np.ones(squared.size), np.full(len(RIGIDITIES), _PULL)])
+    weighted = np.concatenate([alike * rows / squared[:, None], _PULL * np.eye(board.symmetry.n)])
+    wanted = np.concatenate([np.ones(squared.size), np.full(board.symmetry.n, _PULL)])
     constants, _ = nnls(weighted, wanted)
-    return np.asarray(alike * np.maximum(constants, 1e-2 * constants.max()))
+    return np.asarray(columns @ (alike * np.maximum(constants, 1e-2 * constants.max())))
 
 
 def _rayleigh_rows(setup: Setup, inputs: Values) -> NDArray[np.float64]:

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict
+from bayesplate.estimates.refit import Bounds, Misfit, Predict, n_constants
 from bayesplate.estimates.side_by_side import most_likely_of_each
-
-_FEWEST = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +21,8 @@ class Errors:
     in_sample : (n_modes,) array
         Against the fit of all modes.
     left_out : (n_modes,) array
-        Against a refit that has not seen the mode; not a number everywhere if fewer than four modes are given, because
-        then no fold determines three constants.
+        Against a refit that has not seen the mode; not a number everywhere if no more modes are given than constants,
+        because then no fold determines them.
     """
 
     in_sample: NDArray[np.float64]
@@ -56,8 +54,10 @@ def prediction_errors(
     Errors
     """
 
+    n = n_constants(predict)
+
     def best(starts: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(starts[np.nanargmin(squares.sum(axis=1) + np.sum(starts[:, N_CONSTANTS:] ** 2, axis=1))])
+        return np.asarray(starts[np.nanargmin(squares.sum(axis=1) + np.sum(starts[:, n:] ** 2, axis=1))])
 
     def squared(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return misfit(predict(x))[0] ** 2
@@ -67,7 +67,7 @@ def prediction_errors(
     in_sample = np.asarray(target - predict(whole[None, :])[0])
     left_out = np.full(target.size, np.nan)
     modes = [(reading,) for reading in range(target.size)] if modes is None else modes
-    if len(modes) >= _FEWEST:
+    if len(modes) > n:
         starts, squares = (np.concatenate(both) for both in ((starts, whole[None]), (squares, squared(whole[None]))))
         without = np.stack([best(starts, np.delete(squares, list(mode), axis=1)) for mode in modes])
         fitted = most_likely_of_each(predict, misfit, without, modes, bounds)

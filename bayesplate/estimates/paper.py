@@ -46,13 +46,16 @@ class PaperSystem:
         Returns
         -------
         (..., 3) array
-            The shortest solution where a subset leaves something open.
+            The shortest solution where a subset leaves something open; not a number where it has fewer modes than
+            three, as an isotropic board may.
 
         References
         ----------
         Ducceschi et al., eq. (13).
         """
         coefficients, psi = self.coefficients[rows], self.psi[rows]
+        if psi.shape[-1] < coefficients.shape[-1]:
+            return np.full((*psi.shape[:-1], coefficients.shape[-1]), np.nan)
         cutoff = np.finfo(np.float64).eps * max(coefficients.shape[-2:])
         return np.asarray((np.linalg.pinv(coefficients, cutoff) @ psi[..., None])[..., 0])
 

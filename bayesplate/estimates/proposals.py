@@ -246,7 +246,8 @@ def _log_weight(board: Board, estimate: Estimate, labels: Assignment, modes: Nam
     setup = board.setups[0]
     levels = setup.noise.median * np.exp(np.maximum(setup.noise.log_sd, 0.5) * _NOISE_SDS)
     variances = np.stack([reading_sd(board.setups, [level]) ** 2 for level in levels])
-    by_noise = log_probability(estimate.residuals, estimate.sensitivities, variances) - 0.5 * _NOISE_SDS**2
+    slopes = board.symmetry.along(estimate.sensitivities)
+    by_noise = log_probability(estimate.residuals, slopes, variances) - 0.5 * _NOISE_SDS**2
     highest = max(np.log(setup.measured))
     below = {label for log, label in modes if log < highest}
     n_missed = len(below - set(labels))

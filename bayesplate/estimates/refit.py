@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
 """From (n_draws, n_free) parameters to (n_draws, n_modes) logarithms of frequencies.
 
-The parameters are ln D_x, ln D_y, ln D_s, and the standard coordinates of the uncertain inputs, each of which counts
-as one more observation: zero with standard deviation one.
+The parameters are the logarithms of the free rigidities, D_x, D_y, D_s unless a Predictor says otherwise, and the
+standard coordinates of the uncertain inputs, each of which counts as one more observation: zero with standard deviation
+one.
 """
 Misfit = Callable[[Floats], tuple[Floats, Floats]]
 """From (..., n_modes) logarithms of frequencies to what is squared and summed over the readings, and its derivatives.
@@ -24,8 +26,12 @@ Misfit = Callable[[Floats], tuple[Floats, Floats]]
 Half the sum is the negative log likelihood of the readings but for a constant.
 """
 
-N_CONSTANTS = 3
 _STEP = 1e-5
+
+
+def n_constants(predict: Predict) -> int:
+    """How many of the parameters are logarithms of free rigidities, which have no priors in a fit."""
+    return predict.n_constants if isinstance(predict, Predictor) else len(RIGIDITIES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,15 +113,17 @@ def most_likely(
     """
     from scipy.optimize import least_squares
 
+    n = n_constants(predict)
+
     def without(rows: Floats) -> Floats:
         return np.delete(rows, left_out, axis=0) if len(left_out) else rows
 
     def residuals(x: Floats) -> Floats:
-        return np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[N_CONSTANTS:]])
+        return np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[n:]])
 
     def jacobian(x: Floats) -> Floats:
         chained = misfit(predict(x[None, :])[0])[1][:, None] * sensitivities(predict, x)
-        return np.concatenate([without(chained), np.eye(x.size)[N_CONSTANTS:]])
+        return np.concatenate([without(chained), np.eye(x.size)[n:]])
 
     if bounds is None or bounds.are_open:
         return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-10, ftol=1e-10).x)
@@ -125,7 +133,8 @@ def most_likely(
 
 def design(predict: Predict, scales: Floats, at: Floats) -> Floats:
     """Weighted sensitivities of all observations at a point: (n_modes + n_inputs, n_free) array."""
-    return np.concatenate([sensitivities(predict, at) / scales[:, None], np.eye(at.size)[N_CONSTANTS:]])
+    own = np.eye(at.size)[n_constants(predict) :]
+    return np.concatenate([sensitivities(predict, at) / scales[:, None], own])
 
 
 def sensitivities(predict: Predict, at: Floats) -> Floats:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Floats, Misfit, Predict, most_likely
+from bayesplate.estimates.refit import Bounds, Floats, Misfit, Predict, most_likely, n_constants
 from bayesplate.modes.threads import in_threads
 
 _MOST_STEPS = 15
@@ -121,7 +121,7 @@ class _Problems:
 
     def place(self, problems: NDArray[np.intp], x: Floats) -> _Place:
         """Some of the problems at (n, n_free) points."""
-        is_input = (np.arange(x.shape[1]) >= N_CONSTANTS).astype(np.float64)
+        is_input = (np.arange(x.shape[1]) >= n_constants(self.predict)).astype(np.float64)
         ends = _FIRST * np.concatenate([np.zeros((1, x.shape[1])), np.eye(x.shape[1]), -np.eye(x.shape[1])])
         middle, above, below = np.split(_around(self.predict, x, ends), [1, 1 + x.shape[1]], axis=1)
         log_f, slopes = middle[:, 0], (above - below) / (2.0 * _FIRST)

@@ -69,8 +69,8 @@ class Guess:
     ----------
     values : dict of float
         Rigidities at its middle (N m), and the nominal inputs.
-    log_rigidities : (n_draws, 3) array
-        ln D of draws from it.
+    log_rigidities : (n_draws, n_constants) array
+        ln of the free rigidities of draws from it.
     noise : float
         Relative, at which the peaks may be taken for modes there.
     """

@@ -27,12 +27,15 @@ class Predictor:
     law : "linear" or "exact"
     rows : (n_modes,) array of int, optional
         Which of all modes that the models have; by default all of them.
+    n_constants : int
+        How many of the parameters, the first ones, are logarithms of free rigidities: all others have priors.
     """
 
     values: Callable[[Floats], Values]
     models: Sequence[SetupModel]
     law: LawName
     rows: NDArray[np.intp] | None = None
+    n_constants: int = 3
 
     def __call__(self, x: Floats) -> Floats:
         """From (n, n_free) parameters to (n, n_modes) ln f."""

@@ -12,7 +12,7 @@ from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
 from bayesplate.modes.line import N_BEAMS
 from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
+from bayesplate.plate.material import MODULI, RIGIDITIES, isotropic_moduli, rigidities
 from bayesplate.plate.setup import Setup
 
 WITHIN = (1 / 6, 5 / 6)
@@ -71,8 +71,10 @@ def prior_draws(board: Board, prior: PriorCard, rng: np.random.Generator, n: int
 
 
 def with_rigidities(values: Values) -> dict[str, NDArray[np.float64]]:
-    """The same values with D_x, D_y, D_s, from the moduli where these are given."""
+    """The same values with D_x, D_y, D_s, from the moduli where these are given: all three, or one if isotropic."""
     if set(RIGIDITIES) <= set(values):
         return dict(values)
+    if "E_y" not in values:
+        values = {**values, **isotropic_moduli(values["E_x"], values["poisson_xy"])._asdict()}
     E_x, E_y, G_xy = (values[name] for name in MODULI)
     return {**values, **rigidities(E_x, E_y, G_xy, values["thickness"], values["poisson_xy"])._asdict()}

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import SHEAR_CORRECTION
 from bayesplate.plate.board import Values, density, vibrating_lengths
 from bayesplate.plate.setup import Setup
+
+
+def shear_moduli(values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """G_xz and G_yz, Pa; one that is not there is G_xy, as in a plate that is alike in all directions."""
+    of_plane = 3.0 * values["D_s"] / np.asarray(values["thickness"]) ** 3
+    return np.asarray(values.get("G_xz", of_plane)), np.asarray(values.get("G_yz", of_plane))
 
 
 def shear_term_weights(values: Values, setup: Setup) -> Weights:
@@ -18,6 +25,7 @@ def shear_term_weights(values: Values, setup: Setup) -> Weights:
     ----------
     values : dict of array
         D_x, D_y, D_s (N m), G_xz and G_yz (Pa, positive) and the board's inputs; numbers or (n_draws,) arrays.
+        G_xz and G_yz as of `shear_moduli`.
     setup : Setup
 
     Returns
@@ -32,12 +40,12 @@ def shear_term_weights(values: Values, setup: Setup) -> Weights:
     """
     thin = term_weights(values, setup)
     length_x, length_y = vibrating_lengths(values, setup)
-    thickness = np.asarray(values["thickness"])
+    thickness, (G_xz, G_yz) = np.asarray(values["thickness"]), shear_moduli(values)
     # Board mass and thickness cancel from S_x / m, up to density and the area.
     per_modulus = SHEAR_CORRECTION / density(values)
     columns = (
-        per_modulus * values["G_xz"] / length_x**2,
-        per_modulus * values["G_yz"] / length_y**2,
+        per_modulus * G_xz / length_x**2,
+        per_modulus * G_yz / length_y**2,
         thickness**2 / (12.0 * length_x**2),
         thickness**2 / (12.0 * length_y**2),
     )

@@ -18,7 +18,7 @@ from bayesplate.planning.stations import Station
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
@@ -37,24 +37,25 @@ def prior_beliefs(board: Board, prior: PriorCard, rng: np.random.Generator) -> t
         Deals the levels of the noise.
     """
     values = prior_medians(board, prior)
-    n_inputs = len(Parameters(board).inputs)
-    n_u = N_RIGIDITIES + n_inputs
-    log_rigidities = np.log([float(values[name]) for name in RIGIDITIES])
+    n, n_inputs = board.symmetry.n, len(Parameters(board).inputs)
+    n_u = n + n_inputs
+    log_rigidities = np.log(board.symmetry.free_of(values))
     log_moduli, gradient = moduli_at(board, log_rigidities, n_u)
     names = tuple(prior.constants)
     spread = np.array([prior.constants[name].log_sd for name in names])
     covariance = np.eye(n_u)
-    if set(names) == set(MODULI):
-        order = [names.index(name) for name in MODULI]
-        back = np.linalg.inv(gradient[:, :N_RIGIDITIES])
-        of_inputs = -back @ gradient[:, N_RIGIDITIES:]
-        covariance[:N_RIGIDITIES, N_RIGIDITIES:] = of_inputs
-        covariance[N_RIGIDITIES:, :N_RIGIDITIES] = of_inputs.T
+    if set(names) <= set(MODULI):
+        order = [names.index(name) for name in MODULI if name in names]
+        stated = gradient[[MODULI.index(names[i]) for i in order]]
+        back = np.linalg.inv(stated[:, :n])
+        of_inputs = -back @ stated[:, n:]
+        covariance[:n, n:] = of_inputs
+        covariance[n:, :n] = of_inputs.T
         own = back @ np.diag(spread[order] ** 2) @ back.T
-        covariance[:N_RIGIDITIES, :N_RIGIDITIES] = own + of_inputs @ of_inputs.T
+        covariance[:n, :n] = own + of_inputs @ of_inputs.T
     else:
         order = [names.index(name) for name in RIGIDITIES]
-        covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.diag(spread[order] ** 2)
+        covariance[:n, :n] = np.diag(spread[order] ** 2)
     one = Explanation(
         members=(),
         words=NOTHING_LACKS,
@@ -79,7 +80,7 @@ def prior_laws(
     laws = [bare_law(beliefs.board, station, values)]
     drawn = {name: one.sample(rng, N_PLATES) for name, one in prior.constants.items()}
     for i in range(N_PLATES):
-        plain = {name: value for name, value in values.items() if name not in RIGIDITIES}
+        plain = {name: value for name, value in values.items() if name not in (*MODULI, *RIGIDITIES)}
         there = with_rigidities({**plain, **{name: np.asarray(each[i]) for name, each in drawn.items()}})
         if not all(np.isfinite(there[name]) for name in RIGIDITIES):
             continue

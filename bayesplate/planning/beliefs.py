@@ -4,7 +4,7 @@ Around a cell of an effect's table and at one level of noise everything is linea
 
     y = shift + X x + Z z + S t + noise,
 
-with x the logarithms of D_x, D_y, D_s beyond what the cell has moved them by, z the standard coordinates of the
+with x the logarithms of the free rigidities beyond what the cell has moved them by, z the standard coordinates of the
 uncertain inputs, and t the place within the cell. Given the readings at hand u = (x, z, t) is normal, so that an
 explanation is a mixture of normal terms, each with the weight that its cell and its level have now.
 """
@@ -22,7 +22,7 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.terms import Terms, normalised
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -90,7 +90,7 @@ class Beliefs:
     explanations : tuple of Explanation
         The most probable first.
     n_inputs : int
-        Uncertain inputs: the columns of u after the three constants.
+        Uncertain inputs: the columns of u after the constants.
     """
 
     board: Board
@@ -136,9 +136,10 @@ def _explained(found: Found, answer: Answer, probability: float, rng: np.random.
     noise = terms.noise.sd[levels]
     mean, covariance = _conditioned(terms, seen[0], cells, noise)
     log_moduli, gradient = _moduli(found, mean.shape[1])
+    by_constants = gradient[:, : found.ground.baseline.log_rigidities.size]
     moved, slopes = terms.table.moved[cells], terms.table.moved_slopes[cells]
     to_moduli = np.tile(gradient, (len(cells), 1, 1))
-    to_moduli[:, :, mean.shape[1] - slopes.shape[2] :] = gradient[:, :N_RIGIDITIES] @ slopes
+    to_moduli[:, :, mean.shape[1] - slopes.shape[2] :] = by_constants @ slopes
     words = answer_words(found, answer) if answer.members else NOTHING_LACKS
     return Explanation(
         members=hypothesis.members,
@@ -147,7 +148,7 @@ def _explained(found: Found, answer: Answer, probability: float, rng: np.random.
         mean=mean,
         covariance=covariance,
         noise=noise,
-        log_moduli=log_moduli + moved @ gradient[:, :N_RIGIDITIES].T,
+        log_moduli=log_moduli + moved @ by_constants.T,
         to_moduli=to_moduli,
         cells=cells,
         hypothesis=answer.index,
@@ -169,7 +170,8 @@ def _conditioned(terms: Terms, seen: Floats, cells: Rows, noise: Floats) -> tupl
     variance = noise[:, base.setup_index[used]] ** 2 + base.own_variance[used]
     weighted = design / variance[:, :, None]
     precision = np.swapaxes(weighted, 1, 2) @ design
-    prior = np.r_[np.zeros(N_RIGIDITIES), np.ones(design.shape[2] - N_RIGIDITIES)]
+    n = base.log_rigidities.size
+    prior = np.r_[np.zeros(n), np.ones(design.shape[2] - n)]
     covariance = np.linalg.inv(precision + np.diag(prior))
     told = np.einsum("tnu,tn->tu", weighted, seen[used] - table.shift[cells][:, used])
     return np.einsum("tuv,tv->tu", covariance, told), covariance
@@ -187,15 +189,15 @@ def moduli_at(board: Board, log_rigidities: Floats, n_u: int) -> tuple[Floats, F
     Parameters
     ----------
     board : Board
-    log_rigidities : (3,) array
+    log_rigidities : (n_constants,) array
         Where the slopes are taken, the inputs at the middle of their priors.
     n_u : int
-        Columns of u, at least three and the inputs.
+        Columns of u, at least the constants and the inputs.
     """
     parameters = Parameters(board)
     columns = parameters.fitted_columns
     theta = np.zeros((1 + 2 * columns.size, parameters.n_dim))
-    theta[:, :N_RIGIDITIES] = log_rigidities
+    theta[:, : parameters.n_constants] = log_rigidities
     for i, column in enumerate(columns):
         theta[1 + 2 * i, column] += _STEP
         theta[2 + 2 * i, column] -= _STEP

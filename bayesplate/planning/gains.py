@@ -87,7 +87,8 @@ class Gain:
     constants_error : float
         Standard error of the mean shrinkage of the three intervals, ln.
     information : float
-        Half the log determinant of what the three moduli gain where the explanation is known, nats.
+        Half the log determinant of what the moduli gain where the explanation is known, nats; of an isotropic board
+        of what E gains.
     """
 
     E_x: float
@@ -123,7 +124,7 @@ def expected_gain(beliefs: Beliefs, readings: Readings, rng: np.random.Generator
     -------
     Gain
     """
-    updates = [_Update.of(one, readings, k) for k, one in enumerate(beliefs.explanations)]
+    updates = [_Update.of(one, readings, k, beliefs.board.symmetry.n) for k, one in enumerate(beliefs.explanations)]
     weights = beliefs.probabilities
     within = sum(p * one.after_variance.mean(axis=0) for p, one in zip(weights, updates, strict=True))
     of_terms = sum(p**2 * _variance_of_mean(one.after_variance) for p, one in zip(weights, updates, strict=True))
@@ -184,7 +185,7 @@ class _Update:
     information: Floats
 
     @classmethod
-    def of(cls, one: Explanation, readings: Readings, k: int) -> _Update:
+    def of(cls, one: Explanation, readings: Readings, k: int, n_free: int) -> _Update:
         slopes, variance = readings.slopes[k], readings.variance[k]
         n = variance.shape[1]
         expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, one.mean)
@@ -196,7 +197,8 @@ class _Update:
         pull: Floats = one.to_moduli @ np.swapaxes(along, 1, 2) @ np.swapaxes(whitening, 1, 2)
         before = one.to_moduli @ one.covariance @ np.swapaxes(one.to_moduli, 1, 2)
         after = before - pull @ np.swapaxes(pull, 1, 2)
-        information = np.asarray(0.5 * (np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1]))
+        first = (..., slice(n_free), slice(n_free))  # of an isotropic board the other moduli follow from E_x
+        information = np.asarray(0.5 * (np.linalg.slogdet(before[first])[1] - np.linalg.slogdet(after[first])[1]))
         log_size = np.asarray(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1))
         variances = np.asarray(np.diagonal(after, axis1=1, axis2=2))
         return cls(expected, factor, whitening, log_size, pull, one.expected, variances, information)
@@ -267,5 +269,5 @@ def entropy(probabilities: Floats) -> Floats:
 
 def probabilities_after(beliefs: Beliefs, readings: Readings, read: Floats) -> Floats:
     """Probability of each explanation after some readings: (n_explanations, n_draws) array from (n_draws, n)."""
-    updates = [_Update.of(one, readings, k) for k, one in enumerate(beliefs.explanations)]
+    updates = [_Update.of(one, readings, k, beliefs.board.symmetry.n) for k, one in enumerate(beliefs.explanations)]
     return _of_each(_log_joint(beliefs, updates, read))

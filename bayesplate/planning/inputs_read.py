@@ -15,7 +15,6 @@ from bayesplate.planning.gains import Readings
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.random_field import conditioned, sd_after, thickness_readings, width_readings
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -120,7 +119,7 @@ def _placed(board: Board, parameter: Parameter) -> Iterator[tuple[float, int, st
 
 def input_readings(beliefs: Beliefs, one: Measured) -> Readings:
     """A measurement of an input as one reading of its standard coordinate."""
-    column = N_RIGIDITIES + [p.name for p in beliefs.board.uncertain].index(one.parameter.name)
+    column = beliefs.board.symmetry.n + [p.name for p in beliefs.board.uncertain].index(one.parameter.name)
     shift, slopes, variance = [], [], []
     for explanation in beliefs.explanations:
         n_terms, n_u = explanation.mean.shape

@@ -21,7 +21,7 @@ from bayesplate.plate.board import Board, Values
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share
 from bayesplate.posterior.laplace import noise_widenings
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.target import Posterior
 
 Floats = NDArray[np.float64]
@@ -102,8 +102,8 @@ class BoardInJoint:
     @property
     def precision(self) -> tuple[Floats, Floats, Floats]:
         """What its readings and its own priors say: blocks of own, own with shared, shared."""
-        n_own = self.moduli.shape[1]
-        own = np.diag(np.r_[np.zeros(N_RIGIDITIES), np.ones(n_own - N_RIGIDITIES)])
+        n_own, n = self.moduli.shape[1], self.board.symmetry.n
+        own = np.diag(np.r_[np.zeros(n), np.ones(n_own - n)])
         across, shared = np.zeros((n_own, self.shared[0].shape[1])), np.zeros((self.shared[0].shape[1],) * 2)
         for i in range(len(self.laws)):
             read = self.was_read(i)
@@ -143,7 +143,7 @@ def board_in_joint(
     names, turned = _columns(board, prior, shared, at, noise)
     n_own = len(names)
     theta = parameters.theta(at, noise)
-    to_moduli = moduli_at(board, theta[:N_RIGIDITIES], parameters.fitted_columns.size)[1] @ turned
+    to_moduli = moduli_at(board, theta[: parameters.n_constants], parameters.fitted_columns.size)[1] @ turned
     slopes = [law.slopes @ turned for law in laws]
     return BoardInJoint(
         board=board,
@@ -286,7 +286,9 @@ class Joint:
         inner = rows @ self.covariance @ rows.T + np.diag(variance)
         after = before - across @ np.linalg.solve(inner, across.T)
         left = np.sqrt(np.diagonal(after) / np.diagonal(before))
-        part = slice(0, self.n_shared) if self.n_shared else slice(None)
-        information = 0.5 * (np.linalg.slogdet(before[part, part])[1] - np.linalg.slogdet(after[part, part])[1])
+        # The moduli of an isotropic board follow from its first one.
+        free = [self.n_shared + 3 * i + j for i, one in enumerate(self.boards) for j in range(one.board.symmetry.n)]
+        part = np.ix_(*2 * [list(range(self.n_shared)) or free])
+        information = 0.5 * (np.linalg.slogdet(before[part])[1] - np.linalg.slogdet(after[part])[1])
         moduli = np.exp(np.log(left[self.n_shared :]).reshape(-1, 3).mean(axis=0))
         return left[: self.n_shared], moduli, float(information)

@@ -17,7 +17,6 @@ from bayesplate.planning.station_laws import BareLaw
 from bayesplate.planning.stations import Station
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share, unknown_discrepancies
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -203,7 +202,7 @@ def _of_explanation(one: Explanation, law: BareLaw, found: Found | None, effects
     if found is None or not one.members or found.ground.hypotheses[one.hypothesis].swap is not None:
         return shift, slopes
     table = found.ground.hypotheses[one.hypothesis].table
-    by_constants = law.slopes[:, :N_RIGIDITIES]
+    by_constants = law.slopes[:, : table.moved.shape[1]]
     first = one.mean.shape[1] - table.slopes.shape[2]
     shift[:, :n] += table.moved[one.cells] @ by_constants.T
     slopes[:, :, first:] += by_constants @ table.moved_slopes[one.cells]

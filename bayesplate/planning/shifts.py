@@ -19,7 +19,6 @@ from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.diagnosis.shifts.tables import Table
 from bayesplate.modes.threads import in_threads
 from bayesplate.planning.station_laws import BareLaw, SolvedStation
-from bayesplate.plate.material import RIGIDITIES
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -173,12 +172,11 @@ def _beside(found: Found, table: Table, form: Form, cell: int, law: BareLaw) -> 
     baseline = found.ground.baseline
     sizes = {free.name: np.asarray(free.prior.value(table.z[cell, j])) for j, free in enumerate(form.free)}
     exact = {name: np.asarray(q.mean) for name, q in form.board.inputs.items() if q.is_exact}
+    known = {**exact, **baseline.values, **sizes}
     constants = (np.exp(baseline.log_rigidities + moved) for moved in (table.moved[cell], 0.0))
-    there, meshed = (
-        {**exact, **baseline.values, **sizes, **dict(zip(RIGIDITIES, each, strict=True))} for each in constants
-    )
+    there, meshed = ({**known, **baseline.board.symmetry.rigidities(each, known["poisson_xy"])} for each in constants)
     shift = SolvedStation.of(law.station, form.board, there, meshed).bare_and_added - law.solved
-    shift[0] -= law.slopes[:, : len(RIGIDITIES)] @ table.moved[cell]
+    shift[0] -= law.slopes[:, : table.moved.shape[1]] @ table.moved[cell]
     shift[:, np.abs(shift[0]) > _TOO_FAR] = np.nan
     return np.asarray(shift.ravel())
 

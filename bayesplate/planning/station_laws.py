@@ -17,7 +17,7 @@ from bayesplate.modes.solve import Modes
 from bayesplate.planning.stations import SEARCHED, Station
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.sessions import under_prior_scales
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
@@ -149,8 +149,8 @@ class BareLaw:
         Of `SolvedStation.bare_and_added`, at the estimate.
     middle : (n_modes,) array
         ln f (Hz) with the inputs at the middle of their priors.
-    slopes : (n_modes, 3 + n_inputs) array
-        By ln D_x, ln D_y, ln D_s and the inputs' standard coordinates.
+    slopes : (n_modes, n_constants + n_inputs) array
+        By the logarithms of the free rigidities and the inputs' standard coordinates.
     off_place : (n_spots, n_modes) array
         Of `SolvedStation`, at the estimate.
     """
@@ -178,6 +178,7 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
         If one of its modes is no mode of the plate.
     """
     parameters = Parameters(board)
+    n = parameters.n_constants
     centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
     system = station.system(board)
     model = setup_model(system, station.values(system, values))
@@ -192,6 +193,6 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
     found = SolvedStation.of(station, board, values)
     solved = found.bare_and_added
     there = solved[0] + model.discrepancies(at(start[None, :]))[0]
-    of_inputs, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], start[N_RIGIDITIES:])
-    every = np.concatenate([slopes[:, :N_RIGIDITIES], of_inputs], axis=1)
+    of_inputs, inputs = under_prior_scales(board, values, slopes[:, n:], start[n:])
+    every = np.concatenate([slopes[:, :n], of_inputs], axis=1)
     return BareLaw(station, solved, there - of_inputs @ inputs, every, found.off_place)

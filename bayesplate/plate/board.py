@@ -12,11 +12,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.cards import DEFAULT_POISSON, PriorCard, load_prior
+from bayesplate.cards import PriorCard, load_prior, usual_poisson
 from bayesplate.cards.stated import are, quantity_of, wrong_types
 from bayesplate.cards.words import did_you_mean, effect_named
 from bayesplate.cards.writing import write_card
 from bayesplate.errors import Fault, InputError
+from bayesplate.plate.material import ISOTROPIC, ORTHOTROPIC, Symmetry
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
 from bayesplate.plate.setup import Setup
@@ -68,6 +69,8 @@ class Board:
         What a straightedge tells of a board that is not flat, as far as it was stated: "cup", the rise across the
         width; "bow", that along the length, negative on a saddle; "twist", a corner's lift off a table that the other
         three touch.
+    isotropic : bool
+        One modulus in all directions: E_y = E_x = E and G_xy = E / (2 (1 + nu)), nu the input poisson_xy.
     notes : tuple of str
         What was assumed because the card does not say it.
     """
@@ -84,10 +87,16 @@ class Board:
     shear_xz: Quantity | None = None
     shear_yz: Quantity | None = None
     warp: Mapping[str, Quantity] = field(default_factory=dict)
+    isotropic: bool = False
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(map(effect_named, self.effects)))
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Which of its rigidities are free."""
+        return ISOTROPIC if self.isotropic else ORTHOTROPIC
 
     @cached_property
     def inputs(self) -> Mapping[str, Quantity]:
@@ -168,6 +177,7 @@ class Board:
         shear_xz: Quantity | ArrayLike | None = None,
         shear_yz: Quantity | ArrayLike | None = None,
         warp: Mapping[str, Quantity | ArrayLike] | None = None,
+        isotropic: bool = False,
         title: str = "",
         source: str = "",
     ) -> Board:
@@ -185,7 +195,8 @@ class Board:
             Or the density; exactly one of the two.
         density : Quantity, number or array of readings, kg m^-3
         poisson_xy : Quantity, number or array of readings
-            By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08.
+            By default that of the prior that the board is used with, where it states one, else 0.4 ± 0.08, or
+            0.3 ± 0.06 where the board is isotropic.
         prior : str, path or PriorCard
             Name of a shipped prior card, a path, or the card itself; a card that is not on the shelf is given again to
             what uses the board: `Problem.from_card(board, prior=prior)`. What is not stated of noise and Poisson ratio
@@ -195,6 +206,8 @@ class Board:
         shear_xz, shear_yz : Quantity, number or array of readings, Pa
         warp : dict of Quantity, number or array of readings, m
             "cup", "bow" and "twist", as far as they were read with a straightedge; a quantity is a normal one.
+        isotropic : bool
+            One modulus in all directions, as of metal, glass, foam or MDF; then the prior is its density of E.
         title, source : str
 
         Returns
@@ -221,6 +234,7 @@ class Board:
             ("setups", setups, isinstance(setups, Setup) or are(setups, Setup), "a Setup or a list of them"),
             ("prior", prior, isinstance(prior, str | os.PathLike | PriorCard), "a name, a path or a PriorCard"),
             ("effects", effects, effects is None or are(effects, str), "a list of names of effects"),
+            ("isotropic", isotropic, isinstance(isotropic, bool), "True or False"),
             ("title", title, isinstance(title, str), "a text"),
             ("source", source, isinstance(source, str), "a text"),
             ("warp", warp, isinstance(warp, Mapping | None), "a dict of heights by cup, bow and twist"),
@@ -243,10 +257,11 @@ class Board:
             name,
             quantities,
             [setup.assuming_noise(card) if setup.is_noise_assumed else setup for setup in held],
-            assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or DEFAULT_POISSON,
+            assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or usual_poisson(isotropic),
             prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
             effects=tuple(effects or ()),
             implies=effects is None or bool(effects),
+            isotropic=isotropic,
             title=title,
             source=source,
             warp=warps,

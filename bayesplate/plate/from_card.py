@@ -59,6 +59,7 @@ def board_from_card(
         shear_xz=_optional(card.material.shear_xz_gpa, 1e9),
         shear_yz=_optional(card.material.shear_yz_gpa, 1e9),
         warp={name: rise.scaled(_MILLI) for name, rise in card.plate.warp_mm.items()},
+        isotropic=card.material.isotropic,
         notes=_notes(assumed),
     )
 
@@ -71,7 +72,7 @@ def _assumed_poisson(card: BoardCard, prior: PriorCard | None) -> Quantity | Non
     """The Poisson ratio of the prior, or else the usual one, if the card states none."""
     if not card.material.poisson_is_default:
         return None
-    return prior.poisson_xy if prior is not None and prior.poisson_xy is not None else card.material.poisson_xy
+    return prior.poisson_xy if prior is not None and prior.poisson_xy is not None else card.material.usual_poisson
 
 
 def _joined_with_rounding(frequency: Quantity, resolution: float | None) -> Quantity:

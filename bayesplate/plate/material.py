@@ -1,11 +1,15 @@
-"""Elastic moduli and rigidities of an orthotropic plate, and the wave speeds makers derive from them."""
+"""Elastic moduli and rigidities of a plate, which of them are free, and the wave speeds makers derive from them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
 
 RIGIDITIES = ("D_x", "D_y", "D_s")
 MODULI = ("E_x", "E_y", "G_xy")
@@ -25,6 +29,71 @@ class Moduli(NamedTuple):
     E_x: NDArray[np.float64]
     E_y: NDArray[np.float64]
     G_xy: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """Which rigidities of a material are free, and how the others follow them.
+
+    A fit moves the logarithms of the free rigidities. Those of D_x, D_y, D_s move along `along` of a unit step, from
+    places that depend on nu_xy alone, so that they follow an uncertain nu_xy draw by draw.
+
+    Attributes
+    ----------
+    free : tuple of str
+        Names of the free rigidities.
+    moduli : tuple of str
+        The modulus that each of them is told as.
+    follows : tuple of int
+        Which of the free ones each of D_x, D_y, D_s is proportional to.
+    """
+
+    free: tuple[str, ...]
+    moduli: tuple[str, ...]
+    follows: tuple[int, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of free rigidities: the constants of a fit."""
+        return len(self.free)
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether the material is the same in all directions."""
+        return self.n == 1
+
+    def rigidities(self, free: Sequence[Floats] | Floats, nu_xy: Floats) -> dict[str, Floats]:
+        """D_x, D_y, D_s by name, N m.
+
+        Parameters
+        ----------
+        free : (n, ...) array or n arrays, N m
+            The free rigidities.
+        nu_xy : number or array
+        """
+        found = {name: free[i] for name, i in zip(RIGIDITIES, self.follows, strict=True)}
+        if self.is_isotropic:
+            found["D_s"] = np.asarray(2.0 * (1.0 - nu_xy) * found["D_s"])
+        return found
+
+    def free_of(self, values: Mapping[str, Floats]) -> Floats:
+        """The free rigidities of one plate, N m: (n,) array from D_x, D_y, D_s by name."""
+        return np.array([float(values[RIGIDITIES[self.follows.index(i)]]) for i in range(self.n)])
+
+    def columns(self, nu_xy: Floats) -> Floats:
+        """The matrix that takes the free rigidities to (D_x, D_y, D_s): (3, n) array."""
+        return np.array([list(self.rigidities(unit, nu_xy).values()) for unit in np.eye(self.n)]).T
+
+    def along(self, by_rigidity: Floats) -> Floats:
+        """Slopes by the logarithms of the free rigidities from those by ln D_x, D_y, D_s: (..., n) from (..., 3)."""
+        return by_rigidity if not self.is_isotropic else by_rigidity.sum(axis=-1, keepdims=True)
+
+
+ORTHOTROPIC = Symmetry(RIGIDITIES, MODULI, (0, 1, 2))
+"""E_x, E_y and G_xy are three constants: wood, fibre composites."""
+
+ISOTROPIC = Symmetry(("D",), ("E",), (0, 0, 0))
+"""E_x = E_y = E and G_xy = E / (2 (1 + nu)), so that D_s = 2 (1 - nu) D: metal, glass, foam, MDF."""
 
 
 def rigidities(E_x: ArrayLike, E_y: ArrayLike, G_xy: ArrayLike, thickness: ArrayLike, nu_xy: ArrayLike) -> Rigidities:
@@ -79,6 +148,12 @@ def moduli(D_x: ArrayLike, D_y: ArrayLike, D_s: ArrayLike, thickness: ArrayLike,
     remainder = 1.0 - np.asarray(nu_xy) ** 2 * D_y / D_x
     factor = 12.0 * np.where(remainder > 0, remainder, np.nan) / h**3
     return Moduli(D_x * factor, D_y * factor, np.asarray(3.0 * D_s / h**3))
+
+
+def isotropic_moduli(E: ArrayLike, nu: ArrayLike) -> Moduli:
+    """Moduli of an isotropic material from its E, Pa, and its Poisson ratio."""
+    E = np.asarray(E, dtype=float)
+    return Moduli(E, E, np.asarray(E / (2.0 * (1.0 + np.asarray(nu)))))
 
 
 class Derived(NamedTuple):

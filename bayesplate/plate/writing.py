@@ -62,6 +62,7 @@ def card_text(board: Board) -> str:
         lines.append(f"warp_mm = {table({name: quantity(rise, _MILLI) for name, rise in board.warp.items()})}")
     lines += ["", "[material]"]
     lines += [f"poisson_xy = {quantity(inputs['poisson_xy'], 1.0)}"] if "poisson_xy" in inputs else []
+    lines += ["isotropic = true"] if board.isotropic else []
     lines += [f"prior = {text(board.prior)}"]
     shear = {"shear_xz_gpa": board.shear_xz, "shear_yz_gpa": board.shear_yz}
     lines += [f"{key} = {quantity(modulus, 1e9)}" for key, modulus in shear.items() if modulus is not None]

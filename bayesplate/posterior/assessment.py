@@ -90,7 +90,7 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     )
     return Assessment(
         left_out=mode_errors(inference, draws).left_out,
-        leverages=identifiability(problem.estimate.sensitivities, scales).leverages,
+        leverages=identifiability(problem.estimate.sensitivities, scales, problem.board.symmetry).leverages,
         linear_errors=errors,
         linear_is_enough=linear_is_enough(inference, draws, errors),
         exact_worst=worst_cents(models),

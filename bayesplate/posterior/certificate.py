@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.convergence import autocorrelation_time
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.normal_case import NormalCase
@@ -142,7 +141,7 @@ def differences(case: NormalCase, theta: Floats, log_posterior: Floats) -> dict[
     weights = np.exp(log_weights - log_weights.max())
     weights /= weights.mean()
     deviates = np.concatenate([case.column_deviates(flat), case.noise_deviates(flat)], axis=1)
-    names = [f"ln {name}" for name in RIGIDITIES]
+    names = [f"ln {name}" for name in case.parameters.board.symmetry.free]
     names += [*case.parameters.inputs, *(f"ln noise of {setup.name}" for setup in case.parameters.board.setups)]
     terms: dict[str, Floats] = {}
     for name, one in zip(names, deviates.T, strict=True):

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.plate.material import MODULI, moduli
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.posterior.target import Posterior
 
 Floats = NDArray[np.float64]
@@ -87,7 +86,7 @@ def require_possible_noise(posterior: Posterior, centre: Floats) -> None:
         gaps = np.maximum(np.maximum(readings.log_low - predicted, predicted - readings.log_high), 0.0)
         squares += float(np.sum((gaps / np.hypot(noise, readings.own_sd)) ** 2))
         n_modes += gaps.size
-    misfit = squares / max(n_modes - N_RIGIDITIES, 1)
+    misfit = squares / max(n_modes - board.symmetry.n, 1)
     if not misfit > IMPOSSIBLE_MISFIT:
         return
     levels = ", ".join(

@@ -51,8 +51,8 @@ class Way:
     ----------
     board : Board
         With the labels of the peaks that are likely one certain mode.
-    log_rigidities : (3,) array
-        ln of D_x, D_y, D_s (N m) near those of its readings.
+    log_rigidities : (n_constants,) array
+        ln of the free rigidities (N m) near those of its readings.
     log_density : float
         ln of the posterior density there, at the noise that suits it best.
     log_density_unlike : float
@@ -80,7 +80,7 @@ class Proposed:
         likely label stay peaks.
     rigidities : (3,) array or None
         D_x, D_y, D_s near those of its readings, N m; None where there is nothing to propose.
-    spread : (3, 3) array
+    spread : (n_constants, n_constants) array
         Covariance of ln D between the likely ways to take the peaks; zero where there is but one.
     """
 
@@ -112,7 +112,7 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     NotIdentifiableError
         If the peaks may as well be taken another way, with constants that lie far off.
     """
-    none = np.zeros((len(RIGIDITIES), len(RIGIDITIES)))
+    none = np.zeros((board.symmetry.n, board.symmetry.n))
     if not any(takes_part(setup) for setup in board.setups):
         return Proposed(board, None, none)
     tried: list[tuple[Setup, ...]] = []
@@ -128,7 +128,8 @@ def propose_labels(board: Board, prior: PriorCard) -> Proposed:
     best = max(near, key=lambda one: one.log_density)
     off = np.array([one.log_rigidities for one in near]) - best.log_rigidities
     shares = softmax([one.log_density for one in near])
-    return Proposed(best.board, np.exp(best.log_rigidities), (off.T * shares) @ off)
+    rigidities = board.symmetry.rigidities(np.exp(best.log_rigidities), board.nominal()["poisson_xy"])
+    return Proposed(best.board, np.array([float(rigidities[name]) for name in RIGIDITIES]), (off.T * shares) @ off)
 
 
 def only_way(ways: Sequence[Way]) -> Way:
@@ -159,8 +160,8 @@ def only_way(ways: Sequence[Way]) -> Way:
 
 def _constants_words(way: Way) -> str:
     nominal = way.board.nominal()
-    D_x, D_y, D_s = np.exp(way.log_rigidities)
-    elastic = moduli(D_x, D_y, D_s, nominal["thickness"], nominal["poisson_xy"])
+    found = way.board.symmetry.rigidities(np.exp(way.log_rigidities), nominal["poisson_xy"])
+    elastic = moduli(found["D_x"], found["D_y"], found["D_s"], nominal["thickness"], nominal["poisson_xy"])
     return ", ".join(f"{name} {1e-9 * float(value):.3g}" for name, value in zip(MODULI, elastic, strict=True)) + " GPa"
 
 
@@ -186,34 +187,38 @@ def _settled(board: Board, guess: Guess, tried: list[tuple[Setup, ...]]) -> tupl
     while True:
         labelled = _labelled(board, guess)
         n_readings = sum(len(setup.readings) for setup in labelled.setups)
-        if labelled.setups in before or len(before) == _MOST_ROUNDS or n_readings < len(RIGIDITIES):
+        if labelled.setups in before or len(before) == _MOST_ROUNDS or n_readings < board.symmetry.n:
             return labelled, guess.rigidities
         if labelled.setups in tried:
             return None
         before.append(labelled.setups)
         tried.append(labelled.setups)
         estimate = weighted_least_squares(_of_labelled(labelled), _STEPS, guess.rigidities)
-        if identifiability(estimate.sensitivities, estimate.scales).blind():
+        if identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
             return labelled, guess.rigidities
         guess = _guess_of(board, estimate)
 
 
 def _guesses(board: Board, prior: PriorCard) -> list[Guess]:
     """The constants that the labelled modes determine, or those of all the prior where the peaks are likely."""
-    if sum(len(setup.readings) for setup in board.setups) >= len(RIGIDITIES):
+    if sum(len(setup.readings) for setup in board.setups) >= board.symmetry.n:
         estimate = weighted_least_squares(_of_labelled(board), accepted=_NEAR)
-        if not identifiability(estimate.sensitivities, estimate.scales).blind():
+        if not identifiability(estimate.sensitivities, estimate.scales, board.symmetry).blind():
             return [_guess_of(board, estimate)]
     n_peaks = sum(len(setup.readings) + len(setup.peaks) for setup in board.setups)
-    return search_widely(board, prior, np.random.default_rng(0)) if n_peaks >= len(RIGIDITIES) else []
+    if board.isotropic or n_peaks < len(RIGIDITIES):  # one label fixes all of an isotropic plate
+        return []
+    return search_widely(board, prior, np.random.default_rng(0))
 
 
 def _guess_of(board: Board, estimate: Estimate) -> Guess:
     """An estimate with its uncertainty; residuals beyond the expected noise widen both."""
-    spare = max(estimate.residuals.size - len(RIGIDITIES), 1)
+    symmetry = board.symmetry
+    spare = max(estimate.residuals.size - symmetry.n, 1)
     widening = max(float(np.sqrt(np.sum((estimate.residuals / estimate.scales) ** 2) / spare)), 1.0)
-    covariance = widening**2 * identifiability(estimate.sensitivities, estimate.scales).covariance
-    logs = np.random.default_rng(0).multivariate_normal(np.log(estimate.rigidities), covariance, _N_DRAWS)
+    covariance = widening**2 * identifiability(estimate.sensitivities, estimate.scales, symmetry).covariance
+    middle = np.log(symmetry.free_of(estimate.values))
+    logs = np.random.default_rng(0).multivariate_normal(middle, covariance, _N_DRAWS)
     return Guess(estimate.values, logs, widening * max(setup.noise.median for setup in board.setups))
 
 
@@ -224,7 +229,7 @@ def _of_labelled(board: Board) -> Board:
 
 def _judged(board: Board, prior: PriorCard, start: NDArray[np.float64]) -> Way | None:
     """A labelled board at its own estimate and the noise that suits it best; None if it has too few labels for one."""
-    if sum(len(setup.readings) for setup in board.setups) < len(RIGIDITIES):
+    if sum(len(setup.readings) for setup in board.setups) < board.symmetry.n:
         return None
     estimate = weighted_least_squares(_of_labelled(board), _STEPS, start)
     models = [setup_model(system_of(board, setup), estimate.values) for setup in board.setups]
@@ -235,7 +240,7 @@ def _judged(board: Board, prior: PriorCard, start: NDArray[np.float64]) -> Way |
     theta = np.stack([posterior.parameters.theta(estimate.values, noise) for noise in noises])
     theta = np.concatenate([theta, [posterior.parameters.theta(estimate.values, np.maximum(medians, UNLIKE))]])
     *by_level, unlike = (posterior.log_likelihood(theta).sum(axis=1) + posterior.log_prior(theta)).tolist()
-    return Way(board, np.log(estimate.rigidities), max(by_level), unlike)
+    return Way(board, np.log(board.symmetry.free_of(estimate.values)), max(by_level), unlike)
 
 
 def _labelled(board: Board, guess: Guess) -> Board:
@@ -251,7 +256,8 @@ def _labelled_setup(board: Board, setup: Setup, guess: Guess) -> Setup:
     assert peaks is not None
     # Where a guess is off, few peaks are near a mode: they are taken for one the sooner, and the next guess is better.
     peaks = replace(peaks, log_alone=peaks.log_alone - np.log(peaks.log_alone.size))
-    values = {**guess.values, **dict(zip(RIGIDITIES, np.exp(guess.log_rigidities).T, strict=True))}
+    free = np.exp(guess.log_rigidities).T
+    values = {**guess.values, **board.symmetry.rigidities(free, guess.values["poisson_xy"])}
     every = model.every_log_frequency(values, "linear")
     usable = np.isfinite(every).all(axis=1)
     noise = np.full(int(usable.sum()), guess.noise)

@@ -31,7 +31,7 @@ from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.doubts import Remarks, is_too_wide, noise_remarks, reading_remarks
 from bayesplate.posterior.first_labels import propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
@@ -183,7 +183,7 @@ def _posed(board: Board, prior: PriorCard, law: LawName | None, robust: bool) ->
     board = with_discrepancies(proposed.board)
     require_labels(board)
     estimate = weighted_least_squares(board, start=proposed.rigidities)
-    found = identifiability(estimate.sensitivities, estimate.scales)
+    found = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
     require_identifiable(board, found)
     approximation = laplace_approximation(board, estimate, robust, proposed.spread)
     require_identifiable(board, _identifiable_at(board, approximation, estimate))
@@ -206,8 +206,9 @@ def _posed(board: Board, prior: PriorCard, law: LawName | None, robust: bool) ->
 def _plausible(board: Board, approximation: LaplaceApproximation) -> Floats:
     """Draws of the normal approximation, wider because the noise is not known, within the limits of the inputs."""
     draws = np.random.default_rng(0).multivariate_normal(approximation.centre, approximation.covariance, _N_CHECKS)
-    draws[:, :N_RIGIDITIES] += (_widening(board) - 1.0) * (draws - approximation.centre)[:, :N_RIGIDITIES]
     parameters, columns = Parameters(board), Parameters(board).fitted_columns
+    constants = slice(parameters.n_constants)
+    draws[:, constants] += (_widening(board) - 1.0) * (draws - approximation.centre)[:, constants]
     limits = parameters.fitted_bounds
     draws[:, columns] = np.clip(draws[:, columns], limits.lower, limits.upper)
     return np.asarray(draws)
@@ -238,7 +239,7 @@ def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noi
             setup = with_labels(setup, peaks, probabilities, LIKELY)
         setups.append(setup)
     board = replace(problem.board, setups=tuple(setups))
-    if board.setups == problem.board.setups or sum(len(setup.readings) for setup in setups) < N_RIGIDITIES:
+    if board.setups == problem.board.setups or sum(len(setup.readings) for setup in setups) < board.symmetry.n:
         return inference
     estimate = weighted_least_squares(board, start=problem.estimate.rigidities)
     before = problem.posterior
@@ -250,7 +251,7 @@ def labelled_by(inference: Inference, every_log_frequency: Sequence[Floats], noi
         starts = np.cumsum([0, *(len(model.every_place) for model in before.models)])[:-1]
         every = np.concatenate([start + own for start, own in zip(starts, columns, strict=True)])
         surrogate = replace(surrogate, coefficients=surrogate.coefficients[:, every])
-    found = identifiability(estimate.sensitivities, estimate.scales)
+    found = identifiability(estimate.sensitivities, estimate.scales, board.symmetry)
     again = replace(problem, board=board, estimate=estimate, identifiability=found, posterior=posterior)
     return replace(inference, problem=again, surrogate=surrogate)
 
@@ -268,7 +269,7 @@ def _widening(board: Board) -> float:
 
     The prior of ln noise and two for each reading to spare add up to its precision.
     """
-    spare = max(sum(len(setup.readings) for setup in board.setups) - N_RIGIDITIES, 0)
+    spare = max(sum(len(setup.readings) for setup in board.setups) - board.symmetry.n, 0)
     log_sd = max(setup.noise.log_sd for setup in board.setups)
     return float(np.exp(1.0 / (1.0 / log_sd**2 + 2.0 * spare)))
 
@@ -276,7 +277,8 @@ def _widening(board: Board) -> float:
 def _identifiable_at(board: Board, approximation: LaplaceApproximation, estimate: Estimate) -> Identifiability:
     """What the readings tell where the posterior lies; modes may stand there in another order than at the estimate."""
     there = Parameters(board).values_at(approximation.centre)
-    return identifiability(np.concatenate([m.sensitivities(there) for m in approximation.models]), estimate.scales)
+    sensitivities = np.concatenate([m.sensitivities(there) for m in approximation.models])
+    return identifiability(sensitivities, estimate.scales, board.symmetry)
 
 
 def infer(
@@ -301,7 +303,7 @@ def infer(
         Its chains are theta, the columns of `Parameters`, and the log posterior density of theta.
     """
     coordinates = TailCoordinates.around(
-        problem.centre, problem.covariance, range(N_RIGIDITIES), problem.parameters.effect_columns
+        problem.centre, problem.covariance, range(problem.parameters.n_constants), problem.parameters.effect_columns
     )
     surrogate = None
     if problem.posterior.law == "exact" and not problem.is_forced:

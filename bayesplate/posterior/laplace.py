@@ -22,7 +22,7 @@ from bayesplate.modes.reduction import ACCEPTED_CENTS
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.robust import highest_student, student_weights
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,7 @@ def laplace_approximation(
         At the nominal inputs.
     robust : bool
         Student's distribution for the noise.
-    spread : (3, 3) array, optional
+    spread : (n_constants, n_constants) array, optional
         Covariance of ln D beyond that: between several ways to take peaks for modes.
 
     Returns
@@ -136,7 +136,7 @@ def _fitted(
         scales = reading_sd(board.setups, noise)
         if np.abs(np.log(noise / before)).max() < _SAME_LEVEL:
             break
-    centre[N_RIGIDITIES : parameters.first_input] = np.log(noise)
+    centre[parameters.n_constants : parameters.first_input] = np.log(noise)
     return centre, scales
 
 
@@ -170,7 +170,7 @@ def noise_widenings(board: Board, residuals: Floats) -> Floats:
     from scipy.optimize import brentq
 
     squares = residuals**2
-    spare = max(squares.size - N_RIGIDITIES, 1) / squares.size
+    spare = max(squares.size - board.symmetry.n, 1) / squares.size
     medians = np.array([setup.noise.median for setup in board.setups])
     noise = np.repeat(medians, [len(setup.readings) for setup in board.setups])
 
@@ -197,7 +197,7 @@ def every_predictor(board: Board, models: Sequence[SetupModel], law: LawName, ce
         theta[:, parameters.fitted_columns] = x
         return parameters.values(theta)
 
-    return Predictor(values, models, law)
+    return Predictor(values, models, law, n_constants=parameters.n_constants)
 
 
 def predictor(board: Board, models: Sequence[SetupModel], law: LawName, centre: Floats) -> Predictor:
@@ -210,14 +210,14 @@ def _covariance(
 ) -> Floats:
     """Covariance of all columns: of the weighted fit for the fitted ones, of the prior for the noise."""
     parameters = Parameters(board)
-    columns = parameters.fitted_columns
+    n, columns = parameters.n_constants, parameters.fitted_columns
     weighted = design(predictor(board, models, law, centre), scales, centre[columns])
     covariance = np.zeros((parameters.n_dim, parameters.n_dim))
     covariance[np.ix_(columns, columns)] = np.linalg.inv(weighted.T @ weighted)
-    for i, setup in enumerate(board.setups, start=N_RIGIDITIES):
+    for i, setup in enumerate(board.setups, start=n):
         covariance[i, i] = setup.noise.log_sd**2
     if spread is not None:
-        covariance[:N_RIGIDITIES, :N_RIGIDITIES] += spread
+        covariance[:n, :n] += spread
     return covariance
 
 
@@ -233,7 +233,8 @@ def exact_models(
     """Models with the exact law, trained at the centre and at the corners of a box around it.
 
     The box spans D_x / D_s, D_y / D_s and, where it is uncertain, nu_xy: frequencies of a bare plate are homogeneous in
-    the rigidities, so a common factor needs no training, and side lengths only rescale the same terms. Parameters of
+    the rigidities, so a common factor needs no training, and side lengths only rescale the same terms; of an isotropic
+    board it spans D itself, which does no harm. Parameters of
     effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
     the box. Sessions that hold the plate alike are solved once.
 
@@ -249,13 +250,14 @@ def exact_models(
         Error at the checks up to which no further points are solved.
     """
     parameters = Parameters(board)
-    ratios = np.eye(N_RIGIDITIES)[:2] - np.eye(N_RIGIDITIES)[2]
-    spread = ratios @ covariance[:N_RIGIDITIES, :N_RIGIDITIES] @ ratios.T
+    n = parameters.n_constants
+    ratios = np.eye(n)[:-1] - np.eye(n)[-1] if n > 1 else np.eye(1)
+    boxed = list(range(len(ratios)))
+    spread = ratios @ covariance[:n, :n] @ ratios.T
     half_widths = np.zeros(parameters.n_dim)
-    half_widths[:2] = np.clip(_BOX_SDS * np.sqrt(np.diagonal(spread)), _NARROWEST, _WIDEST)
+    half_widths[boxed] = np.clip(_BOX_SDS * np.sqrt(np.diagonal(spread)), _NARROWEST, _WIDEST)
     sds = np.sqrt(np.diagonal(covariance))
     followed = {name for model in models for effect in model.system.effects for name in effect.goes_with}
-    boxed = [0, 1]
     alone = []
     for i, parameter in enumerate(parameters.uncertain, start=parameters.first_input):
         if parameter.name == "poisson_xy":

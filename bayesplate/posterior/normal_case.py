@@ -21,7 +21,7 @@ from scipy.special import ndtri
 
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.posterior.inference import PosedProblem
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
@@ -162,7 +162,7 @@ class NormalCase:
                 right = np.clip(np.sum(below < u[:, None], axis=1), 1, len(grid) - 1)
                 low, high = below[rows, right - 1], below[rows, right]
                 share = np.divide(u - low, high - low, out=np.full(n_draws, 0.5), where=high > low)
-                theta[:, N_RIGIDITIES + i] = grid[right - 1] + share * (grid[1] - grid[0])
+                theta[:, self.parameters.n_constants + i] = grid[right - 1] + share * (grid[1] - grid[0])
             mean, covariance = self.given_noise(self.parameters.log_noise(theta))
             normal = rng.standard_normal(mean.shape)
             theta[:, columns] = mean + np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), normal)

@@ -10,18 +10,15 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.refit import Bounds
 from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.parameter import Parameter
-
-N_RIGIDITIES = len(RIGIDITIES)
 
 
 @dataclass(frozen=True)
 class Parameters:
     """Names, order and meaning of the columns that are sampled.
 
-    Columns: ln D_x, ln D_y, ln D_s (N m); ln of the relative noise, one per setup; the standard coordinate z of each
-    uncertain parameter of the board (`bayesplate.quantities`).
+    Columns: ln D_x, ln D_y, ln D_s (N m), of an isotropic board ln D alone; ln of the relative noise, one per setup;
+    the standard coordinate z of each uncertain parameter of the board (`bayesplate.quantities`).
 
     Attributes
     ----------
@@ -29,6 +26,11 @@ class Parameters:
     """
 
     board: Board
+
+    @property
+    def n_constants(self) -> int:
+        """Number of free rigidities: the first columns."""
+        return self.board.symmetry.n
 
     @property
     def n_setups(self) -> int:
@@ -54,12 +56,12 @@ class Parameters:
     def names(self) -> tuple[str, ...]:
         """Names of all columns."""
         noises = [f"log_{noise.name}" for noise in self.noises]
-        return (*(f"log_{name}" for name in RIGIDITIES), *noises, *(f"z[{name}]" for name in self.inputs))
+        return (*(f"log_{name}" for name in self.board.symmetry.free), *noises, *(f"z[{name}]" for name in self.inputs))
 
     @property
     def first_input(self) -> int:
         """Column of the first uncertain parameter of the board."""
-        return N_RIGIDITIES + self.n_setups
+        return self.n_constants + self.n_setups
 
     @cached_property
     def n_dim(self) -> int:
@@ -69,7 +71,7 @@ class Parameters:
     @cached_property
     def fitted_columns(self) -> NDArray[np.intp]:
         """Columns that frequencies depend on: all but the noise."""
-        return np.r_[:N_RIGIDITIES, self.first_input : self.n_dim]
+        return np.r_[: self.n_constants, self.first_input : self.n_dim]
 
     @cached_property
     def effect_columns(self) -> list[int]:
@@ -98,7 +100,8 @@ class Parameters:
         values = dict(self._exact)
         for i, parameter in enumerate(self.uncertain, start=self.first_input):
             values[parameter.name] = parameter.prior.value(theta[:, i])
-        values.update((name, np.exp(theta[:, i])) for i, name in enumerate(RIGIDITIES))
+        free = [np.exp(theta[:, i]) for i in range(self.n_constants)]
+        values.update(self.board.symmetry.rigidities(free, values["poisson_xy"]))
         return values
 
     def values_at(self, theta: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -107,7 +110,7 @@ class Parameters:
 
     def log_noise(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """ln of the relative noise: (n_draws, n_setups) array."""
-        return theta[:, N_RIGIDITIES : self.first_input]
+        return theta[:, self.n_constants : self.first_input]
 
     def log_prior_inputs(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log density of the input columns: (n_draws,) array."""
@@ -135,4 +138,4 @@ class Parameters:
     def theta(self, values: Values, noise: NDArray[np.float64]) -> NDArray[np.float64]:
         """Columns of one point from rigidities, inputs and relative noises: (n_dim,) array; inverse of `values`."""
         inputs = [float(one.prior.standard(values[one.name])) for one in self.uncertain]
-        return np.array([*(np.log(float(values[n])) for n in RIGIDITIES), *np.log(noise), *inputs])
+        return np.array([*np.log(self.board.symmetry.free_of(values)), *np.log(noise), *inputs])

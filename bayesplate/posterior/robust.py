@@ -36,7 +36,7 @@ def highest_student(board: Board, estimate: Estimate) -> tuple[Floats, Floats]:
     noise : (n_setups,) array
         Relative.
     """
-    residuals, slopes = estimate.residuals, estimate.sensitivities
+    residuals, slopes = estimate.residuals, board.symmetry.along(estimate.sensitivities)
     noises = np.stack([setup.noise.median * np.exp(setup.noise.log_sd * _NOISE_SDS) for setup in board.setups], axis=1)
     scales = np.stack([reading_sd(board.setups, noise) for noise in noises])[:, None, :]
     kept = np.concatenate([np.ones((1, residuals.size)), 1.0 - np.eye(residuals.size)])
@@ -48,7 +48,8 @@ def highest_student(board: Board, estimate: Estimate) -> tuple[Floats, Floats]:
     log_density = np.sum(STUDENT.log(z) - np.log(scales), axis=-1) - 0.5 * np.linalg.slogdet(information)[1]
     log_density -= 0.5 * _NOISE_SDS[:, None] ** 2
     level, start = np.unravel_index(np.argmax(log_density), log_density.shape)
-    return estimate.rigidities * np.exp(steps[level, start]), noises[level]
+    moved = np.exp(steps[level, start])[list(board.symmetry.follows)]
+    return estimate.rigidities * moved, noises[level]
 
 
 def student_weights(z: Floats) -> Floats:
@@ -57,13 +58,13 @@ def student_weights(z: Floats) -> Floats:
 
 
 def _weighted(weights: Floats, slopes: Floats, residuals: Floats) -> Floats:
-    """Steps of weighted least squares: (..., 3) array."""
+    """Steps of weighted least squares: (..., n_constants) array."""
     wanted = np.einsum("...i,ij,i->...j", weights, slopes, residuals)
     return np.asarray(np.linalg.solve(_information(weights, slopes), wanted[..., None])[..., 0])
 
 
 def _information(weights: Floats, slopes: Floats) -> Floats:
-    """Information of the readings on ln D_x, ln D_y, ln D_s: (..., 3, 3) array; a little more, so that none is open."""
+    """Information of the readings on ln D: (..., n_constants, n_constants); a little more, so that none is open."""
     found = np.einsum("ij,...i,ik->...jk", slopes, weights, slopes)
     trace = np.trace(found, axis1=-2, axis2=-1)[..., None, None]
     return np.asarray(found + 1e-9 * trace * np.eye(slopes.shape[1]))

@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
-from bayesplate.estimates.refit import N_CONSTANTS, Bounds, most_likely, normal_misfit, sensitivities
+from bayesplate.estimates.refit import Bounds, most_likely, normal_misfit, sensitivities
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
@@ -32,7 +32,7 @@ RARITY = 1000.0
 """A slip is told where the readings are this many times as probable with it as without."""
 
 FEWEST_TO_SPARE = 2
-"""Readings beyond the three constants that it takes to see a slip in one of them."""
+"""Readings beyond as many as there are constants that it takes to see a slip in one of them."""
 
 _LEAST_LOG_SD = 0.7
 """What is left of ln noise at least: an effect that the plate lacks adds to the noise, however well that is known."""
@@ -128,7 +128,7 @@ class _Fit:
     @property
     def inputs(self) -> Floats:
         """Standard coordinates of the uncertain inputs."""
-        return self.x[N_CONSTANTS:]
+        return self.x[self.predict.n_constants :]
 
 
 class SlipSearch:
@@ -147,6 +147,7 @@ class SlipSearch:
         self.is_robust = posterior.robust
         self.target = log_measured(self.board)
         self._parameters = posterior.parameters
+        self._n = posterior.parameters.n_constants
         self._medians = np.array([setup.noise.median for setup in self.board.setups])
         self._log_sd = max(_LEAST_LOG_SD, *(setup.noise.log_sd for setup in self.board.setups))
         self._variances = np.stack(
@@ -186,7 +187,7 @@ class SlipSearch:
         Slip or None
         """
         n_modes = self.target.size
-        if n_modes < N_CONSTANTS + FEWEST_TO_SPARE:
+        if n_modes < self._n + FEWEST_TO_SPARE:
             return None
         strays = [Slip((i,)) for i in range(n_modes)]
         off = [Slip((i,), factor) for i in range(n_modes) for factor in (*OCTAVES, *DECIMALS)]
@@ -245,7 +246,7 @@ class SlipSearch:
         """Limits of the fitted columns: constants stay within reach, for a slip may leave one of them open."""
         bounds = self._parameters.fitted_bounds
         reach = np.full(x.size, np.inf)
-        reach[:N_CONSTANTS] = _REACH
+        reach[: self._n] = _REACH
         return Bounds(np.maximum(bounds.lower, x - reach), np.minimum(bounds.upper, x + reach))
 
     def _elsewhere(self, slip: Slip) -> _Fit | None:
@@ -270,15 +271,15 @@ class SlipSearch:
         """
         kept = np.setdiff1d(np.arange(self.target.size), left_out)
         is_plate = np.isfinite(fit.residuals).all() and np.isfinite(fit.slopes).all()
-        if not is_plate or np.linalg.matrix_rank(fit.slopes[kept, :N_CONSTANTS], tol=_OPEN) < N_CONSTANTS:
+        if not is_plate or np.linalg.matrix_rank(fit.slopes[kept, : self._n], tol=_OPEN) < self._n:
             return np.full(np.shape(shifts)[:-1], -np.inf)
         return np.asarray(logsumexp(self._by_noise(fit, left_out, shifts), axis=0) - len(left_out) * np.log(_ANYWHERE))
 
     def _by_noise(self, fit: _Fit, left_out: tuple[int, ...], shifts: Floats | float = 0.0) -> Floats:
         """ln of the same at each noise level, times its prior: (n_levels, ...) array."""
         kept = np.setdiff1d(np.arange(self.target.size), left_out)
-        inputs = fit.slopes[kept, N_CONSTANTS:]
+        inputs = fit.slopes[kept, self._n :]
         # measured from the middle of the inputs' priors, so that their own departure counts
         residuals = (fit.residuals + shifts)[..., kept] + inputs @ fit.inputs
-        found = log_probability(residuals, fit.slopes[kept, :N_CONSTANTS], self._variances[:, kept], inputs)
+        found = log_probability(residuals, fit.slopes[kept, : self._n], self._variances[:, kept], inputs)
         return found - 0.5 * (_NOISE_SDS**2).reshape(-1, *[1] * (found.ndim - 1))

@@ -111,7 +111,7 @@ class Surrogate:
         """
         points = points.where(np.isfinite(points.log_frequency).all(axis=1) & np.isfinite(points.log_density))
         x, weights = points.theta[:, columns], points.weights
-        factor = np.linalg.cholesky(np.cov(x.T, aweights=weights))
+        factor = np.linalg.cholesky(np.atleast_2d(np.cov(x.T, aweights=weights)))
         centre = np.average(x, axis=0, weights=weights)
         none = np.empty((0, points.log_frequency.shape[1]))
         second = cls(columns, centre, np.asarray(np.linalg.inv(factor).T), {}, none)._fitted_to(points)

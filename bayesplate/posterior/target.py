@@ -13,9 +13,9 @@ from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
+from bayesplate.plate.material import MODULI, RIGIDITIES, isotropic_moduli, moduli, rigidities
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 from bayesplate.quantities import Quantity
 
 LINEAR_SHARE = 0.25
@@ -30,7 +30,7 @@ class Posterior:
     ----------
     board : Board
     prior : PriorCard
-        Densities of E_x, E_y, G_xy or of D_x, D_y, D_s.
+        Densities of E_x, E_y, G_xy or of D_x, D_y, D_s; of an isotropic board that of E_x, which is its E.
     models : sequence of SetupModel
         One per setup.
     law : "linear" or "exact"
@@ -100,9 +100,10 @@ class Posterior:
         return factors | ({"inputs": self.parameters.log_prior_inputs(theta)} if self.parameters.inputs else {})
 
     def log_prior_constants(self, theta: NDArray[np.float64], values: Values | None = None) -> NDArray[np.float64]:
-        """Log prior density of ln D_x, ln D_y, ln D_s given the inputs: (n_draws,) array.
+        """Log prior density of the logarithms of the free rigidities given the inputs: (n_draws,) array.
 
-        A density of the moduli is one of the rigidities: the Jacobian of their logarithms is 1 (`moduli`). Outside
+        A density of the moduli is one of the rigidities: the Jacobian of their logarithms is 1 (`moduli`), and so is
+        that of ln E by ln D of an isotropic board. Outside
         nu_xy nu_yx < 1 no material exists and the density is zero. The draws' `values` are given where they are known.
         """
         values = self.parameters.values(theta) if values is None else values
@@ -119,7 +120,7 @@ class Posterior:
         Parameters
         ----------
         u : (n_draws, n_dim) array, 0 to 1
-            One number per column, in their order; the first three are those of the constants that the prior states.
+            One number per column, in their order; the first ones are those of the constants that the prior states.
 
         Returns
         -------
@@ -131,7 +132,7 @@ class Posterior:
         theta = np.zeros_like(u)
         for i, one in enumerate(parameters.uncertain, start=parameters.first_input):
             theta[:, i] = one.prior.standard_quantile(u[:, i])
-        for i, noise in enumerate(parameters.noises, start=N_RIGIDITIES):
+        for i, noise in enumerate(parameters.noises, start=parameters.n_constants):
             theta[:, i] = np.log(noise.prior.quantile(u[:, i]))
         drawn = {name: prior.quantile(u[:, i]) for i, (name, prior) in enumerate(self.priors.items())}
         if set(drawn) == set(MODULI):
@@ -142,9 +143,13 @@ class Posterior:
             without = rigidities(E_x, E_y, G_xy, values["thickness"], 0.0)
             pairs = zip(stiffness, without, strict=True)
             constants = [np.where(np.isnan(stiffness.D_x), other, one) for one, other in pairs]
+        elif self.board.isotropic:
+            values = parameters.values(theta)
+            nu = values["poisson_xy"]
+            constants = [rigidities(*isotropic_moduli(drawn["E_x"], nu), values["thickness"], nu).D_x]
         else:
             constants = [drawn[name] for name in RIGIDITIES]
-        theta[:, :N_RIGIDITIES] = np.log(np.stack(constants, axis=1))
+        theta[:, : parameters.n_constants] = np.log(np.stack(constants, axis=1))
         return theta
 
     @property

@@ -46,12 +46,19 @@ def summary_sentences(summary: Summary) -> list[str]:
     E_x, E_y, G_xy = (plus_minus(entry, GPA) for _, entry in summary.elastic.items())
     n = len(summary.modes)
     sentences = [f"From {n} modes: {E_x} GPa along the grain, {E_y} GPa across it, and a shear modulus of {G_xy} GPa."]
+    if summary.model.isotropic:
+        sentences = [
+            f"From {n} mode{'s' * (n != 1)}: {E_x} GPa in all directions, so that the shear modulus is {G_xy} GPa."
+        ]
     left_out = error.leave_one_out_rms_cents
     missed = f"The fit misses the frequencies by {_cents(error.in_sample_rms_cents)}"
     if left_out is None:
         sentences.append(f"{missed}; there are too few modes to test it on one that it has not seen.")
     else:
         sentences.append(f"{missed}; a mode that it has not seen, by {_cents(left_out)}.")
+    if summary.model.isotropic:
+        entry = summary.elastic.E_x
+        return [*sentences, f"The modulus is known to ± {two_digits(entry.sd / entry.mean, 100)} %."]
     share, weakest = max((entry.sd / entry.mean, name) for name, entry in summary.elastic.items())
     told = two_digits(share, 100)
     alike = all(two_digits(entry.sd / entry.mean, 100) == told for _, entry in summary.elastic.items())
@@ -141,7 +148,7 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
     """Where the uncertainty of each constant comes from."""
     board = inference.problem.board
     shares = budget(draws, board)
-    alone = dict(zip(CONSTANTS, inference.problem.identifiability.standard_errors, strict=True))
+    alone = dict(zip(CONSTANTS, inference.problem.identifiability.errors_of_rigidities, strict=True))
     rows = []
     for name in CONSTANTS:
         entry = summary.elastic[name]
@@ -226,6 +233,7 @@ def model_rows(summary: Summary) -> list[tuple[str, str]]:
     noise = "Student's distribution (robust)" if model.robust else "normal distribution"
     return [
         ("plate theory", model.theory),
+        *([("material", "isotropic: E_x and E_y are E, G_xy is E / (2 (1 + ν))")] if model.isotropic else []),
         ("frequency law", f"{model.law}; the linear one is off by {two_digits(error.linearisation_rms_cents)} cents"),
         ("declared effects", effects),
         ("noise of a reading", noise),

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.inference import Inference
 from bayesplate.report.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, Picture, legend_below, stacked
 from bayesplate.report.symbols import in_figure
@@ -32,7 +31,7 @@ def health_picture(inference: Inference) -> Picture:
     """
     chains, convergence = inference.chains, inference.convergence
     n_ensembles, n_steps, _, _ = chains.draws.shape
-    names = [*RIGIDITIES, "noise"]
+    names = [*inference.problem.board.symmetry.free, "noise"]
     figure, panels = stacked([0.68] * len(names), left=0.62, right=0.25, top=0.26, bottom=0.78, gap=0.34)
     every = max(1, n_steps // _MOST_POINTS)
     steps = np.arange(0, n_steps, every)

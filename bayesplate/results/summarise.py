@@ -158,7 +158,7 @@ def model_header(problem: PosedProblem) -> ModelHeader:
     """What is fitted."""
     posterior = problem.posterior
     theory, effects = posterior.models[0].system.theory, tuple(problem.board.effects)
-    return ModelHeader(theory, posterior.law, effects, posterior.robust, problem.prior.name)
+    return ModelHeader(theory, posterior.law, effects, posterior.robust, problem.prior.name, problem.board.isotropic)
 
 
 def sampler_health(chains: Chains, convergence: Convergence) -> SamplerHealth:

@@ -18,13 +18,17 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class ModelHeader:
-    """What was fitted: plate theory, frequency law, declared effects, whether the noise is Student's, prior card."""
+    """What was fitted: plate theory, frequency law, declared effects, whether the noise is Student's, prior card.
+
+    Of an isotropic board one modulus: E_x and E_y are E in every draw, and G_xy is E / (2 (1 + nu)).
+    """
 
     theory: str
     law: str
     effects: tuple[str, ...]
     robust: bool
     prior: str
+    isotropic: bool = False
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.solve import Modes, solve_up_to
 from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.material import ORTHOTROPIC, Symmetry
 from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
 from bayesplate.recordings.contract import sign_of, spurious_share
@@ -54,15 +54,19 @@ class MostlyKnown:
     model : SetupModel
         Of the setup with nothing but bare peaks.
     values : dict of float
-    log_rigidities : (n_draws, 3) array
+    log_rigidities : (n_draws, n_constants) array
+        Of the free ones.
     noise : float
         Relative, with which the labelled peaks scatter about the plate.
+    symmetry : Symmetry
+        Of the board.
     """
 
     model: SetupModel
     values: Values
     log_rigidities: Floats
     noise: float
+    symmetry: Symmetry = ORTHOTROPIC
 
     def with_peaks(self, board: Board) -> MostlyKnown:
         """The same with other peaks of the same setup: signs joined to the same frequencies."""
@@ -79,7 +83,8 @@ class MostlyKnown:
     @cached_property
     def _draws(self) -> tuple[Floats, Floats]:
         """ln f of all modes at every draw, and the noise there."""
-        values = {**self.values, **dict(zip(RIGIDITIES, np.exp(self.log_rigidities).T, strict=True))}
+        free = np.exp(self.log_rigidities).T
+        values = {**self.values, **self.symmetry.rigidities(free, self.values["poisson_xy"])}
         every = self.model.every_log_frequency(values, "linear")
         usable = np.isfinite(every).all(axis=1)
         return every[usable], np.full(int(usable.sum()), self.noise)
@@ -165,10 +170,12 @@ def mostly_known(way: Proposal, bare: Board) -> MostlyKnown:
     """
     estimate = weighted_least_squares(way.board)
     scales = estimate.scales
-    spare = max(estimate.residuals.size - len(RIGIDITIES), 1)
+    symmetry = bare.symmetry
+    spare = max(estimate.residuals.size - symmetry.n, 1)
     widening = max(float(np.sqrt(np.sum((estimate.residuals / scales) ** 2) / spare)), 1.0)
-    covariance = widening**2 * identifiability(estimate.sensitivities, scales).covariance
-    logs = np.random.default_rng(0).multivariate_normal(np.log(estimate.rigidities), covariance, _N_DRAWS)
+    covariance = widening**2 * identifiability(estimate.sensitivities, scales, symmetry).covariance
+    middle = np.log(symmetry.free_of(estimate.values))
+    logs = np.random.default_rng(0).multivariate_normal(middle, covariance, _N_DRAWS)
     (setup,) = bare.setups
     model = with_others(setup_model(system_of(bare, setup), estimate.values), estimate.values)
-    return MostlyKnown(model, estimate.values, logs, widening * setup.noise.median)
+    return MostlyKnown(model, estimate.values, logs, widening * setup.noise.median, symmetry)

@@ -175,6 +175,11 @@ def _prepared(card: CampaignCard, effects: Sequence[str] | None) -> tuple[list[P
         try:
             population = load_prior(card.population.prior, Path(card.path).parent)
             require_moduli(population, place)
+            alike = [one.board.name for one in boards if one.board.isotropic]
+            if alike:
+                remedy = "leave [population] out, or those boards"
+                got = f"{', '.join(alike)}, whose E_y and G_xy follow from E_x"
+                raise InputError(Fault(place, "boards of three constants", got, remedy))
         except InputError as error:
             known = [fault if fault.place == place else replace(fault, place=f"{place} -> {fault.place}")
                      for fault in error.faults]  # fmt: skip

@@ -25,6 +25,8 @@ from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.shown import show_check
 
 _N_DRAWS = 4000
+_HARDLY_NARROWER = 0.9
+"""Uncertainty of nu after the readings over that before from which on they are said to tell nothing of it."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,11 +136,24 @@ def check_board(given: Problem, *, candidates: bool = True) -> CheckResult:
         in_sample_rms_cents=float(np.sqrt(np.mean(residuals**2))),
         signatures=tuple(_effects(signatures(problem))) if candidates else (),
         invisible=INVISIBLE,
-        identifiability=tuple(remarks(board, found)),
+        identifiability=(*remarks(board, found), *_of_poisson(problem)),
         notes=(*problem.doubts, *board.notes),
         n_doubts=len(problem.doubts),
         problem=given,
     )
+
+
+def _of_poisson(problem: PosedProblem) -> list[str]:
+    """What the modes tell of an uncertain Poisson ratio of an isotropic board, beside its one modulus."""
+    names = problem.parameters.inputs
+    if not problem.board.isotropic or "poisson_xy" not in names:
+        return []
+    stated = problem.board.inputs["poisson_xy"]
+    column = problem.parameters.first_input + names.index("poisson_xy")
+    share = float(np.sqrt(problem.covariance[column, column]))
+    if share > _HARDLY_NARROWER:
+        return [f"the modes tell nothing of nu: it stays at {stated.mean:g} ± {stated.sd:.2g}, and E goes with it"]
+    return [f"the modes tell nu beside E: to ± {share * stated.sd:.2g}, from ± {stated.sd:.2g} before"]
 
 
 def _effects(found: Sequence[Signature]) -> list[CheckedEffect]:

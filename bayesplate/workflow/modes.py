@@ -144,13 +144,14 @@ def _constants(prepared: Prepared) -> tuple[Values, Precision | None, list[str]]
     try:
         require_labels(board)
         estimate = weighted_least_squares(board)
-        require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales))
+        require_identifiable(board, identifiability(estimate.sensitivities, estimate.scales, board.symmetry))
     except NotIdentifiableError as error:
         return prior_medians(board, prepared.prior), None, [str(error)] if _has_labels(board) else []
     widenings = noise_widenings(board, estimate.residuals)
     scales = estimate.scales * np.repeat(widenings, [len(setup.readings) for setup in board.setups])
     noise = {setup.name: setup.noise.median * w for setup, w in zip(board.setups, widenings.tolist(), strict=True)}
-    return estimate.values, Precision(identifiability(estimate.sensitivities, scales).covariance, noise), []
+    found = identifiability(estimate.sensitivities, scales, board.symmetry)
+    return estimate.values, Precision(found.of_rigidities, noise), []
 
 
 def _has_labels(board: Board) -> bool:

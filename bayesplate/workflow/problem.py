@@ -28,9 +28,9 @@ Floats = NDArray[np.float64]
 class Problem:
     """What is to be inferred of a board: densities, frequencies and the prior, as any sampler asks for them.
 
-    theta holds, in the order of `names`: ln D_x, ln D_y, ln D_s (N m); ln of the relative noise, one per setup; and one
-    standard coordinate z per uncertain input of the board or of a declared effect, standard normal under its prior
-    within the bounds of the quantity.
+    theta holds, in the order of `names`: ln D_x, ln D_y, ln D_s (N m), of an isotropic board ln D alone (D_x = D_y = D
+    and D_s = 2 (1 - nu) D); ln of the relative noise, one per setup; and one standard coordinate z per uncertain input
+    of the board or of a declared effect, standard normal under its prior within the bounds of the quantity.
 
     Every method takes one point or many: an (n_dim,) array gives a number or a vector, an (n, n_dim) array gives n of
     them. The plates are solved once, when a likelihood or a frequency is first asked for.

@@ -109,8 +109,10 @@ def show_fit(summary: Summary | CampaignSummary) -> Shown:
     several = len(summary.noise) > 1
     noise = ", ".join(percent(one.q50, 2) + f" in {setup}" * several for setup, one in summary.noise.items())
     effects = f" with {effect_names(model.effects)}" if model.effects else ""
+    kind = "isotropic, " if model.isotropic else ""
     closing = (
-        f"{model.theory} plate{effects}, {model.law} law. Error rms {error.in_sample_rms_cents:.1f} cents in sample, "
+        f"{kind}{model.theory} plate{effects}, {model.law} law. Error rms "
+        f"{error.in_sample_rms_cents:.1f} cents in sample, "
         + (f"{left_out:.1f} left out" if left_out is not None else "too few modes to leave one out")
         + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )

@@ -11,8 +11,8 @@ from bayesplate.campaigns.claim import SharedClaim
 from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero, common_residuals
 from bayesplate.campaigns.diagnosis import next_step, pooled_rms
 from bayesplate.campaigns.search import Explanation
+from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.setup import Setup
-from bayesplate.posterior.parameters import N_RIGIDITIES
 
 N_MODES, N_CAMPAIGNS = 12, 400
 
@@ -26,7 +26,7 @@ def noise(rng, n_boards, offset=0.0, unlike=0.4):
     of_modes = np.exp(unlike * rng.standard_normal(N_MODES))
     residuals = scale[:, None] * of_modes * rng.standard_normal((n_boards, N_MODES))
     residuals[:, 0] += offset
-    n_spare = N_MODES - N_RIGIDITIES
+    n_spare = N_MODES - len(RIGIDITIES)
     told = np.sqrt((residuals**2).sum(axis=1) / n_spare)
     return {
         f"({mode},0)": _pooled(

@@ -14,7 +14,7 @@ from bayesplate.diagnosis.evidence.search import search
 from bayesplate.planning.beliefs import believed
 from bayesplate.planning.gains import Readings, probabilities_after
 from bayesplate.planning.survivors import asked, survivors
-from bayesplate.posterior.parameters import N_RIGIDITIES
+from bayesplate.plate.material import RIGIDITIES
 
 N_READ, N_MODES = 6, 9
 NAMES = ("first", "second")
@@ -66,7 +66,7 @@ def further(found, beliefs, whole, directions):
         table = found.ground.hypotheses[one.hypothesis].table
         moved = np.zeros((one.n_terms, N_MODES - N_READ))
         along = np.zeros((one.n_terms, N_MODES - N_READ, one.mean.shape[1]))
-        along[:, :, :N_RIGIDITIES] = whole.slopes[rows]
+        along[:, :, : len(RIGIDITIES)] = whole.slopes[rows]
         if one.members:
             z, step = table.z[one.cells, 0], table.z_slopes[one.cells, 0]
             moved = np.outer(made.HALF_NORMAL.value(z), directions[one.members[0]][rows])

@@ -291,10 +291,11 @@ def test_a_prior_from_quantities_holds_them_and_becomes_a_card(tmp_path):
 def test_a_shipped_prior_comes_back(name):
     card = load_prior(name)
     further = {"noise": None if card.noise_percent is None else card.noise_percent.scaled(0.01)}
+    isotropic = {} if card.E is None else {"E": card.E}
     made = bayesplate.PriorCard.from_quantities(
         name,
-        card.constants,
-        source=card.sources,
+        card.constants | {key: one.quantity for key, one in isotropic.items()},
+        source=card.sources | {key: one.source for key, one in isotropic.items()},
         poisson_xy=card.poisson_xy,
         density=card.density,
         title=card.title,

@@ -11,11 +11,11 @@ from bayesplate.estimates.least_squares import log_measured, weighted_least_squa
 from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import ExactLaw, cents
+from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior import laplace
 from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import linearisation_errors, noise_widenings, predictor, worst_cents
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
@@ -64,7 +64,7 @@ def test_the_centre_that_a_rough_law_found_is_that_of_the_final_one(problem):
     columns, bounds = problem.parameters.fitted_columns, problem.parameters.fitted_bounds
     errors = np.sqrt(np.diagonal(problem.covariance))[columns]
     predict = predictor(board, models, "exact", problem.centre)
-    noise = np.exp(problem.centre[N_RIGIDITIES : N_RIGIDITIES + len(board.setups)])
+    noise = np.exp(problem.centre[len(RIGIDITIES) : len(RIGIDITIES) + len(board.setups)])
     scales, start = reading_sd(board.setups, noise), problem.centre[columns]
 
     residuals = log_measured(board) - predict(start[None, :])[0]

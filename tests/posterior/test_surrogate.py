@@ -7,10 +7,10 @@ import pytest
 from scipy.special import ndtr, ndtri
 
 from bayesplate.frequencies.laws import cents
+from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.draws import named_draws
 from bayesplate.posterior.inference import infer, pose
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.surrogate import (
     LEAST_ACCEPTANCE,
@@ -41,7 +41,7 @@ def inference(problem):
 
 def found(problem):
     coordinates = TailCoordinates.around(
-        problem.centre, problem.covariance, range(N_RIGIDITIES), problem.parameters.effect_columns
+        problem.centre, problem.covariance, range(len(RIGIDITIES)), problem.parameters.effect_columns
     )
     return find_surrogate(problem.posterior, problem.centre, problem.covariance, coordinates)
 
@@ -207,8 +207,8 @@ def test_with_and_without_a_surrogate_the_posterior_is_the_same(problem, inferen
     alone = infer(pose(problem.board, problem.prior, law="exact"), SamplerSettings(seed=6))
     assert inference.convergence.passed
     assert alone.convergence.passed
-    first, second = (i.chains.pooled[:, :N_RIGIDITIES] for i in (inference, alone))
-    inverse_ess = sum(1.0 / i.convergence.ess[:N_RIGIDITIES] for i in (inference, alone))
+    first, second = (i.chains.pooled[:, : len(RIGIDITIES)] for i in (inference, alone))
+    inverse_ess = sum(1.0 / i.convergence.ess[: len(RIGIDITIES)] for i in (inference, alone))
     assert np.all(np.abs(first.mean(axis=0) - second.mean(axis=0)) < 4 * second.std(axis=0) * np.sqrt(inverse_ess))
     for p in (0.05, 0.25, 0.5, 0.75, 0.95):
         below = (first < np.quantile(second, p, axis=0)).mean(axis=0)

@@ -31,7 +31,7 @@ from bayesplate.frequencies.model import SetupModel
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 from bayesplate.workflow.prepare import prepare
 
 Floats = NDArray[np.float64]
@@ -107,7 +107,8 @@ def _bare_models(design: str) -> tuple[SetupModel, ...]:
     parameters = Parameters(board)
     centre = parameters.theta(dict(estimate.values), np.array([setup.noise.median for setup in board.setups]))
     covariance = np.eye(parameters.n_dim)
-    covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.diag([HALF_WIDTH**2 / 9.0] * 2 + [0.0])
+    n = parameters.n_constants
+    covariance[:n, :n] = np.diag([HALF_WIDTH**2 / 9.0] * (n - 1) + [0.0])
     return exact_models(board, estimate.models, centre, covariance)
 
 

@@ -12,7 +12,7 @@ from bayesplate.diagnosis.evidence.draws import TermDraws, members_of, sizes_of
 from bayesplate.diagnosis.evidence.exact import draw_exact, under_exact_law
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.material import MODULI, moduli
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def draw_constants(
     drawn = [draw_exact(found, int(i), rng, int(n)) for i, n in zip(indices, counts, strict=True) if n]
     parts = [(one.log_rigidities, *_inputs(found, one)) for one in drawn]
     log_rigidities, thickness, nu_xy = (np.concatenate(part) for part in zip(*parts, strict=True))
-    values = dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))
+    values = found.ground.baseline.board.symmetry.rigidities(np.exp(log_rigidities).T, nu_xy)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], thickness, nu_xy)
     return ConstantDraws(values | dict(zip(MODULI, constants, strict=True)))
 

@@ -35,6 +35,7 @@ AT_LIMIT = 0.005
 _N_DRAWS = 2000
 
 NOTHING_LEFT = "three modes determine the three constants and leave nothing to judge by"
+NOTHING_LEFT_OF_ONE = "one mode determines the one constant and leaves nothing to judge by"
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,8 @@ def decide(found: Found, control: NullControl, others: Iterable[Variant] | None 
     ranked = answers(found)
     best = ranked[0] if ranked else None
     if not found.ground.n_directions:
-        return Verdict("undetectable", (), 0, best, NOTHING_LEFT)
+        is_one = found.ground.baseline.board.isotropic
+        return Verdict("undetectable", (), 0, best, NOTHING_LEFT_OF_ONE if is_one else NOTHING_LEFT)
     if best is None or found.against_none <= control.needed_from:
         return _without(found, best)
     passed = found.p_value(best.index)

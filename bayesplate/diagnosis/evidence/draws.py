@@ -12,7 +12,6 @@ from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.evidence.terms import Fold, normalised
 from bayesplate.diagnosis.shifts.laws import FormLaw
-from bayesplate.posterior.parameters import N_RIGIDITIES
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +24,7 @@ class TermDraws:
     ----------
     index : int
         Of the hypothesis.
-    log_rigidities : (n_draws, 3) array
+    log_rigidities : (n_draws, n_constants) array
         ln D_x, ln D_y, ln D_s.
     inputs : (n_draws, n_inputs) array
         Standard coordinates of the board's uncertain inputs.
@@ -98,20 +97,21 @@ def draw_hypothesis(
     log_density = terms.log_densities(seen[None, :])[:, 0]
     picked = np.sort(rng.choice(log_density.size, size=n_draws, p=normalised(log_density)))
     levels, cells = np.divmod(picked, table.n_cells)
-    first_input = N_RIGIDITIES + table.slopes.shape[2]
+    n = baseline.log_rigidities.size
+    first_input = n + table.slopes.shape[2]
     noise = hypothesis.noise.sd[levels]
     variance = noise[:, baseline.setup_index] ** 2 + baseline.own_variance
     variance[:, ~baseline.is_mode] = np.inf
     columns = _columns(baseline.slopes, table.slopes[cells], baseline.input_slopes)
-    joint = _regressed(columns, variance, seen - table.shift[cells], rng)
-    inside = joint[:, N_RIGIDITIES:first_input]
+    joint = _regressed(columns, variance, seen - table.shift[cells], rng, n)
+    inside = joint[:, n:first_input]
     every, wide = baseline.every, table if hypothesis.wide is None else hypothesis.wide
     middle = every.log_frequency - every.input_slopes @ every.inputs
     moving = _columns(every.slopes, wide.slopes[cells], every.input_slopes)
     return TermDraws(
         index=0,
         log_rigidities=baseline.log_rigidities
-        + joint[:, :N_RIGIDITIES]
+        + joint[:, :n]
         + table.moved[cells]
         + np.einsum("nkp,np->nk", table.moved_slopes[cells], inside),
         inputs=joint[:, first_input:],
@@ -195,21 +195,22 @@ def _of_members(found: Found, index: int, cells: NDArray[np.intp]) -> NDArray[np
     return np.stack(np.divmod(cells, members[1].coarse.n_cells), axis=1)
 
 
-def _regressed(columns: Floats, variance: Floats, target: Floats, rng: np.random.Generator) -> Floats:
-    """A draw of the coefficients for each target: flat on the three constants, standard normal on all others.
+def _regressed(columns: Floats, variance: Floats, target: Floats, rng: np.random.Generator, n_constants: int) -> Floats:
+    """A draw of the coefficients for each target: flat on the constants, standard normal on all others.
 
     Parameters
     ----------
     columns : (n, n_modes, n_coefficients) array
     variance, target : (n, n_modes) arrays
     rng : numpy.random.Generator
+    n_constants : int
 
     Returns
     -------
     (n, n_coefficients) array
     """
     weighted = np.swapaxes(columns / variance[:, :, None], 1, 2)
-    prior = np.r_[np.zeros(3), np.ones(columns.shape[2] - 3)]
+    prior = np.r_[np.zeros(n_constants), np.ones(columns.shape[2] - n_constants)]
     precision = weighted @ columns + np.diag(prior)
     factor = np.linalg.cholesky(precision)
     mean = np.linalg.solve(precision, (weighted @ target[:, :, None]))

@@ -130,7 +130,7 @@ def hypotheses(
     board = baseline.board
     reach = reach_of(board, baseline.setup_index, np.where(baseline.is_mode, baseline.residual, np.nan))
     levels, few = (noise_grid(board, few=are_few, reach=reach) for are_few in (False, True))
-    empty = nothing(baseline.every.log_frequency.size)
+    empty = nothing(baseline.every.log_frequency.size, baseline.log_rigidities.size)
     swaps = confusable(baseline)
     pairs = list(combinations([name for name in fine if name in paired], 2))
     each = ONE / max(len(fine) + bool(swaps), 1)

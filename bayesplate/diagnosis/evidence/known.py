@@ -2,7 +2,7 @@
 
 The sizes of a computed effect are the medians of their priors. Sizes that the board declares without stating them
 stand where its own fit has them, all other inputs at their nominal values, as in `bayesplate.estimates.least_squares`.
-Nothing is fitted but the three constants, so that an error may rise as well as fall.
+Nothing is fitted but the constants, so that an error may rise as well as fall.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import exact_models
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ _NEAR = 0.1
 
 @dataclass(frozen=True, eq=False)
 class KnownFit:
-    """The three constants fitted to a board with known effects of fixed sizes.
+    """The constants fitted to a board with known effects of fixed sizes.
 
     Attributes
     ----------
@@ -57,8 +57,8 @@ class KnownFit:
         Computed beyond those that the board declares.
     without : tuple of str
         Declared ones that are left out.
-    log_rigidities : (3,) array
-        ln of D_x, D_y, D_s (N m).
+    log_rigidities : (n_constants,) array
+        ln of the free rigidities (N m).
     moduli : (3,) array, Pa
         E_x, E_y, G_xy.
     errors : Errors
@@ -142,8 +142,8 @@ def known_fit(
     problem : PosedProblem
         The board as it stands.
     effects, without : sequence of str
-    start : (3,) array, optional
-        ln of D_x, D_y, D_s (N m) where the fit begins; by default the estimate of the board as it stands.
+    start : (n_constants,) array, optional
+        ln of the free rigidities (N m) where the fit begins; by default the estimate of the board as it stands.
     solved : sequence of SetupModel
         With the exact law, made near the start; by default they are solved there.
 
@@ -153,13 +153,13 @@ def known_fit(
     """
     board = with_known_sizes(problem.board.without(without), effects)
     inputs, target, scales = inputs_of(problem, board), log_measured(board), reading_scales(board)
-    start = np.log(problem.estimate.rigidities) if start is None else start
+    start = _estimated(problem) if start is None else start
     models = solved or _solved(problem, board, start)
-    law, rows = _law(models, inputs), _labelled(models)
+    law, rows = _law(board, models, inputs), _labelled(models)
     for _ in range(_MOST_LABELLINGS):
         fitted = _refit(law, rows, target, scales, start)
         if np.abs(fitted - start).max() > _NEAR:
-            law = _law(_solved(problem, board, fitted), inputs)
+            law = _law(board, _solved(problem, board, fitted), inputs)
             fitted = _refit(law, rows, target, scales, fitted)
         before, start = rows, fitted
         rows = _relabelled(problem, law(fitted[None, :]), rows)
@@ -172,7 +172,8 @@ def known_fit(
     modes = [mode for mode in modes if mode]
     misfit = normal_misfit(target, scales)
     errors = prediction_errors(law.of(labelled), target, misfit, fitted[None, :], modes=modes)
-    D_x, D_y, D_s = np.exp(fitted)
+    found = _values(board, fitted, inputs)
+    D_x, D_y, D_s = (found[name] for name in RIGIDITIES)
     constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
     return KnownFit(tuple(effects), tuple(without), fitted, constants, errors)
 
@@ -222,13 +223,18 @@ def inputs_of(problem: PosedProblem, board: Board) -> Values:
     return {**nominal, **{name: np.asarray(there[name][0]) for name in learnt if name in nominal}}
 
 
-def _law(models: Models, inputs: Values) -> Predictor:
-    """ln f (Hz) of all modes from (n, 3) ln D by the exact law, all else at its nominal value."""
-    return Predictor(lambda x: _values(x, inputs), models, "exact")
+def _law(board: Board, models: Models, inputs: Values) -> Predictor:
+    """ln f (Hz) of all modes from (n, n_constants) ln D by the exact law, all else at its nominal value."""
+    return Predictor(lambda x: _values(board, x, inputs), models, "exact", n_constants=board.symmetry.n)
 
 
-def _values(log_rigidities: Floats, inputs: Values) -> Values:
-    return {**inputs, **dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))}
+def _values(board: Board, log_rigidities: Floats, inputs: Values) -> Values:
+    return {**inputs, **board.symmetry.rigidities(np.exp(log_rigidities).T, inputs["poisson_xy"])}
+
+
+def _estimated(problem: PosedProblem) -> Floats:
+    """ln of the free rigidities of the board as it stands."""
+    return np.log(problem.board.symmetry.free_of(problem.estimate.values))
 
 
 def _solved(problem: PosedProblem, board: Board, at: Floats) -> Models:
@@ -239,17 +245,18 @@ def _solved(problem: PosedProblem, board: Board, at: Floats) -> Models:
     one model to the next, and errors of different modes would be compared.
     """
     inputs = inputs_of(problem, board)
-    values, meshed = _values(at, inputs), _values(np.log(problem.estimate.rigidities), inputs)
+    values, meshed = _values(board, at, inputs), _values(board, _estimated(problem), inputs)
     models = []
     for setup, before in zip(board.setups, problem.posterior.models, strict=True):
         system = system_of(board, setup)
         model = setup_model(system, values, system.plate(meshed))
         keeps = symmetry_of([model]) == symmetry_of([before])
         models.append(replace(model, places=before.places, others=before.others) if keeps else model)
-    weighted = np.concatenate([one.sensitivities(values) for one in models]) / reading_scales(board)[:, None]
+    slopes = board.symmetry.along(np.concatenate([one.sensitivities(values) for one in models]))
+    weighted = slopes / reading_scales(board)[:, None]
     fixed = board.with_priors({name: Quantity.exact(float(value)) for name, value in inputs.items()})
     parameters = Parameters(fixed)
-    covariance = np.eye(parameters.n_dim)
-    covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.linalg.inv(weighted.T @ weighted)
+    n, covariance = parameters.n_constants, np.eye(parameters.n_dim)
+    covariance[:n, :n] = np.linalg.inv(weighted.T @ weighted)
     centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
     return exact_models(fixed, models, centre, covariance, is_rough=True)

@@ -32,8 +32,6 @@ _ROUNDS = 3
 """Of labelling anew, from labels that were found before."""
 _MOST_WAYS, _WORTH = 6, 5.0
 """Ways to label the readings that are drawn from at most, and by how much of ln evidence the last may be worse."""
-_FEWEST = 4
-"""Readings with a label without which no round goes on: three constants, and one more to judge by."""
 
 
 def with_own_labels(ground: Ground) -> Ground:
@@ -149,7 +147,8 @@ def likely_labels(baseline: Baseline, log_frequency: Floats, noise: Floats, othe
                     is_likely = row[best] > LIKELY
                     result[n_before + at] = baseline.every.starts[i] + peaks.columns[best] if is_likely else -1
         n_before += len(setup.readings)
-    return result if np.sum(result >= 0) >= _FEWEST else otherwise
+    # Without as many readings as constants, and one more to judge by, no round goes on.
+    return result if np.sum(result >= 0) > baseline.log_rigidities.size else otherwise
 
 
 def _best(ground: Ground, one: Hypothesis, begun: Iterable[Rows]) -> Hypothesis:

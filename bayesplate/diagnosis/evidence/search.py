@@ -43,7 +43,7 @@ class Candidate:
     fine, coarse : Table
     raw, visible : (n_modes,) array
         Shift at nominal size before and after the constants are refitted, ln f; of the form that shows most.
-    moved : (3,) array
+    moved : (n_constants,) array
         What that refit takes from ln D, so that the constants of a board with the effect are larger by it.
     traced : (n_modes,) array, optional
         The visible shift at the constants of a board with the effect that looks like the one at hand: what the search

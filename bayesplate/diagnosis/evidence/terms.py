@@ -1,7 +1,7 @@
 """How probable readings are under an effect: a sum over its sizes and the noise, constants projected out.
 
-With a flat prior on the logarithms of the three constants the marginal density of the readings is that of their
-projection on the n - 3 directions that the constants cannot reach (the restricted likelihood). Under one cell of a
+With a flat prior on the logarithms of the constants the marginal density of the readings is that of their projection
+on the directions that they cannot reach, n - 3 of a board of wood (the restricted likelihood). Under one cell of a
 table and one level of noise the projection is normal, so that evidence, the prediction of a reading that was left out
 and the posterior of constants and sizes are sums of normal terms; many data sets go through at once.
 """
@@ -54,7 +54,7 @@ class Fold:
 
     @cached_property
     def blind(self) -> Floats:
-        """Orthonormal directions that the constants cannot reach: (n_used - 3, n_modes) array, zero where not used."""
+        """Orthonormal directions that the constants cannot reach: (n_left, n_modes) array, zero where not used."""
         slopes = self.baseline.slopes[self.used]
         left = np.linalg.svd(slopes, full_matrices=True)[0][:, slopes.shape[1] :]
         full = np.zeros((left.shape[1], self.baseline.n_modes))

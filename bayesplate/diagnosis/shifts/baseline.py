@@ -4,9 +4,10 @@ Around the estimate the logarithms of the readings are
 
     y = g + X (x - x_hat) + Z z + noise,
 
-with g the frequencies at the estimate, x the logarithms of D_x, D_y, D_s, and z the standard coordinates of the
-uncertain inputs. The constants are projected out, so that only n - 3 directions of a residual are left to be judged;
-the inputs have their priors and count as one more covariance.
+with g the frequencies at the estimate, x the logarithms of the free rigidities (D_x, D_y, D_s, of an isotropic board D
+alone), and z the standard coordinates of the uncertain inputs. The constants are projected out, so that of a residual
+only as many directions as there are readings beyond them are left to be judged; the inputs have their priors and count
+as one more covariance.
 """
 
 from __future__ import annotations
@@ -25,12 +26,11 @@ from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import same_modes, under_prior_scales
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import every_predictor
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -45,13 +45,13 @@ class Baseline:
     board : Board
     values : dict of float
         Rigidities and inputs at the estimate, SI.
-    log_rigidities : (3,) array
+    log_rigidities : (n_constants,) array
         x_hat.
     log_frequency : (n_modes,) array
         g, ln f (Hz) at the estimate.
     residual : (n_modes,) array
         ln measured less g, corrected to inputs at the middle of their priors.
-    slopes : (n_modes, 3) array
+    slopes : (n_modes, n_constants) array
         X, d ln f / d ln D.
     input_slopes : (n_modes, n_inputs) array
         Z, d ln f / d z.
@@ -166,7 +166,7 @@ class Baseline:
 
     @cached_property
     def absorbing(self) -> Floats:
-        """The matrix that takes a shift of the frequencies to the constants that absorb it best: (3, n_modes) array."""
+        """The matrix that takes a shift of the frequencies to the constants that absorb it best: (n, n_modes) array."""
         return np.asarray(np.linalg.pinv(self.slopes / self.scales[:, None]) / self.scales)
 
     def whitened(self, shift: Floats) -> Floats:
@@ -184,7 +184,7 @@ class Baseline:
         -------
         visible : (n_modes,) array
             What they leave of the shift: weighted by the readings' uncertainties it is never the larger one.
-        step : (3,) array
+        step : (n_constants,) array
             Change of ln D.
         """
         if self.predict is None or not np.isfinite(shift).all():
@@ -207,31 +207,31 @@ def _of_rows(predict: Predict | None, rows: NDArray[np.intp]) -> Predict | None:
 def baseline_of(problem: PosedProblem) -> Baseline:
     """The baseline of a problem that is ready to be sampled, at the centre of its posterior under the exact law."""
     board, parameters, models = problem.board, problem.parameters, problem.posterior.models
-    columns = parameters.fitted_columns
+    n, columns = parameters.n_constants, parameters.fitted_columns
     predict = every_predictor(board, models, "exact", problem.centre)
     at = problem.centre[columns]
     slopes = sensitivities(predict, at)
     values = parameters.values_at(problem.centre)
-    input_slopes, inputs = under_prior_scales(board, values, slopes[:, N_RIGIDITIES:], at[N_RIGIDITIES:])
+    input_slopes, inputs = under_prior_scales(board, values, slopes[:, n:], at[n:])
     discrepancies = [np.broadcast_to(one.discrepancies(values)[0], len(one.every_place)) for one in models]
     spectrum = Spectrum(
         log_frequency=predict(at[None, :])[0],
-        slopes=slopes[:, :N_RIGIDITIES],
+        slopes=slopes[:, :n],
         input_slopes=input_slopes,
         places=tuple(model.every_place for model in models),
         inputs=inputs,
         peaks=problem.posterior.peaks,
-        predict=predict.with_fixed(at[N_RIGIDITIES:]),
+        predict=predict.with_fixed(at[n:]),
         discrepancy=np.concatenate(discrepancies),
     )
     rows = spectrum.first_of_each([len(setup.readings) for setup in board.setups])
     bare = Baseline(
         board=board,
         values=values,
-        log_rigidities=at[:N_RIGIDITIES],
+        log_rigidities=at[:n],
         log_frequency=np.zeros(rows.size),
         residual=log_measured(board),
-        slopes=np.zeros((rows.size, N_RIGIDITIES)),
+        slopes=np.zeros((rows.size, n)),
         input_slopes=np.zeros((rows.size, inputs.size)),
         places=(),
         symmetry=symmetry_of(models),
@@ -253,17 +253,17 @@ def baseline_at(board: Board, estimate: Estimate, predict: Predict | None = None
     board : Board
     estimate : Estimate
     predict : callable, optional
-        The exact law without effects: (n, n_modes) ln f (Hz) from (n, 3) ln D; by default it is linear.
+        The exact law without effects: (n, n_modes) ln f (Hz) from (n, n_constants) ln D; by default it is linear.
     """
     if Parameters(board).inputs:
         raise ValueError("wanted a board of exact inputs, got uncertain ones: pose the problem instead")
     return Baseline(
         board=board,
         values=estimate.values,
-        log_rigidities=np.log([float(estimate.values[name]) for name in RIGIDITIES]),
+        log_rigidities=np.log(board.symmetry.free_of(estimate.values)),
         log_frequency=log_measured(board) - estimate.residuals,
         residual=estimate.residuals,
-        slopes=estimate.sensitivities,
+        slopes=board.symmetry.along(estimate.sensitivities),
         input_slopes=np.zeros((estimate.residuals.size, 0)),
         places=places_of(estimate.models),
         symmetry=symmetry_of(estimate.models),

@@ -20,7 +20,7 @@ from bayesplate.modes.plate import Parity
 from bayesplate.plate.board import Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
-from bayesplate.posterior.parameters import N_RIGIDITIES, Parameters
+from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class FormLaw:
         ----------
         baseline : Baseline
             Whose inputs are taken.
-        log_rigidities : (n, 3) array
+        log_rigidities : (n, n_constants) array
         values : dict of (n,) array
             The form's free parameters by name, SI.
         """
@@ -61,9 +61,7 @@ class FormLaw:
 
     def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
         """The same of all modes that the baseline's readings may be: (n, n_every) array."""
-        inputs = _inputs(baseline, self.form)
-        constants = dict(zip(RIGIDITIES, np.exp(log_rigidities).T, strict=True))
-        there: Values = inputs | dict(values) | constants
+        there = _with_rigidities(baseline, _inputs(baseline, self.form) | dict(values), np.exp(log_rigidities).T)
         followed = self.following or tuple(((),) * len(model.stations) for model in self.models)
         parts = [
             mean_log_frequency(
@@ -119,8 +117,8 @@ class FormLaw:
     def _without(self, baseline: Baseline) -> Values:
         """Values of the baseline with the effect absent."""
         nothing = {free.name: np.full(1, free.null) for free in self.form.free}
-        constants = dict(zip(RIGIDITIES, np.exp(baseline.log_rigidities)[:, None], strict=True))
-        return _inputs(baseline, self.form) | nothing | constants
+        free = np.exp(baseline.log_rigidities)[:, None]
+        return _with_rigidities(baseline, _inputs(baseline, self.form) | nothing, free)
 
     def _by_frequency(self, baseline: Baseline, setup: int, model: SetupModel) -> tuple[Place, ...]:
         """Where the modes of a setup stand on the plate with the effect absent, each at a place of its own."""
@@ -153,7 +151,8 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
     baseline : Baseline
     form : Form
     half_width : float, optional
-        Of the region in ln D_x / D_s and ln D_y / D_s; by default three standard deviations of the fit.
+        Of the region in ln D_x / D_s and ln D_y / D_s, of which an isotropic board has none; by default three standard
+        deviations of the fit.
 
     Returns
     -------
@@ -170,12 +169,12 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
     )
     noise = np.array([setup.noise.median for setup in board.setups])
     centre = parameters.theta(at_middle, noise)
-    covariance = np.eye(parameters.n_dim)
+    n, covariance = parameters.n_constants, np.eye(parameters.n_dim)
     if half_width is None:
         weighted = baseline.slopes / baseline.scales[:, None]
-        covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.linalg.inv(weighted.T @ weighted)
+        covariance[:n, :n] = np.linalg.inv(weighted.T @ weighted)
     else:
-        covariance[:N_RIGIDITIES, :N_RIGIDITIES] = np.diag([half_width**2 / 9.0] * 2 + [0.0])
+        covariance[:n, :n] = np.diag([half_width**2 / 9.0] * (n - 1) + [0.0])
     return FormLaw(form, exact_models(board, models, centre, covariance, accepted_cents=_ACCEPTED_CENTS))
 
 
@@ -210,6 +209,11 @@ def _log_frequencies(model: SetupModel, following: Sequence[Following], values: 
     for each in following:
         squared[:, [place.parity == each.block.parity for place in model.every_place]] = each.eigenvalues(weights)
     return log_frequency(squared)
+
+
+def _with_rigidities(baseline: Baseline, values: Values, free: Floats) -> Values:
+    """Values with D_x, D_y, D_s from the (n_constants, n) free rigidities, by the Poisson ratio among them."""
+    return {**values, **baseline.board.symmetry.rigidities(free, values["poisson_xy"])}
 
 
 def _inputs(baseline: Baseline, form: Form) -> dict[str, Floats]:

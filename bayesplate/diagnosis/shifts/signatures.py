@@ -1,6 +1,6 @@
 """What each effect would do to the frequencies, how much of it the constants hide, and which effects look alike.
 
-A fit of three constants absorbs most of any effect: only its visible part, what is left after the constants have been
+A fit of the constants absorbs most of any effect: only its visible part, what is left after the constants have been
 fitted again, can ever be traced, and the rest has gone into the constants as a bias. All of it by exact solves at the
 effect's nominal size; first-order columns of the bare plate are wrong by factors here.
 """
@@ -25,7 +25,6 @@ from bayesplate.plate.material import MODULI, Moduli, moduli
 from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import predictor
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -117,7 +116,7 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
     tuple of Signature
     """
     predict = constants_predictor(problem)
-    start = problem.centre[:N_RIGIDITIES]
+    start = problem.centre[: problem.parameters.n_constants]
     base = predict(start[None, :])[0]
     scales = problem.estimate.scales
     noise = float(1.0 / np.sqrt(np.mean(1.0 / cents(scales) ** 2)))
@@ -141,9 +140,9 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
 
 
 def constants_predictor(problem: PosedProblem) -> Predictor:
-    """ln f of all modes as a function of ln D_x, ln D_y, ln D_s alone, inputs as at the estimate."""
+    """ln f of all modes as a function of the logarithms of the free rigidities alone, inputs as at the estimate."""
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
-    return predict.with_fixed(problem.centre[problem.parameters.fitted_columns][N_RIGIDITIES:])
+    return predict.with_fixed(problem.centre[problem.parameters.fitted_columns][predict.n_constants :])
 
 
 def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, tuple[Parameter, ...]]:
@@ -210,8 +209,8 @@ def _bias(problem: PosedProblem, true: Floats, fitted: Floats) -> dict[str, floa
     thickness, nu_xy = values["thickness"], values["poisson_xy"]
 
     def constants(x: Floats) -> Moduli:
-        D_x, D_y, D_s = np.exp(x)
-        return moduli(D_x, D_y, D_s, thickness, nu_xy)
+        found = problem.board.symmetry.rigidities(np.exp(x), nu_xy)
+        return moduli(found["D_x"], found["D_y"], found["D_s"], thickness, nu_xy)
 
     before, after = constants(true), constants(fitted)
     return {name: 100.0 * float(np.ravel(b / a)[0] - 1.0) for name, a, b in zip(MODULI, before, after, strict=True)}

@@ -25,7 +25,7 @@ class Spectrum:
     ----------
     log_frequency : (n_every,) array
         ln f (Hz) at the estimate.
-    slopes : (n_every, 3) array
+    slopes : (n_every, n_constants) array
         d ln f / d ln D.
     input_slopes : (n_every, n_inputs) array
         d ln f / d z.

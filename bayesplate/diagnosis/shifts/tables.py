@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.laws import FormLaw
-from bayesplate.posterior.parameters import N_RIGIDITIES
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
@@ -47,9 +46,9 @@ class Table:
         those that they are taken for.
     slopes : (n_cells, n_modes, n_tangents) array
         Change of the shift over one standard deviation of the cell.
-    moved : (n_cells, 3) array
+    moved : (n_cells, n_constants) array
         Change of ln D by the refit.
-    moved_slopes : (n_cells, 3, n_tangents) array
+    moved_slopes : (n_cells, n_constants, n_tangents) array
     form : (n_cells,) array of int
         Which form of the effect; of the first one where there are two.
     z : (n_cells, n_parameters) array
@@ -142,15 +141,15 @@ def together(one: Table, other: Table) -> Table:
     )
 
 
-def nothing(n_modes: int) -> Table:
+def nothing(n_modes: int, n_constants: int = 3) -> Table:
     """No effect: one cell without shift."""
     return Table(
         members=(),
         weights=np.ones(1),
         shift=np.zeros((1, n_modes)),
         slopes=np.zeros((1, n_modes, 0)),
-        moved=np.zeros((1, N_RIGIDITIES)),
-        moved_slopes=np.zeros((1, N_RIGIDITIES, 0)),
+        moved=np.zeros((1, n_constants)),
+        moved_slopes=np.zeros((1, n_constants, 0)),
         form=np.zeros(1, dtype=np.intp),
         z=np.zeros((1, 0)),
         z_slopes=np.zeros((1, 0)),
@@ -171,10 +170,10 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Float
     -------
     shift : (n, n_every) array
         Not a number where the law gives no frequency.
-    moved : (n, 3) array
+    moved : (n, n_constants) array
     """
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
-    moved = np.zeros((len(z), N_RIGIDITIES))
+    moved = np.zeros((len(z), baseline.log_rigidities.size))
     shift = np.empty((len(z), baseline.every.log_frequency.size))
     moving = np.arange(len(z))
     for n_done in range(_REFITS):
@@ -191,7 +190,7 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Float
 
 
 def nominal_shift(baseline: Baseline, law: FormLaw) -> tuple[Floats, Floats, Floats]:
-    """Raw and visible shift at the nominal size, (n_modes,) arrays, ln f, and what the refit hides of ln D, (3,)."""
+    """Raw and visible shift at the nominal size, (n_modes,) arrays, ln f, and what the refit hides of ln D, (n,)."""
     values = {free.name: np.array([free.nominal]) for free in law.form.free}
     raw = law.log_frequencies(baseline, baseline.log_rigidities[None, :], values)[0] - baseline.log_frequency
     visible, step = baseline.refitted_to(raw)

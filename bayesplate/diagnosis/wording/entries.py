@@ -15,7 +15,7 @@ from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, Exch
 from bayesplate.diagnosis.wording.fates import fate_of, fate_of_exchange
 from bayesplate.effects import EFFECTS, effects_of
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.material import MODULI, moduli
 from bayesplate.results.contract import finite
 
 Floats = NDArray[np.float64]
@@ -112,9 +112,10 @@ def _where(one: Candidate) -> str:
 def _bias(found: Found, one: Candidate) -> dict[str, float]:
     """What ignoring the effect at its nominal size does to the moduli, percent."""
     values = found.ground.baseline.values
-    fitted = {name: float(values[name]) for name in RIGIDITIES}
-    true = {name: v * float(np.exp(m)) for (name, v), m in zip(fitted.items(), one.moved, strict=True)}
     thickness, nu_xy = values["thickness"], values["poisson_xy"]
+    symmetry = found.ground.baseline.board.symmetry
+    free = symmetry.free_of(values)
+    fitted, true = (symmetry.rigidities(each, nu_xy) for each in (free, free * np.exp(one.moved)))
     ignoring, knowing = (
         moduli(np.asarray(D["D_x"]), np.asarray(D["D_y"]), np.asarray(D["D_s"]), thickness, nu_xy)
         for D in (fitted, true)
