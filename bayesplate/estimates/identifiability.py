@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from bayesplate.effects.words import joined
 from bayesplate.errors import NotIdentifiableError
+from bayesplate.estimates.leave_one_out import HIGH_LEVERAGE
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import ORTHOTROPIC, Symmetry
 
 WITHIN_A_FACTOR = 2.0
 """A constant is identifiable if its 95 % interval at the expected noise stays within this factor of the estimate."""
 
-HIGH_LEVERAGE = 0.9
 LOW_SHARE_PERCENT = 60.0
 _HELD = {"clamped", "supported"}
 """Edges that do not move: where all are, the integral of w_xx w_yy is that of w_xy^2."""
@@ -159,8 +159,16 @@ def _modes(board: Board) -> str:
     return joined([f"{labels} of {name}" for name, labels in by_setup.items()])
 
 
-def remarks(board: Board, found: Identifiability) -> tuple[str, ...]:
-    """Sentences on what is weakly known, for the table and the summary; empty where there is nothing to say."""
+def remarks(board: Board, found: Identifiability, carrying: str | None = None) -> tuple[str, ...]:
+    """Sentences on what is weakly known, for the table and the summary; empty where there is nothing to say.
+
+    Parameters
+    ----------
+    board : Board
+    found : Identifiability
+    carrying : str, optional
+        What a fit says of modes that alone carry something; before there is one, their leverages here say it.
+    """
     sentences = [_weakest(found)]
     names = [
         (f"{label}" if len(board.setups) == 1 else f"{label} of {setup.name}")
@@ -172,6 +180,8 @@ def remarks(board: Board, found: Identifiability) -> tuple[str, ...]:
         sentences.append(
             f"{fix} exactly: nothing is left to check the model with, and the noise comes from its prior alone"
         )
+    elif carrying is not None:
+        sentences += [carrying] if carrying else []
     else:
         for name, leverage in zip(names, found.leverages, strict=True):
             if leverage > HIGH_LEVERAGE:

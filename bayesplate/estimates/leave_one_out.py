@@ -1,15 +1,44 @@
-"""Leave one mode out: refit without it by the exact law, and see how far its frequency is missed."""
+"""Leave one mode out: refit without it by the exact law, and see how far its frequency is missed.
+
+A mode of leverage above `HIGH_LEVERAGE` alone carries a constant or a size: without it that number is told by nothing,
+and the prediction of the mode, hundreds of cents off, says nothing about the model. Such a mode counts in no error of
+modes left out, and no score; where models are compared, in that of none of them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import Bounds, Misfit, Predict, n_constants
+from bayesplate.effects import EFFECTS
+from bayesplate.effects.words import effect_name, joined
+from bayesplate.estimates.refit import Bounds, Misfit, Predict, n_constants, sensitivities
 from bayesplate.estimates.side_by_side import most_likely_of_each
+from bayesplate.plate.board import Board
+
+HIGH_LEVERAGE = 0.9
+"""Share of a mode in its own prediction above which it alone carries a constant or a size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leverages:
+    """How much each mode decides its own prediction, to first order.
+
+    Attributes
+    ----------
+    values : (n_readings,) array
+        Share of a reading in its own prediction, 0 to 1; of a mode that was read in several sessions, of these readings
+        together.
+    carries : (n_readings,) array of int
+        Which parameter the mode alone carries, the constants first; -1: none, because others tell it as well.
+    """
+
+    values: NDArray[np.float64]
+    carries: NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +52,137 @@ class Errors:
     left_out : (n_modes,) array
         Against a refit that has not seen the mode; not a number everywhere if no more modes are given than constants,
         because then no fold determines them.
+    leverages : Leverages
+        At the fit of all modes.
     """
 
     in_sample: NDArray[np.float64]
     left_out: NDArray[np.float64]
+    leverages: Leverages
+
+    @property
+    def is_carried(self) -> NDArray[np.bool_]:
+        """Which readings are of a mode that alone carries a constant or a size: (n_modes,) array."""
+        return np.asarray(self.leverages.carries >= 0)
+
+    @property
+    def judged(self) -> NDArray[np.float64]:
+        """What is left out and counts: not a number where a mode alone carries a constant or a size."""
+        return np.where(self.is_carried, np.nan, self.left_out)
+
+    def at(self, readings: NDArray[np.intp], n_readings: int) -> Errors:
+        """The errors among those of more readings, by their indices; what the others have is not a number."""
+        in_sample, left_out, values = (np.full(n_readings, none) for none in (np.nan, np.nan, 0.0))
+        carries = np.full(n_readings, -1, dtype=np.intp)
+        in_sample[readings], left_out[readings] = self.in_sample, self.left_out
+        values[readings], carries[readings] = self.leverages.values, self.leverages.carries
+        return Errors(in_sample, left_out, Leverages(values, carries))
+
+
+@dataclass(frozen=True)
+class CarryingMode:
+    """A mode that alone carries a constant or a size, so that it is left out of every error of modes left out.
+
+    Attributes
+    ----------
+    setup, label : str
+    leverage : float
+        Share of the mode in its own prediction, above 0.9.
+    carries : str
+        What it carries: "E_y", or the name of an effect or an input.
+    """
+
+    setup: str
+    label: str
+    leverage: float
+    carries: str
+
+
+def leverages_of(
+    columns: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    modes: Sequence[Sequence[int]] | None = None,
+    n_open: int = 3,
+) -> Leverages:
+    """Leverages of readings that are fitted by weighted squares.
+
+    Parameters
+    ----------
+    columns : (n_readings, n_free) array
+        d ln f by the logarithms of the free rigidities, ln D_x, ln D_y, ln D_s, and by the standard coordinates of what
+        else is free, whose priors count as one more observation each.
+    scales : (n_readings,) array
+        Relative uncertainty of each; infinite where a reading is not used.
+    modes : sequence of sequence of int, optional
+        Readings of each mode; by default one each.
+    n_open : int
+        Number of free rigidities.
+
+    Returns
+    -------
+    Leverages
+    """
+    weighted = np.nan_to_num(columns / scales[:, None])
+    is_prior = np.arange(columns.shape[1]) >= n_open
+    covariance = np.linalg.pinv(weighted.T @ weighted + np.diag(is_prior.astype(np.float64)), hermitian=True)
+    hat = weighted @ covariance @ weighted.T
+    values, carries = np.zeros(len(weighted)), np.full(len(weighted), -1)
+    for mode in map(list, [(i,) for i in range(len(weighted))] if modes is None else modes):
+        shares, directions = np.linalg.eigh(hat[np.ix_(mode, mode)])
+        values[mode] = shares[-1]
+        if shares[-1] > HIGH_LEVERAGE:  # the variance of what it tells would grow most without it
+            told = covariance @ weighted[mode].T @ directions[:, -1]
+            carries[mode] = np.argmax(told**2 / np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
+    return Leverages(values, carries)
+
+
+def carrying_modes(board: Board, found: Leverages, names: Sequence[str]) -> tuple[CarryingMode, ...]:
+    """The modes of a board that alone carry something, in the order of its readings.
+
+    Parameters
+    ----------
+    board : Board
+    found : Leverages
+    names : sequence of str
+        Of the parameters, the constants first.
+    """
+    return tuple(
+        CarryingMode(setup, label, float(leverage), names[column])
+        for (setup, label), leverage, column in zip(_readings(board), found.values, found.carries, strict=True)
+        if column >= 0
+    )
+
+
+def united(*found: Iterable[CarryingMode]) -> tuple[CarryingMode, ...]:
+    """Modes that alone carry something under any of several models: they count under none, told as the first has it."""
+    modes: dict[tuple[str, str], CarryingMode] = {}
+    for one in chain.from_iterable(found):
+        modes.setdefault((one.setup, one.label), one)
+    return tuple(modes.values())
+
+
+def indices_of(modes: Iterable[CarryingMode], board: Board) -> tuple[int, ...]:
+    """Where the readings of modes stand among all of a board."""
+    named = {(one.setup, one.label) for one in modes}
+    return tuple(i for i, reading in enumerate(_readings(board)) if reading in named)
+
+
+def carrying_sentence(modes: Sequence[CarryingMode]) -> str:
+    """Which modes alone carry what, and what follows; empty where none does."""
+    if not modes:
+        return ""
+    several = len({one.setup for one in modes}) > 1
+    parts = []
+    for one in modes:
+        what = f"the size of {effect_name(one.carries)}" if one.carries in EFFECTS else one.carries
+        parts.append(f"mode {one.label}{f' of {one.setup}' if several else ''} alone carries {what}")
+    are = "it is" if len(modes) == 1 else "they are"
+    return f"{joined(parts)}: {are} left out of the left-out error"
+
+
+def _readings(board: Board) -> list[tuple[str, str]]:
+    """Setup and label of every reading."""
+    return [(setup.name, str(label)) for setup in board.setups for label in setup.labels]
 
 
 def prediction_errors(
@@ -36,6 +192,7 @@ def prediction_errors(
     starts: NDArray[np.float64],
     bounds: Bounds | None = None,
     modes: Sequence[Sequence[int]] | None = None,
+    scales: NDArray[np.float64] | None = None,
 ) -> Errors:
     """Errors of the most likely constants, in sample and with each mode left out in turn.
 
@@ -48,6 +205,10 @@ def prediction_errors(
     starts : (n_starts, n_free) array
         Within the bounds. Each fit begins at the one where its own sum of squares is lowest, or at the fit of all
         modes: Student's likelihood may have another peak without the mode.
+    modes : sequence of sequence of int, optional
+        Readings of each mode; by default one each.
+    scales : (n_modes,) array, optional
+        Relative uncertainties by which the leverages weigh the readings; by default those of normal errors.
 
     Returns
     -------
@@ -73,4 +234,5 @@ def prediction_errors(
         fitted = most_likely_of_each(predict, misfit, without, modes, bounds)
         for mode, predicted in zip(map(list, modes), predict(fitted), strict=True):
             left_out[mode] = (target - predicted)[mode]
-    return Errors(in_sample, left_out)
+    scales = 1.0 / np.abs(misfit(target)[1]) if scales is None else scales
+    return Errors(in_sample, left_out, leverages_of(sensitivities(predict, whole), scales, modes, n))

@@ -9,14 +9,13 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.identifiability import identifiability
+from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.spectrum import doubtful_labels, sign_conflicts, spectra
-from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.laplace import worst_cents
-from bayesplate.posterior.mode_errors import median_noise, mode_errors
+from bayesplate.posterior.mode_errors import carried_in_fit, mode_errors
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation, means_under
 from bayesplate.posterior.target import Posterior
 from bayesplate.posterior.veerings import contradicted_labels
@@ -35,9 +34,11 @@ class Assessment:
     ----------
     left_out : (n_modes,) array
         ln measured - ln predicted of every reading by the most likely constants of the others; not a number where
-        too few modes are left.
+        too few modes are left, or where the mode alone carries a constant or a size.
     leverages : (n_modes,) array
-        Share of each reading in its own prediction, at the posterior's median noise.
+        Share of each mode in its own prediction, at the posterior's median noise.
+    carrying : tuple of CarryingMode
+        Modes that alone carry a constant or a size.
     linear_errors : (n_some, n_every) array, cents
         Linear less exact law over the posterior, of every mode that the likelihood looks at.
     linear_is_enough : bool
@@ -54,6 +55,7 @@ class Assessment:
 
     left_out: Floats
     leverages: Floats
+    carrying: tuple[CarryingMode, ...]
     linear_errors: Floats
     linear_is_enough: bool
     exact_worst: float
@@ -81,7 +83,7 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     values = posterior_mean_values(problem, draws)
     found = spectra(models, values)
     errors = linearisation(inference, draws) if linear_errors is None else linear_errors
-    scales = reading_sd(problem.board.setups, median_noise(draws))
+    left_out = mode_errors(inference, draws)
     conflicts = (
         sentence
         for model in models
@@ -89,8 +91,9 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
         for sentence in sign_conflicts(model.setup, *found[model.setup.name], values, model.system.shaped)
     )
     return Assessment(
-        left_out=mode_errors(inference, draws).left_out,
-        leverages=identifiability(problem.estimate.sensitivities, scales, problem.board.symmetry).leverages,
+        left_out=left_out.judged,
+        leverages=left_out.leverages.values,
+        carrying=carried_in_fit(inference, left_out),
         linear_errors=errors,
         linear_is_enough=linear_is_enough(inference, draws, errors),
         exact_worst=worst_cents(models),

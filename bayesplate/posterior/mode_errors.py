@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.least_squares import log_measured
-from bayesplate.estimates.leave_one_out import Errors, prediction_errors
+from bayesplate.estimates.leave_one_out import CarryingMode, Errors, carrying_modes, prediction_errors
 from bayesplate.estimates.refit import deviance_misfit
+from bayesplate.plate.readings import reading_sd
 from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
@@ -26,7 +27,16 @@ def mode_errors(inference: Inference, draws: Draws) -> Errors:
     predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
     misfit = deviance_misfit(problem.posterior.readings, median_noise(draws))
     starts, bounds = _starts(problem, draws), problem.parameters.fitted_bounds
-    return prediction_errors(predict, log_measured(problem.board), misfit, starts, bounds, same_modes(problem.board))
+    scales = reading_sd(problem.board.setups, median_noise(draws))
+    target, modes = log_measured(problem.board), same_modes(problem.board)
+    return prediction_errors(predict, target, misfit, starts, bounds, modes, scales)
+
+
+def carried_in_fit(inference: Inference, errors: Errors) -> tuple[CarryingMode, ...]:
+    """The modes that alone carry a constant or a size of a fit."""
+    board = inference.problem.board
+    names = (*board.symmetry.moduli, *(one.effect or one.name for one in board.uncertain))
+    return carrying_modes(board, errors.leverages, names)
 
 
 def median_noise(draws: Draws) -> NDArray[np.float64]:

@@ -53,7 +53,9 @@ def summary_sentences(summary: Summary) -> list[str]:
     left_out = error.leave_one_out_rms_cents
     missed = f"The fit misses the frequencies by {_cents(error.in_sample_rms_cents)}"
     if left_out is None:
-        sentences.append(f"{missed}; there are too few modes to test it on one that it has not seen.")
+        all_carry = "every mode alone carries a constant or a size, so that nothing is left"
+        untested = all_carry if summary.carrying_modes else "there are too few modes"
+        sentences.append(f"{missed}; {untested} to test it on one that it has not seen.")
     else:
         sentences.append(f"{missed}; a mode that it has not seen, by {_cents(left_out)}.")
     if summary.model.isotropic:

@@ -16,7 +16,7 @@ from bayesplate.diagnosis.wording.tables import (
     what_is_quoted,
 )
 from bayesplate.diagnosis.wording.told import headline_sentence, remarks, shown_model, verdict_sentences, warnings
-from bayesplate.diagnosis.wording.words import VERDICTS
+from bayesplate.diagnosis.wording.words import IN_PART, VERDICTS
 from bayesplate.report.content import constants_table, summary_sentences
 from bayesplate.results.contract import Elastic, Rigidity
 from bayesplate.results.summary import Summary
@@ -76,7 +76,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
         sizes_table(diagnosis),
     )
     return DiagnosisSection(
-        heading=VERDICTS[diagnosis.verdict].heading,
+        heading=IN_PART if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading,
         verdicts=tuple((word, one.heading, word == diagnosis.verdict) for word, one in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),
         known=known_sentence(diagnosis.known),
@@ -94,11 +94,12 @@ def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
     """A summary with the constants that are to be quoted, and the errors of the fit that they stand for.
 
     Without a diagnosis it stays as it is; after one the constants are the averaged ones, and the errors those of the
-    first fit unless one model was named.
+    first fit unless one model was named, be it in part.
     """
     if diagnosis is None:
         return summary
-    errors = diagnosis.after if diagnosis.verdict == "named" else diagnosis.before
+    is_after = diagnosis.verdict == "named" or diagnosis.named_in_part
+    errors = diagnosis.after if is_after else diagnosis.before
     return replace(
         summary,
         elastic=Elastic(**diagnosis.elastic_averaged),
@@ -108,6 +109,7 @@ def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
             in_sample_rms_cents=errors.in_sample_rms_cents,
             leave_one_out_rms_cents=errors.leave_one_out_rms_cents,
         ),
+        carrying_modes=diagnosis.carrying_modes,
     )
 
 

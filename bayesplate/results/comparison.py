@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bayesplate.estimates.coefficients import CoefficientRows
-from bayesplate.estimates.leave_one_out import Errors
+from bayesplate.estimates.leave_one_out import CarryingMode, Errors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI
@@ -120,6 +120,8 @@ class Comparison:
     theories : tuple of TheoryRow
         Thin, then shear-flexible.
     verdict : BetterTheory
+    carrying_modes : tuple of CarryingMode
+        Modes that alone carry a constant or a size in one of the theories: they count in the left-out error of none.
     """
 
     format: int
@@ -130,6 +132,7 @@ class Comparison:
     prior: str
     theories: tuple[TheoryRow, ...]
     verdict: BetterTheory
+    carrying_modes: tuple[CarryingMode, ...] = field(default=(), kw_only=True)
 
     def __repr__(self) -> str:
         return f"<Comparison of {self.name}: {self.verdict.sentence}>"
@@ -169,6 +172,20 @@ def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Met
     )
 
 
+def judged_alike(rows: Sequence[TheoryRow], carrying: Sequence[CarryingMode]) -> tuple[TheoryRow, ...]:
+    """The theories without what modes say when left out that alone carry something in one of them."""
+    carried = {(one.setup, one.label) for one in carrying}
+
+    def judged(row: TheoryRow) -> TheoryRow:
+        modes = tuple(
+            replace(one, left_out_cents=None) if (one.setup, one.label) in carried else one for one in row.modes
+        )
+        left_out = rms([one.left_out_cents for one in modes])
+        return replace(row, modes=modes, error=replace(row.error, leave_one_out_rms_cents=left_out))
+
+    return tuple(map(judged, rows))
+
+
 def origin_of(setup: str, origin: CoefficientRows) -> Origin:
     """Where the coefficients of a setup come from, as it stands in compare.json."""
     r_squared = {str(label): r for label, r in origin.r_squared.items()}
@@ -179,7 +196,7 @@ def better_theory(thin: TheoryRow, sheared: TheoryRow) -> BetterTheory:
     """Which theory predicts the left-out modes better."""
     before, after = thin.error.leave_one_out_rms_cents, sheared.error.leave_one_out_rms_cents
     if before is None or after is None:
-        return BetterTheory(None, "Too few modes to leave one out: the two theories cannot be told apart.")
+        return BetterTheory(None, "No mode can be left out and foretold: the two theories cannot be told apart.")
     if abs(after - before) < SAME_CENTS:
         better, word = None, "changes nothing"
     else:

@@ -41,9 +41,10 @@ class ModeRow:
     rounding_cents : tuple of float or None
         Ends of the rounding interval over the reading; None where it is not rounded.
     left_out_cents : float or None
-        Measured over predicted by the most likely constants of the other readings; None where too few are left.
+        Measured over predicted by the most likely constants of the other readings; None where too few are left, or
+        where the mode alone carries a constant or a size.
     leverage : float
-        Share of the reading in its own prediction.
+        Share of the mode in its own prediction, what else is free counted in.
     label_correlation : float
         Of the mode's shape with what its label names.
     label_origin : "card", "doubtful" or "proposed"

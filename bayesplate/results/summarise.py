@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.identifiability import remarks
+from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
@@ -144,13 +145,14 @@ def summarise(
         sampler=sampler_health(inference.chains, inference.convergence),
         certificate=certificate,
         identifiability=(
-            *remarks(board, problem.identifiability),
+            *remarks(board, problem.identifiability, carrying_sentence(assessment.carrying)),
             *prior_remarks(draws, problem.prior),
             *input_remarks(draws, board),
         ),
         warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
         doubts=doubts_of(problem, assessment, certificate),
         request=request,
+        carrying_modes=assessment.carrying,
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 
+from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.posterior.certificate import Certificate
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
 from bayesplate.results.joint import Joint
@@ -14,6 +15,8 @@ from bayesplate.results.peaks import AssignedPeak, Spectrum
 from bayesplate.results.words import GPA, constant_name, interval, plus_minus
 
 FORMAT = 1
+TOO_FEW_LEFT = "too few modes to leave one out"
+NONE_JUDGED = "no left-out error, because every mode alone carries a constant or a size"
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,8 @@ class ErrorFigures:
     in_sample_rms_cents : float
         Of the residuals of `Summary.modes`: readings over posterior mean predictions.
     leave_one_out_rms_cents : float or None
-        Of each reading by the most likely constants of the others; None where too few are left.
+        Of each reading by the most likely constants of the others, those of `Summary.carrying_modes` not counted; None
+        where too few are left, or none.
     linearisation_rms_cents : float or None
         Linear less exact law over the posterior.
     exact_law_worst_cents : float
@@ -193,6 +197,8 @@ class Summary(Run):
         Those of the warnings that are reasons not to trust the constants.
     request : Request or None
         None for a board of a campaign, whose draws follow from all boards.
+    carrying_modes : tuple of CarryingMode
+        Modes that alone carry a constant or a size: they count in no error of modes left out.
     """
 
     converged: bool
@@ -218,6 +224,12 @@ class Summary(Run):
     warnings: tuple[str, ...]
     doubts: tuple[str, ...] = ()
     request: Request | None = None
+    carrying_modes: tuple[CarryingMode, ...] = ()
+
+    @property
+    def why_no_left_out(self) -> str:
+        """Why there is no error of modes left out, where there is none."""
+        return NONE_JUDGED if self.carrying_modes else TOO_FEW_LEFT
 
     def __repr__(self) -> str:
         constants = ", ".join(f"{name} = {plus_minus(entry, GPA)} GPa" for name, entry in self.elastic.items())

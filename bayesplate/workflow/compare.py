@@ -10,18 +10,19 @@ from typing import Any, get_args
 
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.coefficients import CoefficientSource, named_table
+from bayesplate.estimates.leave_one_out import CarryingMode, united
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
 from bayesplate.modes.threads import one_thread_each
 from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
-from bayesplate.posterior.mode_errors import mode_errors
+from bayesplate.posterior.mode_errors import carried_in_fit, mode_errors
 from bayesplate.posterior.reweighting import effective_draws, law_weights
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.report.plots import ComparePlots
 from bayesplate.results.archive import to_arviz
-from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, theory_row
+from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, judged_alike, theory_row
 from bayesplate.results.contract import NOT_IN_JSON
 from bayesplate.results.folder import json_text, make_folder, require_new, write_text
 from bayesplate.results.store import posterior_archive
@@ -147,14 +148,19 @@ def compare(
     for problem in problems:  # what cannot be used is told before anything is sampled
         paper_system(problem.board, problem.estimate, coefficients, compared=False)
     theories: list[TheoryRow] = []
+    carrying: list[CarryingMode] = []
     sampled: dict[str, tuple[Inference, Draws]] = {}
     for problem in problems:
         posteriors, inference, draws = _posteriors(problem, SamplerSettings(seed=seed), progress)
         labelled = inference.problem  # as the draws label its peaks: all methods are held against the same readings
         system = paper_system(labelled.board, labelled.estimate, coefficients)
         methods = [*point_methods(labelled, system, expected_sd(labelled)), *posteriors]
-        theories.append(theory_row(labelled, system, methods, mode_errors(inference, draws)))
+        errors = mode_errors(inference, draws)
+        theories.append(theory_row(labelled, system, methods, errors))
+        carrying += carried_in_fit(inference, errors)
         sampled[theories[-1].theory] = inference, draws
+    carrying_any = united(carrying)
+    alike = judged_alike(theories, carrying_any)
     result = CompareResult(
         format=FORMAT,
         name=problems[0].board.name,
@@ -162,8 +168,9 @@ def compare(
         versions=versions(),
         card_sha256=prepared[0].card.sha256,
         prior=problems[0].prior.name,
-        theories=tuple(theories),
-        verdict=better_theory(*theories),
+        theories=alike,
+        verdict=better_theory(*alike),
+        carrying_modes=carrying_any,
         sampled=sampled,
     )
     for path in files:

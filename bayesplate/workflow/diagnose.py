@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
 from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
+from bayesplate.diagnosis.decision.in_part import named_in_part
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, decide
 from bayesplate.diagnosis.evidence.folds import Nested
 from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
+from bayesplate.diagnosis.evidence.leverages import carrying
 from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, made_to_choose, null_control
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
@@ -27,9 +29,11 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
+from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, indices_of, united
 from bayesplate.modes.threads import one_thread_each
 from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.survivors import survivors
+from bayesplate.plate.material import MODULI
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots
@@ -50,7 +54,7 @@ if TYPE_CHECKING:
 
 _NULL_LINE = 7
 _MOST_FINALISTS = 3
-_FIT, _SEARCH, _KNOWN, _CONTROL = 3.0, 3.0, 0.5, 1.0
+_FIT, _SEARCH, _KNOWN, _CONTROL, _CHOICE = 3.0, 3.0, 0.5, 0.5, 0.5
 """How long the parts take beside each other, for the time that is left."""
 
 
@@ -168,7 +172,7 @@ def diagnose(
     begun = opened(problem, seed, out, force=force, resume=resume, first=BEFORE)
     folder = begun.folder
 
-    stages = Stages(progress, _FIT + _SEARCH + _KNOWN + _CONTROL + _FIT)
+    stages = Stages(progress, _FIT + _SEARCH + _KNOWN + _CONTROL + _FIT + _CHOICE)
 
     def run(under: Problem, name: str, stage: str) -> Fitted:
         def refuse(inference: Inference) -> None:
@@ -186,11 +190,10 @@ def diagnose(
     stages.begin("the same search on simulated boards", _CONTROL)
     control = null_control(ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
-    folded = nested_of(found, control)
-    if verdict.index and folded is not None:
-        control = made_to_choose(ground, control, float(folded.ratio[0]))
+    folded = nested_of(found, control, verdict.tried)
+    in_part = named_in_part(found, verdict, control, folded)
     finals = verdict.fitted_again[:_MOST_FINALISTS]
-    stages.left = _FIT * len(finals)
+    stages.left = _FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
     refits: dict[int, Fitted] = {}
     failures = []
     for answer in finals:
@@ -200,14 +203,24 @@ def diagnose(
             refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
             failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
-    after = refits.get(verdict.index, before)
+    after = refits.get(verdict.tried, before) if verdict.index or in_part else before
+    board = before.inference.problem.board
+    known_carrying = (carrying_modes(board, one.errors.leverages, MODULI) for one in known)
+    of_fits = (one.summary.carrying_modes for one in (before, *refits.values()))
+    carrying_any = united(carrying(found, verdict.tried), *of_fits, *known_carrying)
+    folded = folded and folded.without(indices_of(carrying_any, board))
+    if verdict.index and folded is not None and folded.counted.any():
+        stages.begin("the same search on simulated boards, made to choose", _CHOICE)
+        control = made_to_choose(ground, control, float(folded.ratio[0]), folded.carried)
     notes = [*after.inference.problem.doubts, *failures]  # what an effect explains is no doubt any more
     if after is not before:
-        with_words = next(answer_words(found, one) for one in finals if one.index == verdict.index)
+        with_words = next(answer_words(found, one) for one in finals if one.index == verdict.tried)
         first, last = (one.inference.problem.board for one in (before, after))
         told = relabelled_sentence(first, last, with_words)
         notes += [told] if told else []
-    case = _case(found, verdict, control, folded, known, before, finals, refits, tuple(notes))
+    case = _case(
+        found, verdict, control, folded, known, before, after, finals, refits, tuple(notes), in_part, carrying_any
+    )
     diagnosis = diagnosis_of(case)
     if folder is not None:
         if after is not before:
@@ -228,11 +241,13 @@ def _case(
     folded: Nested | None,
     known: Sequence[KnownFit],
     before: Fitted,
+    after: Fitted,
     finals: Sequence[Answer],
     refits: Mapping[int, Fitted],
     notes: tuple[str, ...],
+    in_part: tuple[str, ...],
+    carrying_any: tuple[CarryingMode, ...],
 ) -> Case:
-    after = refits.get(verdict.index, before)
     is_refitted = after is not before
     return Case(
         found=found,
@@ -240,7 +255,7 @@ def _case(
         control=control,
         folded=folded,
         before=Side(0, before.summary, before.draws, _measured(before)),
-        after=Side(verdict.index if is_refitted else 0, after.summary, after.draws, _measured(after)),
+        after=Side(verdict.tried if is_refitted else 0, after.summary, after.draws, _measured(after)),
         claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
         recommendation=advice(found, verdict, before.problem.prior, before.summary.seed),
         known=known,
@@ -248,6 +263,8 @@ def _case(
         drawn={index: one.draws for index, one in refits.items()},
         has_slip=bool(before.inference.problem.slips),
         notes=notes,
+        in_part=in_part,
+        carrying=carrying_any,
     )
 
 

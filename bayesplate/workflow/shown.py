@@ -11,8 +11,9 @@ from bayesplate.campaigns.tables import campaign_check_tables, campaign_tables, 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
-from bayesplate.diagnosis.wording.told import alike_sentence, verdict_sentence, warnings
+from bayesplate.diagnosis.wording.told import alike_sentence, carrying_words, verdict_sentence, warnings
 from bayesplate.effects.words import effect_names
+from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
@@ -113,7 +114,7 @@ def show_fit(summary: Summary | CampaignSummary) -> Shown:
     closing = (
         f"{kind}{model.theory} plate{effects}, {model.law} law. Error rms "
         f"{error.in_sample_rms_cents:.1f} cents in sample, "
-        + (f"{left_out:.1f} left out" if left_out is not None else "too few modes to leave one out")
+        + (f"{left_out:.1f} left out" if left_out is not None else summary.why_no_left_out)
         + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )
     checked = summary.certificate
@@ -148,7 +149,9 @@ def show_compare(comparison: Comparison) -> Shown:
             setup = f", setup {origin.setup}" if len(one.coefficients) > 1 else ""
             told.setdefault(origin.sentence, []).append(one.theory + setup)
     remarks = [f"coefficients of paper and percentile ({', '.join(where)}): {text}" for text, where in told.items()]
-    return Shown(tuple(tables), (*remarks, METHODS_REMARK), (), comparison.verdict.sentence)
+    carrying = carrying_sentence(comparison.carrying_modes)
+    told_last = (METHODS_REMARK, *([carrying] if carrying else []))
+    return Shown(tuple(tables), (*remarks, *told_last), (), comparison.verdict.sentence)
 
 
 def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
@@ -156,7 +159,13 @@ def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
     if isinstance(diagnosis, CampaignDiagnosis):
         told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
         return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
-    told = (known_sentence(diagnosis.known), *diagnosis.sentences, alike_sentence(diagnosis), diagnosis.recommendation)
+    told = (
+        known_sentence(diagnosis.known),
+        carrying_words(diagnosis),
+        *diagnosis.sentences,
+        alike_sentence(diagnosis),
+        diagnosis.recommendation,
+    )
     remarks = tuple(sentence for sentence in told if sentence)
     return Shown(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))
 

@@ -8,7 +8,17 @@ from bars import meets
 from scipy import optimize, stats
 
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
-from bayesplate.estimates.leave_one_out import prediction_errors
+from bayesplate.estimates.leave_one_out import (
+    CarryingMode,
+    Errors,
+    Leverages,
+    carrying_modes,
+    carrying_sentence,
+    indices_of,
+    leverages_of,
+    prediction_errors,
+    united,
+)
 from bayesplate.estimates.refit import design, deviance_misfit, most_likely, normal_misfit, refit
 from bayesplate.plate.densities import DEGREES_OF_FREEDOM
 from bayesplate.plate.readings import ReadingErrors
@@ -205,3 +215,82 @@ def test_a_fit_of_several_peaks_begins_at_the_best_start():
     assert found.left_out[:4] == pytest.approx([-0.2, -0.2, 0.2, 0.2], abs=0.005)
     alone = prediction_errors(lambda x: 5.0 + x @ slopes.T, log_f, misfit, starts[:1])
     assert np.abs(alone.left_out[:2]).max() < 0.01  # control: from the lower start alone it stays there
+
+
+def carried(share: float, n_free: int = 3):
+    """Six readings of which the last alone sees the second constant but for a seventh with that share of its weight.
+
+    Without priors the leverage of the last is then 1 - share.
+    """
+    slopes = np.zeros((7, n_free))
+    slopes[:4, 0], slopes[:4, 2] = (0.5, 0.3, 0.1, 0.4), (0.0, 0.2, 0.4, 0.1)
+    slopes[5, 1] = 0.5
+    slopes[6, 1] = 0.5
+    scales = np.full(7, 0.005)
+    scales[6] *= np.sqrt((1.0 - share) / share)
+    return slopes, scales
+
+
+@pytest.mark.parametrize(("share", "is_alone"), [(0.101, False), (0.099, True)])
+def test_a_mode_of_leverage_above_nine_tenths_alone_carries_its_constant(share, is_alone):
+    slopes, scales = carried(share)
+    found = leverages_of(slopes, scales)
+    assert found.values[5] == pytest.approx(1.0 - share, abs=1e-9)
+    assert found.carries.tolist() == [-1, -1, -1, -1, -1, 1 if is_alone else -1, -1]
+
+
+def test_what_a_mode_carries_may_be_a_size_with_a_prior():
+    """A reading ten times as precise as the prior of a size that no other sees: leverage 100 / 101, column 3."""
+    slopes, scales = carried(0.5, 4)
+    slopes[4, 3] = 0.05
+    found = leverages_of(slopes, scales)
+    assert found.values[4] == pytest.approx(100.0 / 101.0)
+    assert found.carries[4] == 3
+    weak = leverages_of(np.where(np.arange(4) == 3, 0.5, 1.0) * slopes, scales)  # 25 / 26: the prior counts
+    assert weak.values[4] == pytest.approx(25.0 / 26.0)
+
+
+def test_leverages_are_those_of_the_closed_form(problem):
+    slopes, scales, target = problem
+    found = prediction_errors(lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN)
+    _, leverages, _ = closed_form(slopes, scales, target, 5.0)
+    assert found.leverages.values == pytest.approx(leverages, abs=1e-6)
+    assert (found.is_carried == (leverages > 0.9)).all()
+    tight = prediction_errors(
+        lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN, scales=1e-3 * scales
+    )
+    assert tight.leverages.values.sum() > found.leverages.values.sum()  # the prior of the input weighs less
+
+
+def test_readings_of_one_mode_carry_together_what_neither_carries_alone():
+    slopes, scales = carried(0.5)
+    assert (leverages_of(slopes, scales).carries < 0).all()
+    found = leverages_of(slopes, scales, [(0,), (1,), (2,), (3,), (4,), (5, 6)])
+    assert found.carries.tolist() == [-1, -1, -1, -1, -1, 1, 1]
+    assert found.values[5:] == pytest.approx(1.0)
+
+
+def test_a_mode_that_carries_something_counts_in_no_error_left_out():
+    errors = Errors(
+        np.ones(3), np.array([1.0, 300.0, 2.0]), Leverages(np.array([0.5, 0.95, 0.3]), np.array([-1, 1, -1]))
+    )
+    assert errors.judged == pytest.approx([1.0, np.nan, 2.0], nan_ok=True)
+    assert errors.left_out[1] == 300.0
+    spread = errors.at(np.array([0, 2, 3]), 4)
+    assert spread.judged == pytest.approx([1.0, np.nan, np.nan, 2.0], nan_ok=True)
+    assert spread.is_carried.tolist() == [False, False, True, False]
+
+
+def test_modes_that_carry_something_are_named():
+    board = prepare("finnish-spruce-cantilever").board
+    (setup,) = board.setups
+    found = Leverages(np.linspace(0.5, 0.95, 6), np.array([-1, -1, -1, 3, -1, 1]))
+    told = carrying_modes(board, found, ("E_x", "E_y", "G_xy", "clamp_rotation"))
+    labels = [str(label) for label in setup.labels]
+    assert [(one.label, one.carries) for one in told] == [(labels[3], "clamp_rotation"), (labels[5], "E_y")]
+    assert indices_of(told, board) == (3, 5)
+    assert carrying_sentence(told[1:]) == f"mode {labels[5]} alone carries E_y: it is left out of the left-out error"
+    assert "the size of clamp rotation" in carrying_sentence(told)
+    assert carrying_sentence(()) == ""
+    again = (CarryingMode(setup.name, labels[5], 0.99, "E_x"), CarryingMode(setup.name, labels[0], 0.91, "E_x"))
+    assert [(one.label, one.carries) for one in united(told[1:], again)] == [(labels[5], "E_y"), (labels[0], "E_x")]

@@ -23,7 +23,7 @@ CONTRACT = {
     "": ["format", "name", "seed", "versions", "card_sha256", "model", "converged", "elastic", "rigidity", "effects",
          "noise", "inputs", "derived", "joint", "least_squares", "weighted_least_squares", "percentile", "linear_means",
          "exact_means", "modes", "peaks", "spectra", "error", "sampler", "certificate", "identifiability",
-         "warnings", "doubts", "request"],
+         "warnings", "doubts", "request", "carrying_modes"],
     "model": ["theory", "law", "effects", "robust", "prior"],
     "elastic": ELASTIC, "elastic/E_x": SPREAD,
     "rigidity": RIGIDITY, "rigidity/D_x": SPREAD,

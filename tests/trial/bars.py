@@ -23,7 +23,9 @@ from trial.counts import (
     is_claimed,
     is_covered,
     is_flagged,
+    is_judged_in_part,
     is_named,
+    is_named_or_in_part,
     is_not_needed,
     is_part_name,
     is_right_name,
@@ -97,6 +99,10 @@ def bars(cells: Sequence[Cell], by_cell: Mapping[str, Records]) -> list[Bar]:
         records = of("outside", design=design)
         cause = taken_for(records, is_named)
         found.append(_at_most(f"outside the library, {design}: falsely unique", share(records, is_named), 0.10, cause))
+        asked = [record for record in records if is_judged_in_part(record)]
+        told = share(asked, is_named_or_in_part)
+        cause = taken_for(asked, is_named_or_in_part)
+        found.append(_at_most(f"outside the library, {design}: named, or named in part", told, 0.10, cause))
     pairs = of("two")
     note = join(overlooked(pairs), _planned_first(pairs, is_covered))
     found.append(_at_least("two effects: both in the set", share(pairs, is_covered), 0.65, beside=note))

@@ -11,8 +11,8 @@ _MOST = 4
 
 
 def taken_for(records: Sequence[Record], question: Callable[[Record], bool]) -> str:
-    """What was planted and which name it got, most frequent first, among records that answer yes."""
-    pairs = Counter((_joined(truth(r)), _joined(r["effects"])) for r in records if question(r))
+    """What was planted and which name it got, if only in part, most frequent first, among records that answer yes."""
+    pairs = Counter((_joined(truth(r)), _joined(r["effects"] or r.get("in_part", ()))) for r in records if question(r))
     found = [f"{planted} taken for {named} {n}" for (planted, named), n in pairs.most_common(_MOST)]
     return ", ".join(found)
 

@@ -120,6 +120,16 @@ def is_named(record: Record) -> bool:
     return bool(record["word"] == "named")
 
 
+def is_judged_in_part(record: Record) -> bool:
+    """Whether the trial asked of a board what explains it in part: older records do not tell."""
+    return "in_part" in record
+
+
+def is_named_or_in_part(record: Record) -> bool:
+    """Whether the verdict is a unique name, or unexplained with one that explains a part."""
+    return is_named(record) or bool(record["in_part"])
+
+
 def is_flagged(record: Record) -> bool:
     """Whether anything but peace is reported."""
     return record["word"] in FLAGGED

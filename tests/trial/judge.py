@@ -18,6 +18,7 @@ from trial.shared import control_of, ground_of, shared_law
 
 from bayesplate.diagnosis.decision.claim import judge_claim
 from bayesplate.diagnosis.decision.constants import ConstantDraws, draw_constants
+from bayesplate.diagnosis.decision.in_part import named_in_part
 from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answers, decide
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.search import Found, search
@@ -116,6 +117,7 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         "needed": verdict.is_needed,
         "effects": list(verdict.effects),
         "reason": verdict.reason,
+        "in_part": list(named_in_part(found, verdict, control)),
         "claim": bool(claim.holds),
         "conditions": {condition.name: bool(condition.is_met) for condition in claim.conditions},
         "best": list(best.members) if best else [],

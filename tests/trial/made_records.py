@@ -63,6 +63,7 @@ def made(
         "truth": {"effects": sorted(planted)},
         "word": word,
         "effects": list(effects),
+        "in_part": [],
         "claim": claim,
         "conditions": dict.fromkeys(CONDITIONS, claim) if effects else {},
         "best": list(best if best is not None else effects[:1]),

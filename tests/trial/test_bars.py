@@ -36,6 +36,7 @@ def called(word, effects=(), near=()):
 
 
 named_b = called("named", [B], [B])
+in_part_b = lambda cell, i: right(cell, i) | {"in_part": [B]}  # noqa: E731
 flagged = called("unexplained")
 quiet = called("none needed")
 no_more_than_nothing = lambda cell, i: right(cell, i) | {"none": 0.5, "support": 0.5}  # noqa: E731
@@ -51,6 +52,8 @@ AT_MOST = [
     ("cantilever-6, 5 cents, 2x: none needed", large(SIX), quiet, 200 / 1200),
     ("outside the library, cantilever-6: falsely unique", large(SIX, "outside"), named_b, 0.10),
     ("outside the library, cantilever-6-free-6: falsely unique", large(BOTH, "outside"), named_b, 0.10),
+    ("outside the library, cantilever-6: named, or named in part", large(SIX, "outside"), named_b, 0.10),
+    ("outside the library, cantilever-6: named, or named in part", large(SIX, "outside"), in_part_b, 0.10),
     ("17 cents: unique and wrong", LOUD, named_b, 0.02),
     ("claim made on a null", null("drawn"), claimed, 0.01),
 ]  # fmt: skip
@@ -215,7 +218,7 @@ def test_a_trial_that_finds_everything_meets_every_bar_and_one_without_truth_doe
             records.append(quiet_if_loud(cell, record))
     found = by_name(CELLS, records)
     assert [name for name, bar in found.items() if not bar["met"]] == []
-    assert len(found) == 2 * 4 * 5 + 12 + 2 * 5 + 3 + 1 + 2 + 1 + 2 + 2 * 5 + 2 + 1
+    assert len(found) == 2 * 4 * 5 + 12 + 2 * 5 + 3 + 1 + 2 * 2 + 1 + 2 + 2 * 5 + 2 + 1
     assert not any("planned" in name or "further" in name for name in found)
 
     shuffled = []
@@ -239,3 +242,14 @@ def test_a_missed_bar_on_alarms_says_which_rule_raised_them():
     records = [called(words[i] if i < len(words) else "none needed")(cell, i) for i in range(N)]
     bar = by_name((cell,), records)[f"null, {SIX}, {NOISES['drawn']}: flagged at all"]
     assert bar["note"] == "misfit of the plate too large for chance 40, an effect needed 12"
+
+
+def test_records_that_do_not_tell_of_parts_have_no_bar_for_them():
+    cell = large(SIX, "outside")
+    quantity = "outside the library, cantilever-6: named, or named in part"
+    told = with_wrong(cell, in_part_b, 3)
+    assert by_name((cell,), told)[quantity]["note"] == ""
+    older = [{key: value for key, value in record.items() if key != "in_part"} for record in told]
+    assert quantity not in by_name((cell,), older)
+    missed = by_name((cell,), with_wrong(cell, in_part_b, 60))[quantity]
+    assert (missed["met"], missed["note"]) == (False, "rib taken for attached_mass 60")

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.decision.verdict import Verdict, answers
 from bayesplate.diagnosis.evidence.folds import Nested, log_score_gains, nested
+from bayesplate.diagnosis.evidence.leverages import carrying
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, varied
+from bayesplate.estimates.leave_one_out import indices_of
 
 Floats = NDArray[np.float64]
 ConditionName = Literal[
@@ -25,6 +27,8 @@ STANDARD_ERRORS = 2.0
 """By how many of them the nested log score has to rise."""
 IMPROBABLE = 0.05
 """What the probability of no effect has to stay below, and that of one that is not told."""
+_FEWEST_GAINS = 2
+"""Modes that count without which their gains have no scatter."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,8 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
     verdict : Verdict
     control : NullControl
     folded : Nested, optional
-        Of the board's own readings, where it is known already.
+        Of the board's own readings, where it is known already: it and the control without the readings whose modes
+        alone carry something.
 
     Returns
     -------
@@ -85,7 +90,9 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
     """
     if not verdict.index:
         return Claim()
-    folded = nested_of(found, control) if folded is None else folded
+    if folded is None:
+        folded = nested_of(found, control, verdict.index)
+        control = control.without(() if folded is None else folded.carried)
     searches = [found, *(varied(found, width=factor) for factor in WIDTHS.values())]
     told = {one.index for one in verdict.stands_for}
     return Claim(
@@ -99,9 +106,13 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
     )
 
 
-def nested_of(found: Found, control: NullControl) -> Nested | None:
-    """The board's own readings left out one by one, an effect added where a fold calls for one."""
-    return nested(found.ground, found.residual[None, :], control.needed_from)
+def nested_of(found: Found, control: NullControl, index: int = 0) -> Nested | None:
+    """The board's own readings left out one by one, an effect added where a fold calls for one.
+
+    Not counted are those whose modes alone carry a constant or a size, without any effect or under a hypothesis.
+    """
+    folded = nested(found.ground, found.residual[None, :], control.needed_from)
+    return folded and folded.without(indices_of(carrying(found, index), found.ground.baseline.board))
 
 
 def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
@@ -112,7 +123,7 @@ def score_gain(gains: Floats | Sequence[float]) -> tuple[float, float]:
 
 def _beyond_chance(folded: Nested | None, control: NullControl) -> Condition:
     limit = control.ratio_to_beat
-    if folded is None or limit is None:
+    if folded is None or limit is None or not folded.counted.any():
         return Condition("chance selection", None, limit, False)
     ratio = float(folded.ratio[0])
     return Condition("chance selection", ratio, limit, ratio < limit)
@@ -121,7 +132,10 @@ def _beyond_chance(folded: Nested | None, control: NullControl) -> Condition:
 def _better_score(found: Found, folded: Nested | None) -> Condition:
     if folded is None:
         return Condition("log score", None, None, False)
-    gain, error = score_gain(log_score_gains(found.ground, found.residual, folded.chosen[0]))
+    gains = log_score_gains(found.ground, found.residual, folded.chosen[0], folded.carried)
+    if gains.size < _FEWEST_GAINS:
+        return Condition("log score", None, None, False)
+    gain, error = score_gain(gains)
     return Condition("log score", gain, STANDARD_ERRORS * error, gain > STANDARD_ERRORS * error)
 
 

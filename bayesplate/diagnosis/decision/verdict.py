@@ -91,6 +91,11 @@ class Verdict:
         return self.best if self.word == "unexplained" and self.is_needed else None
 
     @property
+    def tried(self) -> int:
+        """Hypothesis that is judged beside that of no effect: the best of those that are fitted again, or 0."""
+        return self.fitted_again[0].index if self.fitted_again else 0
+
+    @property
     def fitted_again(self) -> tuple[Answer, ...]:
         """What it stands for, or what comes nearest."""
         return self.stands_for if self.nearest is None else (self.nearest,)
@@ -153,12 +158,12 @@ def decide(found: Found, control: NullControl, others: Iterable[Variant] | None 
         reason = f"{answer_words(found, best)} fits only at the limit of its range: {limit}"
         return Verdict("unexplained", (), 0, best, reason, is_needed=True)
     near = alternatives(found, ranked)
-    if _stands_out(best, ranked):
-        turned = _turned(found, best, variants(found) if others is None else others)
-        if not turned:
+    if stands_out(best, ranked):
+        changed = turned(found, best, variants(found) if others is None else others)
+        if not changed:
             reason = f"{answer_words(found, best)} has no rival within a factor 3, whatever is assumed"
             return Verdict("named", best.members, best.index, best, reason, True, (best,))
-        words, rivals = turned
+        words, rivals = changed
         reason = f"{words} {alternatives_words(found, rivals)} may be as probable"
         near = (best, *rivals)
     else:
@@ -167,12 +172,12 @@ def decide(found: Found, control: NullControl, others: Iterable[Variant] | None 
     return Verdict("indistinguishable group", group, best.index, best, reason, True, near)
 
 
-def _stands_out(one: Answer, ranked: Sequence[Answer]) -> bool:
+def stands_out(one: Answer, ranked: Sequence[Answer]) -> bool:
     """Whether an answer is three times as probable as every other one."""
     return all(one.support >= CLEARLY * other.support for other in ranked if other.index != one.index)
 
 
-def _turned(found: Found, best: Answer, others: Iterable[Variant]) -> tuple[str, tuple[Answer, ...]] | None:
+def turned(found: Found, best: Answer, others: Iterable[Variant]) -> tuple[str, tuple[Answer, ...]] | None:
     """The first assumption under which a name no longer stands out, and what rivals it there; None if it always does.
 
     A rival is told with the probability that it has without the change.

@@ -5,7 +5,8 @@ A mode is one reading; of several sessions of one setup it is its readings in al
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,18 +41,35 @@ class Nested:
         With the effect that the remaining readings choose, or none; not a number where the reading is no mode then.
     chosen : (n_sets, n_modes) array of int
         Index of the hypothesis that the fold of each reading chose.
+    carried : tuple of int
+        Readings that count neither before nor after, for their mode alone carries a constant or a size.
     """
 
     before: Floats
     after: Floats
     chosen: NDArray[np.intp]
+    carried: tuple[int, ...] = ()
+
+    def without(self, carried: Sequence[int]) -> Nested:
+        """The same errors, some readings not counted."""
+        return replace(self, carried=tuple(sorted({*self.carried, *carried})))
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which errors count: of readings that are a mode before and after, and that others foretell.
+
+        (n_sets, n_modes) array.
+        """
+        counted = np.isfinite(self.before) & np.isfinite(self.after)
+        counted[:, list(self.carried)] = False
+        return counted
 
     @property
     def ratio(self) -> Floats:
-        """Rms after over rms before, over the readings that are a mode under both: (n_sets,) array."""
-        both = np.isfinite(self.before) & np.isfinite(self.after)
-        after, before = (np.where(both, part, 0.0) for part in (self.after, self.before))
-        return np.asarray(np.sqrt(np.sum(after**2, axis=1) / np.sum(before**2, axis=1)))
+        """Rms after over rms before, over the readings that count: (n_sets,) array, not a number where none does."""
+        after, before = (np.where(self.counted, part, 0.0) for part in (self.after, self.before))
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.sqrt(np.sum(after**2, axis=1) / np.sum(before**2, axis=1)))
 
 
 def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> Nested | None:
@@ -119,15 +137,22 @@ def left_out(ground: Ground, index: int, residual: Floats) -> Floats:
     return errors
 
 
-def log_score(ground: Ground, index: int, residual: Floats) -> float:
+def log_score(ground: Ground, index: int, residual: Floats, carried: Collection[int] = ()) -> float:
     """Sum over the modes of the log density of the readings of each given the others, under one hypothesis.
 
-    A ratio of two restricted densities each, noise and sizes averaged.
+    A ratio of two restricted densities each, noise and sizes averaged; without the modes of readings that are carried.
     """
-    return float(sum(_log_score_of(ground, index, residual, mode) for mode in ground.baseline.same_modes))
+    return float(sum(_log_score_of(ground, index, residual, mode) for mode in _foretold(ground, carried)))
 
 
-def log_score_gains(ground: Ground, residual: Floats, chosen: NDArray[np.intp]) -> Floats:
+def _foretold(ground: Ground, carried: Collection[int]) -> list[tuple[int, ...]]:
+    """Readings of each mode, but of those that alone carry a constant or a size."""
+    return [mode for mode in ground.baseline.same_modes if not set(mode) & set(carried)]
+
+
+def log_score_gains(
+    ground: Ground, residual: Floats, chosen: NDArray[np.intp], carried: Collection[int] = ()
+) -> Floats:
     """What each fold's choice adds to the log density of the readings that it left out: one per mode, in their order.
 
     Parameters
@@ -136,9 +161,12 @@ def log_score_gains(ground: Ground, residual: Floats, chosen: NDArray[np.intp]) 
     residual : (n_modes,) array
     chosen : (n_modes,) array of int
         Index of the hypothesis that the fold of each reading chose.
+    carried : collection of int
+        Readings whose modes are not counted.
     """
-    gains = np.zeros(len(ground.baseline.same_modes))
-    for place, mode in enumerate(ground.baseline.same_modes):
+    modes = _foretold(ground, carried)
+    gains = np.zeros(len(modes))
+    for place, mode in enumerate(modes):
         index = int(chosen[mode[0]])
         if index:
             one, none = (_log_score_of(ground, each, residual, mode) for each in (index, 0))

@@ -1,5 +1,10 @@
 """Pairs of effects that are plausible after a first search, solved together: their shifts need not add.
 
+No member of a pair has to do well alone: air that slows all modes and a tension that speeds them up each raise the
+error, and both together explain it. Two large shifts of opposite signs are also those whose sum is the worst
+approximation, by a fifth of what is left of them, so that the right pair may seem improbable. Where nothing explains
+the readings the most probable pairs are therefore solved together however improbable they are.
+
 Pairs with transverse shear are left to the sampler, which fits whatever is named again: solving them takes minutes.
 """
 
@@ -14,6 +19,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.evidence.draws import members_of
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.peaks import with_own_labels
+from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
@@ -21,7 +27,8 @@ from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve, joint_law, joint_table
 
 PLAUSIBLE = 0.05
-"""Probability from which a pair is solved together: each costs as much as a candidate of its own."""
+"""Probability from which a pair is solved together where something explains the readings: each costs as much as a
+candidate of its own."""
 _MOST_PAIRS = 3
 _WORTH = 0.05
 """Share of a pair's probability below which two of its forms keep the sum of their shifts."""
@@ -84,10 +91,12 @@ def with_joint_pairs(found: Found, ground: Ground, solve: Solve = form_law) -> G
 
 def _plausible(found: Found) -> list[int]:
     """Indices of the most probable pairs whose effects have laws and leave the plate thin."""
+    log_probability = found.log_evidence + np.log([one.prior for one in found.ground.hypotheses])
+    is_explained = found.p_value(int(np.argmax(found.probability))) >= PASSES
     pairs = [
         i
-        for i in np.argsort(-found.probability)
-        if found.probability[i] >= PLAUSIBLE
+        for i in np.lexsort((-log_probability, -found.probability))  # by logarithms where they are too small to tell
+        if (found.probability[i] >= PLAUSIBLE or not is_explained)
         and len(members_of(found, int(i))) == 2
         and all(_is_cheap(law) for one in members_of(found, int(i)) for law in one.laws)
     ]

@@ -62,7 +62,7 @@ class KnownFit:
     moduli : (3,) array, Pa
         E_x, E_y, G_xy.
     errors : Errors
-        Of ln f, in sample and left out.
+        Of ln f, in sample and left out; not numbers for readings that are no mode.
     """
 
     effects: tuple[str, ...]
@@ -171,7 +171,7 @@ def known_fit(
     modes = [np.flatnonzero(np.isin(kept, mode)).tolist() for mode in same_modes(problem.board)]
     modes = [mode for mode in modes if mode]
     misfit = normal_misfit(target, scales)
-    errors = prediction_errors(law.of(labelled), target, misfit, fitted[None, :], modes=modes)
+    errors = prediction_errors(law.of(labelled), target, misfit, fitted[None, :], modes=modes).at(kept, before.size)
     found = _values(board, fitted, inputs)
     D_x, D_y, D_s = (found[name] for name in RIGIDITIES)
     constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))

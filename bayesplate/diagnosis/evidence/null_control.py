@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.folds import ALWAYS, CERTAINLY_NEEDED, nested
+from bayesplate.diagnosis.evidence.folds import ALWAYS, CERTAINLY_NEEDED, Nested, nested
 from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none
 from bayesplate.diagnosis.evidence.predictive import noise_of_board
 from bayesplate.diagnosis.evidence.search import Ground
@@ -36,11 +37,21 @@ class NullControl:
         effect; None with too few readings, or where nothing is claimed that chance might have chosen.
     residuals : (n_sets, n_modes) array or None
         The sets themselves, ln f.
+    folded : Nested or None
+        The errors that the ratios are of.
     """
 
     against: Floats
     ratio: Floats | None = None
     residuals: Floats | None = None
+    folded: Nested | None = None
+
+    def without(self, carried: Sequence[int]) -> NullControl:
+        """The same sets, some readings not counted in the ratios, for their modes alone carry something."""
+        if self.folded is None or not carried:
+            return self
+        folded = self.folded.without(carried)
+        return replace(self, ratio=folded.ratio, folded=folded)
 
     @property
     def needed_from(self) -> float:
@@ -103,7 +114,9 @@ def null_control(
     return NullControl(np.concatenate(odds), residuals=np.concatenate(sets))
 
 
-def made_to_choose(ground: Ground, control: NullControl, ratio: float = np.nan) -> NullControl:
+def made_to_choose(
+    ground: Ground, control: NullControl, ratio: float = np.nan, carried: Sequence[int] = ()
+) -> NullControl:
     """The same simulated boards with the errors of their readings left out, every fold made to choose an effect.
 
     Where it is clear on which side of the threshold the board at hand lies, fewer sets say so as well as many.
@@ -115,6 +128,8 @@ def made_to_choose(ground: Ground, control: NullControl, ratio: float = np.nan) 
         With its sets.
     ratio : float
         Nested left-out rms after over before of the board at hand; by default none that fewer sets could judge.
+    carried : sequence of int
+        Readings that are not counted in that.
 
     Returns
     -------
@@ -122,16 +137,20 @@ def made_to_choose(ground: Ground, control: NullControl, ratio: float = np.nan) 
         With the ratios of as many of its sets as were needed; without any where there are too few readings.
     """
     assert control.residuals is not None
-    ratios: list[Floats] = []
+    parts: list[Nested] = []
     for first in range(0, len(control.residuals), _BATCH):
         folded = nested(ground, control.residuals[first : first + _BATCH], ALWAYS)
         if folded is None:
             return control
-        ratios.append(folded.ratio)
-        low, high = _share(np.concatenate(ratios) <= ratio)
+        parts.append(folded.without(carried))
+        low, high = _share(np.concatenate([one.ratio for one in parts]) <= ratio)
         if not np.isnan(ratio) and (low > BY_CHANCE or high < BY_CHANCE):
             break
-    return replace(control, ratio=np.concatenate(ratios))
+    before, after, chosen = (
+        np.concatenate([getattr(one, name) for one in parts]) for name in ("before", "after", "chosen")
+    )
+    every = Nested(before, after, chosen).without(carried)
+    return replace(control, ratio=every.ratio, folded=every)
 
 
 def _share(is_so: NDArray[np.bool_]) -> tuple[float, float]:

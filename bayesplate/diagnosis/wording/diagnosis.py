@@ -10,6 +10,7 @@ from bayesplate.diagnosis.decision.claim import Condition
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry
 from bayesplate.diagnosis.wording.known import KnownModel
+from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.results.contract import NOT_IN_JSON, Spread, as_json
 
 FORMAT = 1
@@ -201,6 +202,13 @@ class Diagnosis:
     candidates : tuple of EffectEntry and ExchangeEntry
     recommendation : str
     notes : tuple of str
+    named_in_part : tuple of str
+        Effects that explain the readings in part, where the verdict is "unexplained" and something else remains: the
+        model after has them, nothing is claimed, and the constants are not to be trusted.
+    in_part_words : str
+        The same as people read it; not written to JSON.
+    carrying_modes : tuple of CarryingMode
+        Modes that alone carry a constant or a size, before or after: they count in no left-out error and no score.
     """
 
     format: int = FORMAT
@@ -234,6 +242,9 @@ class Diagnosis:
     candidates: tuple[CandidateEntry, ...]
     recommendation: str
     notes: tuple[str, ...]
+    named_in_part: tuple[str, ...] = ()
+    in_part_words: str = field(default="", metadata=NOT_IN_JSON)
+    carrying_modes: tuple[CarryingMode, ...] = ()
 
     @property
     def is_refitted(self) -> bool:

@@ -180,8 +180,3 @@ def _fixed(one: Candidate) -> Amplitude | None:
                 parameter=parameter.key, form=form.detail, q05=size, q50=size, q95=size, unit=parameter.unit
             )
     return None
-
-
-def rms(values: Floats) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(np.asarray(values) ** 2)))

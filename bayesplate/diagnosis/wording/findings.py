@@ -28,15 +28,16 @@ from bayesplate.diagnosis.wording.diagnosis import (
     NullControlSummary,
     PValues,
 )
-from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of, rms
+from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of
 from bayesplate.diagnosis.wording.fates import ratio_words
 from bayesplate.diagnosis.wording.known import known_models
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
+from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
-from bayesplate.results.contract import Spread, finite
+from bayesplate.results.contract import Spread, finite, rms
 from bayesplate.results.summary import Summary
 
 Floats = NDArray[np.float64]
@@ -81,6 +82,10 @@ class Case:
     has_slip : bool
         Whether the fit without an effect names a reading or two that a slip explains.
     notes : tuple of str
+    in_part : tuple of str
+        Effects that explain the readings in part.
+    carrying : tuple of CarryingMode
+        Modes that count in no left-out error or score, before and after alike.
     """
 
     found: Found
@@ -96,6 +101,13 @@ class Case:
     drawn: Mapping[int, Draws] = field(default_factory=dict)
     has_slip: bool = False
     notes: tuple[str, ...] = ()
+    in_part: tuple[str, ...] = ()
+    carrying: tuple[CarryingMode, ...] = ()
+
+    @property
+    def carried(self) -> tuple[int, ...]:
+        """Indices of the readings of these modes."""
+        return indices_of(self.carrying, self.found.ground.baseline.board)
 
 
 def diagnosis_of(case: Case) -> Diagnosis:
@@ -115,6 +127,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
     effects = found.ground.candidates.values()
     averaged = _averaged(case)
     taken = verdict.stands_for
+    added = verdict.fitted_again if case.after.index else ()
     return Diagnosis(
         name=case.before.summary.name,
         seed=case.before.summary.seed,
@@ -125,21 +138,21 @@ def diagnosis_of(case: Case) -> Diagnosis:
         effects=verdict.effects,
         words=_words(case, taken),
         refitted=found.ground.hypotheses[case.after.index].members,
-        refitted_words=next((answer_words(found, one) for one in taken if one.index == case.after.index), ""),
+        refitted_words=next((answer_words(found, one) for one in added if one.index == case.after.index), ""),
         reason=verdict.reason,
         sentences=_sentences(case, taken),
         declared=found.ground.baseline.board.effects,
-        known=known_models(case.known),
+        known=known_models(case.known, case.carried),
         probability_of_none=found.none,
         probability_of_none_with_halved_priors=halved[""],
         probability_of_none_with_doubled_priors=doubled[""],
-        p_value=PValues(before=p_value_of(found, 0), after=p_value_of(found, verdict.index)),
+        p_value=PValues(before=p_value_of(found, 0), after=p_value_of(found, case.after.index)),
         before=_errors(case, case.before),
         after=_errors(case, case.after),
         gain_null_percentile=None if (odds := _log_odds(found)) is None else control.percentile_of(odds),
         null_control=_null_control(case),
         elastic_shift=_elastic_shift(case),
-        finalists=tuple(_finalist(answer, figures) for answer, figures in case.finalists),
+        finalists=tuple(_finalist(case, answer, figures) for answer, figures in case.finalists),
         elastic_averaged={name: averaged[name] for name in MODULI},
         rigidity_averaged={name: averaged[name] for name in RIGIDITIES},
         answers=tuple(
@@ -151,28 +164,45 @@ def diagnosis_of(case: Case) -> Diagnosis:
         ),
         recommendation=case.recommendation,
         notes=case.notes,
+        named_in_part=case.in_part,
+        in_part_words=answer_words(found, verdict.nearest) if case.in_part and verdict.nearest else "",
+        carrying_modes=case.carrying,
     )
 
 
 def _errors(case: Case, side: Side) -> Errors:
-    found, folded = case.found, case.folded
+    folded = case.folded
     nested = None
     if folded is not None:
-        both = np.isfinite(folded.before[0]) & np.isfinite(folded.after[0])
-        nested = rms(cents((folded.after if side.index else folded.before)[0, both]))
+        nested = rms(cents((folded.after if side.index else folded.before)[0, folded.counted[0]]))
     measured = side.measured
     low, high = np.quantile(side.draws.predictive.reshape(-1, measured.size), [0.05, 0.95], axis=0)
     return Errors(
         in_sample_rms_cents=side.summary.error.in_sample_rms_cents,
-        leave_one_out_rms_cents=side.summary.error.leave_one_out_rms_cents,
+        leave_one_out_rms_cents=left_out_rms_cents(side.summary, case.carrying),
         nested_leave_one_out_rms_cents=nested,
-        log_score=log_score(found.ground, side.index, found.residual) if folded is not None else None,
+        log_score=_log_score(case, side),
         hits_90=float(np.mean((measured >= low) & (measured <= high))),
     )
 
 
+def left_out_rms_cents(summary: Summary, carrying: Sequence[CarryingMode]) -> float | None:
+    """Error of a fit for modes left out, but of those that alone carry something in any of the models compared."""
+    carried = {(one.setup, one.label) for one in carrying}
+    if not carried - {(one.setup, one.label) for one in summary.carrying_modes}:
+        return summary.error.leave_one_out_rms_cents
+    return rms([one.left_out_cents for one in summary.modes if (one.setup, one.label) not in carried])
+
+
+def _log_score(case: Case, side: Side) -> float | None:
+    """None where too few modes are left, or none that others foretell."""
+    if case.folded is None or not case.folded.counted.any():
+        return None
+    return log_score(case.found.ground, side.index, case.found.residual, case.folded.carried)
+
+
 def _null_control(case: Case) -> NullControlSummary:
-    ratio = None if case.folded is None else float(case.folded.ratio[0])
+    ratio = None if case.folded is None else finite(float(case.folded.ratio[0]))
     control, found = case.control, case.found
     return NullControlSummary(
         n_sets=int(control.against.size),
@@ -213,9 +243,10 @@ def _averaged(case: Case) -> dict[str, Spread]:
 
     Averaged over everything that may be the case, each by its probability under the exact law: by the sampler's draws
     where a model was sampled, else by those of the search, weighted for the exact law. Where nothing explains the
-    readings there is nothing to average over but the first fit.
+    readings there is nothing to average over: they are those of the fit with what explains them in part, else of the
+    first.
     """
-    summary, found = case.before.summary, case.found
+    summary, found = case.after.summary if case.in_part else case.before.summary, case.found
     if case.verdict.word == "unexplained":
         return dict((*summary.elastic.items(), *summary.rigidity.items()))
     sampled = {0: case.before.draws, **case.drawn}
@@ -258,13 +289,13 @@ def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
 
 def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
     """What the most probable explanation does to the errors though it is not enough, and how to go on from it."""
-    before, after = case.before.summary.error, summary.error
+    before, after = case.before.summary, summary
     comes, it = ("come", "them") if len(answer.members) > 1 else ("comes", "it")
     told = (
         f"{answer_words(case.found, answer).capitalize()} {comes} nearest: with {it} the error goes from "
-        f"{before.in_sample_rms_cents:.1f} to {after.in_sample_rms_cents:.1f} cents in the fit"
+        f"{before.error.in_sample_rms_cents:.1f} to {after.error.in_sample_rms_cents:.1f} cents in the fit"
     )
-    first, last = before.leave_one_out_rms_cents, after.leave_one_out_rms_cents
+    first, last = (left_out_rms_cents(one, case.carrying) for one in (before, after))
     if first is not None and last is not None:
         told += f", and from {first:.1f} to {last:.1f} for a mode left out"
     if RELABELLING in answer.members:
@@ -276,12 +307,12 @@ def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:
     return f"{told}. Declare {it}, effects = [{names}], and diagnose again to look for what else is lacking."
 
 
-def _finalist(answer: Answer, summary: Summary) -> Finalist:
+def _finalist(case: Case, answer: Answer, summary: Summary) -> Finalist:
     return Finalist(
         effects=answer.members,
         probability=answer.support,
         in_sample_rms_cents=summary.error.in_sample_rms_cents,
-        leave_one_out_rms_cents=summary.error.leave_one_out_rms_cents,
+        leave_one_out_rms_cents=left_out_rms_cents(summary, case.carrying),
         elastic=dict(summary.elastic.items()),
         sizes={
             owner: {name: sizes for name, sizes in effects.items() if name in answer.members}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from bayesplate.diagnosis.evidence.known import KnownFit
 from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
@@ -34,7 +36,8 @@ class KnownModel:
         Of the readings, by weighted least squares, all inputs at their nominal values, declared sizes that the card
         leaves open where the fit has them.
     leave_one_out_rms_cents : float or None
-        Of each reading, predicted by a fit that has not seen it; None where they are too few.
+        Of each reading, predicted by a fit that has not seen it, but of modes that alone carry a constant or a size in
+        any of the models compared; None where too few are left.
     change_percent : dict of float
         Of E_x, E_y, G_xy against the board as it stands.
     """
@@ -46,14 +49,17 @@ class KnownModel:
     change_percent: Mapping[str, float]
 
 
-def known_models(fits: Sequence[KnownFit]) -> tuple[KnownModel, ...]:
-    """Errors in cents and changes in percent, the board as it stands first, as in the fits."""
+def known_models(fits: Sequence[KnownFit], carried: Sequence[int] = ()) -> tuple[KnownModel, ...]:
+    """Errors in cents and changes in percent, the board as it stands first, as in the fits.
+
+    Readings that are carried, whose mode alone carries a constant or a size, count in the left-out error of none.
+    """
     return tuple(
         KnownModel(
             effects=one.effects,
             without=one.without,
             in_sample_rms_cents=rms(cents(one.errors.in_sample)) or 0.0,
-            leave_one_out_rms_cents=rms(cents(one.errors.left_out)),
+            leave_one_out_rms_cents=rms(np.delete(cents(one.errors.left_out), list(carried))),
             change_percent={
                 name: 100.0 * float(new / old - 1.0)
                 for name, new, old in zip(MODULI, one.moduli, fits[0].moduli, strict=True)

@@ -7,12 +7,31 @@ from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.words import claim_sentence, meaning
 from bayesplate.effects.words import effect_names
+from bayesplate.estimates.leave_one_out import carrying_sentence
+
+
+def carrying_words(diagnosis: Diagnosis) -> str:
+    """Which modes alone carry a constant or a size, and so count in no left-out error; empty where none does."""
+    told = carrying_sentence(diagnosis.carrying_modes)
+    if not told:
+        return ""
+    before, after = (one.leave_one_out_rms_cents for one in (diagnosis.before, diagnosis.after))
+    no_more = "" if None not in (before, after) else "; no mode is left to judge by, and nothing can be claimed"
+    return f"{told[0].upper()}{told[1:]}, before and after alike{no_more}."
+
+
+def in_part_sentence(diagnosis: Diagnosis) -> str:
+    """What explains the readings in part, and that something else remains; empty where nothing does."""
+    if not diagnosis.named_in_part:
+        return ""
+    return f"Named in part: {diagnosis.in_part_words}; something else remains. The constants are not to be trusted."
 
 
 def verdict_sentence(diagnosis: Diagnosis) -> str:
     """The verdict, what it means, its reason, and whether a lower error may be claimed: the closing words of a run."""
     parts = (
         f"Verdict: {diagnosis.verdict}.",
+        in_part_sentence(diagnosis),
         meaning(diagnosis),
         f"The reason: {diagnosis.reason}.",
         claim_sentence(diagnosis),
@@ -22,7 +41,14 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 
 def verdict_sentences(diagnosis: Diagnosis) -> list[str]:
     """The verdict for a page: what it means, what each effect is, what else looks like it, and what may be claimed."""
-    told = [meaning(diagnosis), *diagnosis.sentences, alike_sentence(diagnosis), claim_sentence(diagnosis)]
+    told = [
+        in_part_sentence(diagnosis),
+        meaning(diagnosis),
+        *diagnosis.sentences,
+        alike_sentence(diagnosis),
+        claim_sentence(diagnosis),
+        carrying_words(diagnosis),
+    ]
     return [sentence for sentence in told if sentence]
 
 
@@ -45,6 +71,8 @@ def shown_model(diagnosis: Diagnosis) -> str:
     if not diagnosis.is_refitted:
         return ""
     model = f"the model with {diagnosis.refitted_words}"
+    if diagnosis.named_in_part:
+        return f"The constants and all else below are of {model}, which does not explain the readings either."
     told = f"The table of the constants is of the averaged ones; all else below is of {model}"
     if diagnosis.verdict == "named":
         return f"{told}."

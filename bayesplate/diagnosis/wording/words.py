@@ -13,6 +13,7 @@ from bayesplate.effects.words import effect_name, effect_names, joined
 
 MISSING = "–"
 TOO_FEW = "the readings are too few to choose anew without each of them"
+NONE_LEFT = "hardly a mode is left that does not carry a constant or a size alone"
 _UNLIKELY = 0.01
 """Probability below which an exchange of two labels is not worth showing: any two neighbours are a candidate."""
 
@@ -50,6 +51,9 @@ VERDICTS: dict[Word, Meaning] = {
         "even if they were there. The constants hold only if none of them is.",
     ),
 }
+
+IN_PART = "Part of what is missing was found"
+"""The heading where a verdict names something in part."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +105,16 @@ def claim_sentence(diagnosis: Diagnosis) -> str:
     if not diagnosis.is_refitted:
         return ""
     change, is_gain = _change(diagnosis)
+    if diagnosis.named_in_part:
+        return f"The {change}. No improvement is claimed: the misfit that is left is too large."
     if not is_gain:
         return f"The {change}. No improvement is claimed."
     if diagnosis.claim:
         return f"The error of the prediction is reduced: the {change}, and every condition of that claim is met."
     missed = [
-        TOO_FEW if one.value is None else CONDITIONS[one.name].lacking for one in diagnosis.conditions if not one.is_met
+        (NONE_LEFT if diagnosis.carrying_modes else TOO_FEW) if one.value is None else CONDITIONS[one.name].lacking
+        for one in diagnosis.conditions
+        if not one.is_met
     ]
     return f"The {change}. No improvement is claimed: {joined(list(dict.fromkeys(missed)))}."
 

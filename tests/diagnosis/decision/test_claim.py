@@ -20,7 +20,7 @@ from bayesplate.diagnosis.decision.verdict import answers
 from bayesplate.diagnosis.evidence.folds import Nested, log_score, log_score_gains
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.null_control import NullControl
+from bayesplate.diagnosis.evidence.null_control import NullControl, made_to_choose, null_control
 from bayesplate.diagnosis.evidence.search import search
 from bayesplate.diagnosis.evidence.sensitivity import varied
 
@@ -184,3 +184,50 @@ def test_the_folds_of_the_board_add_an_effect_where_the_null_simulations_call_fo
     assert nested_of(weak, calm).chosen.sum() == 9
     assert nested_of(weak, loud).chosen.sum() == 0
     assert 0 < nested_of(weak, CONTROL).chosen.sum() < 9
+
+
+def test_modes_that_alone_carry_something_count_in_no_condition(found):
+    """Not in the ratio, not in that of the null sets, not in the score; before and after by the same modes."""
+    control = made_to_choose(found.ground, null_control(found.ground, np.random.default_rng(5), 100))
+    whole = folds(found, 0.5)
+    spoilt = replace(whole, before=whole.before.copy())
+    spoilt.before[0, 3] = 1.0  # without the reading that nobody else foretells the error was hundreds of cents
+    assert spoilt.ratio[0] < 0.2
+    judged = spoilt.without((3,))
+    assert judged.ratio[0] == pytest.approx(0.5)
+    same = control.without((3,))
+    kept = np.delete(np.arange(9), 3)
+    after, before = (getattr(control.folded, name)[:, kept] for name in ("after", "before"))
+    assert same.ratio == pytest.approx(np.sqrt((after**2).sum(axis=1) / (before**2).sum(axis=1)))
+    again = made_to_choose(found.ground, null_control(found.ground, np.random.default_rng(5), 100), carried=(3,))
+    assert again.ratio == pytest.approx(same.ratio)
+    gains = log_score_gains(found.ground, found.residual, np.ones(9, dtype=int))
+    told = judge_claim(found, decided(found), same, judged).conditions
+    assert told[0].value == pytest.approx(0.5)
+    assert told[1].value == pytest.approx(gains[kept].sum())
+    assert told[1].value != pytest.approx(gains.sum())
+    assert log_score(found.ground, 1, found.residual, (3,)) - log_score(
+        found.ground, 0, found.residual, (3,)
+    ) == pytest.approx(gains[kept].sum())
+
+
+def test_nothing_is_claimed_where_every_mode_alone_carries_something(found):
+    none = folds(found).without(range(9))
+    told = judge_claim(found, decided(found), CONTROL.without(range(9)), none)
+    assert [(one.value, one.is_met) for one in told.conditions[:2]] == [(None, False)] * 2
+    assert not told.holds
+    assert np.isnan(none.ratio[0])
+
+
+def test_the_folds_of_the_board_do_not_count_what_carries_something(found):
+    """By the leverages of the search: an effect that shifts one mode alone."""
+    base = found.ground.baseline
+    alone = searched(1.5, 0.2 * np.eye(9)[4])
+    carried = nested_of(alone, CONTROL, 1).carried
+    assert 4 in carried
+    assert set(nested_of(alone, CONTROL).carried) < set(carried)
+    assert not nested_of(alone, CONTROL, 1).counted[0, 4]
+    assert base.n_modes == 9
+    claim = judge_claim(alone, replace(decided(alone), index=1), CONTROL)
+    gains = log_score_gains(alone.ground, alone.residual, nested_of(alone, CONTROL).chosen[0], carried)
+    assert claim.conditions[1].value == pytest.approx(gains.sum())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from full_refits import full_refit
@@ -10,6 +12,7 @@ from bayesplate.diagnosis.evidence import joint
 from bayesplate.diagnosis.evidence.draws import draw_terms
 from bayesplate.diagnosis.evidence.exact import exact_log_frequencies
 from bayesplate.diagnosis.evidence.joint import with_joint_pairs
+from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.pairs import joint_table
@@ -95,7 +98,12 @@ def test_only_plausible_pairs_are_solved_together(solved):
     ] == [index]
     assert with_joint_pairs(found, ground) is ground  # once is enough
     found.probability[:] = np.where(np.arange(found.probability.size) == 0, 1.0, joint.PLAUSIBLE / 2)
-    assert with_joint_pairs(found, found.ground) is found.ground
+    quiet = replace(found, residual=np.zeros(found.residual.size))
+    assert quiet.p_value(0) >= PASSES
+    assert with_joint_pairs(quiet, found.ground) is found.ground
+    loud = replace(found, residual=0.2 * np.sign(np.random.default_rng(1).standard_normal(found.residual.size)))
+    assert loud.p_value(0) < PASSES  # nothing explains these: the sum of shifts may be why
+    assert [set(pair) for pair in with_joint_pairs(loud, found.ground).joint] == [set(PAIR)]
 
 
 def test_pairs_with_shear_are_left_to_the_sampler(finnish_few):

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from diagnoses import spread
 from made_searches import NOISE, bare, baseline, candidate, decided, ground_of
-from made_summaries import SUMMARY
+from made_summaries import SUMMARY, mode
 
 from bayesplate.diagnosis.decision.claim import Claim, Condition
 from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, Answer, answers
-from bayesplate.diagnosis.evidence.folds import Nested, nested
+from bayesplate.diagnosis.evidence.folds import Nested, log_score, nested
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap, probabilities
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl, null_control
@@ -25,12 +25,16 @@ from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
 from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries
 from bayesplate.diagnosis.wording.fates import fate_of
 from bayesplate.diagnosis.wording.findings import Case, Side, _nearest_sentence, diagnosis_of
+from bayesplate.diagnosis.wording.told import verdict_sentence, verdict_sentences, warnings
 from bayesplate.effects import EFFECTS
+from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.quantities import Quantity
+from bayesplate.report.verdict import diagnosis_section, quoted
 from bayesplate.results.contract import Elastic
 from bayesplate.results.folder import json_text
+from bayesplate.workflow.shown import show_diagnosis
 
 SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "fluid_loading", "grain_angle")
 FIGURES = replace(
@@ -486,3 +490,91 @@ def test_two_effects_come_nearest_where_one_comes_nearest():
     told = _nearest_sentence(case, Answer((SHEAR, AIR), 1, 0.9), MOVED)
     assert told.startswith("Transverse shear and fluid loading come nearest: with them the error goes from")
     assert 'Declare them, effects = ["transverse_shear", "fluid_loading"],' in told
+
+
+UNEXPLAINED = {(): 1e-6, (SHEAR,): 0.97, (AIR,): 0.02, (GRAIN,): 0.01}
+
+
+def in_part_case(**changed) -> Case:
+    """A search whose best answer fails the gate, fitted again."""
+    found = made(UNEXPLAINED, residual=np.array([0.2, -0.2, 0.15, 0.1, -0.3, 0.2]))
+    verdict = decided(found)
+    assert (verdict.word, verdict.index, verdict.tried) == ("unexplained", 0, 1)
+    case = case_of(found, control_of(found, 0.4), folds_of(found, 0.5))
+    after = Side(1, MOVED, case.before.draws, case.before.measured)
+    finalists = [(verdict.nearest, MOVED)]
+    return replace(case, after=after, finalists=finalists, in_part=(SHEAR,), **changed)
+
+
+def test_what_is_named_in_part_stands_beside_the_word_unexplained_and_nothing_is_claimed():
+    told = diagnosis_of(in_part_case())
+    assert (told.verdict, told.effects, told.claim, told.conditions) == ("unexplained", (), False, ())
+    assert told.named_in_part == told.refitted == (SHEAR,)
+    assert (told.in_part_words, told.refitted_words) == ("transverse shear", "transverse shear")
+    assert (told.before.in_sample_rms_cents, told.after.in_sample_rms_cents) == (21.25, 4.25)
+    assert told.after.nested_leave_one_out_rms_cents == pytest.approx(0.5 * told.before.nested_leave_one_out_rms_cents)
+    assert told.p_value.after < 0.05
+    assert told.elastic_averaged["E_x"].mean == told.elastic_shift["E_x"].after == 1.25e9
+    assert diagnosis_json(told)["named_in_part"] == [SHEAR]
+    words = verdict_sentence(told)
+    assert words.startswith("Verdict: unexplained. Named in part: transverse shear; something else remains.")
+    assert "The constants are not to be trusted." in words
+    assert "No improvement is claimed: the misfit that is left is too large." in words
+    section = diagnosis_section(told)
+    assert section.heading == "Part of what is missing was found"
+    assert any(one.startswith("Named in part: transverse shear") for one in section.sentences)
+    assert "The model does not explain the readings" in warnings(told)[0]
+    assert quoted(MOVED, told).error.in_sample_rms_cents == 4.25
+
+
+def test_without_a_part_the_word_unexplained_leaves_the_model_as_it_was():
+    case = in_part_case()
+    told = diagnosis_of(replace(case, after=case.before, in_part=()))
+    assert told.named_in_part == told.refitted == ()
+    assert diagnosis_json(told)["named_in_part"] == []
+    assert told.before == told.after
+    assert "in part" not in verdict_sentence(told)
+    assert diagnosis_section(told).heading == "Something is missing that was not found"
+
+
+def carrying_case(*carried: str):
+    """A named effect; some modes alone carry something, in one of the two fits or by the search."""
+    found = made(NAMED)
+    rows = tuple(
+        mode(str(label), 100.0, 100.0, 1.0, setup="setup-0", left_out_cents=10.0 * (i + 1))
+        for i, label in enumerate(found.ground.baseline.board.setups[0].labels)
+    )
+    modes = tuple(CarryingMode("setup-0", label, 0.95, "E_y") for label in carried)
+    case = case_of(
+        found, control_of(found, 0.4), folds_of(found, 0.5).without(indices_of(modes, found.ground.baseline.board))
+    )
+    before, after = (replace(side, summary=replace(side.summary, modes=rows)) for side in (case.before, case.after))
+    return replace(case, before=before, after=after, carrying=modes), found
+
+
+def test_modes_that_alone_carry_something_count_neither_before_nor_after():
+    case, found = carrying_case("(2,0)", "(5,0)")
+    told = diagnosis_of(case)
+    kept = np.sqrt(np.mean(np.square([10.0, 20.0, 40.0, 50.0])))
+    assert told.before.leave_one_out_rms_cents == pytest.approx(kept)
+    assert told.after.leave_one_out_rms_cents == pytest.approx(kept)
+    assert told.before.log_score == pytest.approx(log_score(found.ground, 0, found.residual, (2, 5)))
+    assert told.after.log_score == pytest.approx(log_score(found.ground, 1, found.residual, (2, 5)))
+    assert told.before.log_score != pytest.approx(log_score(found.ground, 0, found.residual))
+    assert [one["label"] for one in diagnosis_json(told)["carrying_modes"]] == ["(2,0)", "(5,0)"]
+    sentence = (
+        "Mode (2,0) alone carries E_y and mode (5,0) alone carries E_y: they are left out of the left-out error, "
+        "before and after alike."
+    )
+    assert sentence in verdict_sentences(told)
+    assert sentence in show_diagnosis(told).remarks
+
+
+def test_where_every_mode_alone_carries_something_there_is_no_left_out_error():
+    case, _ = carrying_case(*(f"({i},0)" for i in range(6)))
+    told = diagnosis_of(case)
+    for errors in (told.before, told.after):
+        assert errors.leave_one_out_rms_cents is errors.nested_leave_one_out_rms_cents is errors.log_score is None
+    assert told.null_control.nested_ratio is None
+    assert "no mode is left to judge by, and nothing can be claimed" in " ".join(verdict_sentences(told))
+    json_text(diagnosis_json(told))

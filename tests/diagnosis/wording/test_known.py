@@ -14,7 +14,7 @@ from payloads import PAYLOADS
 from bayesplate.diagnosis.evidence.known import KnownFit
 from bayesplate.diagnosis.wording.exports import known_csv, known_tex, write_known
 from bayesplate.diagnosis.wording.known import known_models, known_sentence, known_table
-from bayesplate.estimates.leave_one_out import Errors
+from bayesplate.estimates.leave_one_out import Errors, Leverages
 from bayesplate.report.verdict import diagnosis_section
 
 CENTS = np.log(2.0) / 1200.0
@@ -25,7 +25,8 @@ RISE = "Where the error rises, something that acts the other way is lacking"
 
 def test_what_is_told_of_a_fit_by_hand():
     def fit(effects, moduli, in_sample, left_out):
-        errors = Errors(*(CENTS * np.array(one) for one in (in_sample, left_out)))
+        nobody = Leverages(np.zeros(2), np.full(2, -1))
+        errors = Errors(*(CENTS * np.array(one) for one in (in_sample, left_out)), nobody)
         return KnownFit(effects, (), np.zeros(3), np.array(moduli), errors)
 
     first = fit((), [10e9, 1e9, 0.5e9], [3.0, -4.0], [6.0, 8.0])
@@ -36,6 +37,8 @@ def test_what_is_told_of_a_fit_by_hand():
     assert set(stands.change_percent.values()) == {0.0}
     assert (air.effects, air.without, air.leave_one_out_rms_cents) == (("fluid_loading",), (), None)
     assert air.in_sample_rms_cents == pytest.approx(5.0)
+    without = known_models((first, second), carried=(1,))
+    assert [one.leave_one_out_rms_cents for one in without] == [pytest.approx(6.0), None]
     assert air.change_percent == pytest.approx({"E_x": 5.0, "E_y": -10.0, "G_xy": 0.0})
 
 

@@ -43,6 +43,7 @@ KEYS = [
     "sentences", "declared", "known", "probability_of_none", "probability_of_none_with_halved_priors",
     "probability_of_none_with_doubled_priors", "p_value", "before", "after", "gain_null_percentile", "null_control",
     "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates", "recommendation", "notes",
+    "named_in_part", "carrying_modes",
 ]  # fmt: skip
 ERRORS = [
     "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
