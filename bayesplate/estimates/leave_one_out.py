@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict
+from bayesplate.estimates.refit import N_CONSTANTS, Bounds, Misfit, Predict, has_come_to_rest
 from bayesplate.estimates.side_by_side import most_likely_of_each
 
 _FEWEST = 4
@@ -23,8 +23,8 @@ class Errors:
     in_sample : (n_modes,) array
         Against the fit of all modes.
     left_out : (n_modes,) array
-        Against a refit that has not seen the mode; not a number everywhere if fewer than four modes are given, because
-        then no fold determines three constants.
+        Against a refit that has not seen the mode; not a number where the other modes leave a constant open, so that
+        the refit runs out of reach, and everywhere if fewer than four modes are given.
     """
 
     in_sample: NDArray[np.float64]
@@ -57,10 +57,12 @@ def prediction_errors(
     """
 
     def best(starts: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(starts[np.nanargmin(squares.sum(axis=1) + np.sum(starts[:, N_CONSTANTS:] ** 2, axis=1))])
+        lost = squares.sum(axis=1) + np.sum(starts[:, N_CONSTANTS:] ** 2, axis=1)
+        return np.asarray(starts[np.argmin(np.where(np.isfinite(lost), lost, np.inf))])
 
     def squared(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return misfit(predict(x))[0] ** 2
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a start may be no plate
+            return misfit(predict(x))[0] ** 2
 
     squares = squared(starts)
     (whole,) = most_likely_of_each(predict, misfit, best(starts, squares)[None], [()], bounds)
@@ -71,6 +73,7 @@ def prediction_errors(
         starts, squares = (np.concatenate(both) for both in ((starts, whole[None]), (squares, squared(whole[None]))))
         without = np.stack([best(starts, np.delete(squares, list(mode), axis=1)) for mode in modes])
         fitted = most_likely_of_each(predict, misfit, without, modes, bounds)
+        fitted[~has_come_to_rest(fitted, without)] = np.nan
         for mode, predicted in zip(map(list, modes), predict(fitted), strict=True):
             left_out[mode] = (target - predicted)[mode]
     return Errors(in_sample, left_out)
