@@ -127,6 +127,8 @@ def test_a_law_without_frequencies_gives_no_numbers_where_it_starts_and_is_kept_
     (found,) = most_likely_of_each(walled, misfit, np.zeros((1, 3)), [()], bounds)
     assert np.isfinite(found).all()
     assert 0.3 < found[0] <= 0.5
+    beside = np.array([[0.499999, 0.0, 0.0]])  # slopes by differences reach over the wall
+    assert np.isfinite(most_likely_of_each(walled, misfit, beside, [()], bounds)).all()
     assert np.isnan(most_likely(walled, misfit, np.ones(3), bounds)).all()
     assert not has_come_to_rest(np.full(3, np.nan), np.zeros(3))
     errors = prediction_errors(walled, target, misfit, np.ones((1, 3)), bounds)
