@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
-from bayesplate.estimates.refit import Bounds, Misfit, Predict, n_constants, sensitivities
+from bayesplate.estimates.refit import Bounds, Misfit, Predict, has_come_to_rest, n_constants, sensitivities
 from bayesplate.estimates.side_by_side import most_likely_of_each
 from bayesplate.plate.board import Board
 
@@ -50,8 +50,8 @@ class Errors:
     in_sample : (n_modes,) array
         Against the fit of all modes.
     left_out : (n_modes,) array
-        Against a refit that has not seen the mode; not a number everywhere if no more modes are given than constants,
-        because then no fold determines them.
+        Against a refit that has not seen the mode; not a number where the other modes leave a constant open, so that
+        the refit runs out of reach, and everywhere if no more modes are given than constants.
     leverages : Leverages
         At the fit of all modes.
     """
@@ -121,8 +121,11 @@ def leverages_of(
     Returns
     -------
     Leverages
+        Of nothing where the fit has no slopes.
     """
     weighted = np.nan_to_num(columns / scales[:, None])
+    if not np.isfinite(weighted.T @ weighted).all():
+        return Leverages(np.zeros(len(weighted)), np.full(len(weighted), -1))
     is_prior = np.arange(columns.shape[1]) >= n_open
     covariance = np.linalg.pinv(weighted.T @ weighted + np.diag(is_prior.astype(np.float64)), hermitian=True)
     hat = weighted @ covariance @ weighted.T
@@ -218,10 +221,12 @@ def prediction_errors(
     n = n_constants(predict)
 
     def best(starts: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(starts[np.nanargmin(squares.sum(axis=1) + np.sum(starts[:, n:] ** 2, axis=1))])
+        lost = squares.sum(axis=1) + np.sum(starts[:, n:] ** 2, axis=1)
+        return np.asarray(starts[np.argmin(np.where(np.isfinite(lost), lost, np.inf))])
 
     def squared(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return misfit(predict(x))[0] ** 2
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a start may be no plate
+            return misfit(predict(x))[0] ** 2
 
     squares = squared(starts)
     (whole,) = most_likely_of_each(predict, misfit, best(starts, squares)[None], [()], bounds)
@@ -232,7 +237,9 @@ def prediction_errors(
         starts, squares = (np.concatenate(both) for both in ((starts, whole[None]), (squares, squared(whole[None]))))
         without = np.stack([best(starts, np.delete(squares, list(mode), axis=1)) for mode in modes])
         fitted = most_likely_of_each(predict, misfit, without, modes, bounds)
+        fitted[~has_come_to_rest(fitted, without, n)] = np.nan
         for mode, predicted in zip(map(list, modes), predict(fitted), strict=True):
             left_out[mode] = (target - predicted)[mode]
-    scales = 1.0 / np.abs(misfit(target)[1]) if scales is None else scales
-    return Errors(in_sample, left_out, leverages_of(sensitivities(predict, whole), scales, modes, n))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # the fit may have run where no plate is
+        scales = 1.0 / np.abs(misfit(target)[1]) if scales is None else scales
+        return Errors(in_sample, left_out, leverages_of(sensitivities(predict, whole), scales, modes, n))

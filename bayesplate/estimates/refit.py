@@ -27,6 +27,10 @@ Half the sum is the negative log likelihood of the readings but for a constant.
 """
 
 _STEP = 1e-5
+_REACH = 7.0
+"""Change of ln D, from where a fit begins, up to which constants are looked for: a thousandfold."""
+_EDGE = 0.9
+"""Share of it beyond which a fit has not come to rest: readings that leave a constant open lead there."""
 
 
 def n_constants(predict: Predict) -> int:
@@ -93,7 +97,9 @@ def most_likely(
     bounds: Bounds | None = None,
     left_out: Sequence[int] = (),
 ) -> Floats:
-    """Parameters that minimise the squares of a misfit.
+    """Parameters that minimise the squares of a misfit, the constants within reach of the start.
+
+    A step to where the law gives no frequency, or beyond reach, is refused and a shorter one tried.
 
     Parameters
     ----------
@@ -110,6 +116,7 @@ def most_likely(
     Returns
     -------
     (n_free,) array
+        Not numbers where the law gives no frequency at the start.
     """
     from scipy.optimize import least_squares
 
@@ -119,16 +126,34 @@ def most_likely(
         return np.delete(rows, left_out, axis=0) if len(left_out) else rows
 
     def residuals(x: Floats) -> Floats:
-        return np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[n:]])
+        found = np.concatenate([without(misfit(predict(x[None, :])[0])[0]), x[n:]])
+        return found if _distance(x, start, n) <= _REACH else np.full_like(found, np.nan)
 
     def jacobian(x: Floats) -> Floats:
         chained = misfit(predict(x[None, :])[0])[1][:, None] * sensitivities(predict, x)
-        return np.concatenate([without(chained), np.eye(x.size)[n:]])
+        slopes = np.nan_to_num(without(chained), posinf=0.0, neginf=0.0)  # beside a place without frequencies
+        return np.concatenate([slopes, np.eye(x.size)[n:]])
 
-    if bounds is None or bounds.are_open:
-        return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-10, ftol=1e-10).x)
-    limits = (bounds.lower, bounds.upper)
-    return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac").x)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        if not np.isfinite(residuals(start)).all():
+            return np.full(start.size, np.nan)
+        if bounds is None or bounds.are_open:
+            return np.asarray(least_squares(residuals, start, jacobian, method="lm", xtol=1e-10, ftol=1e-10).x)
+        limits = (bounds.lower, bounds.upper)
+        return np.asarray(least_squares(residuals, start, jacobian, bounds=limits, x_scale="jac").x)
+
+
+def has_come_to_rest(fitted: Floats, starts: Floats, n: int) -> NDArray[np.bool_]:
+    """Whether fits, (..., n_free) arrays of which n are constants, ended well within reach of where they began.
+
+    Where one has not, the readings do not tell the constants.
+    """
+    return np.asarray(_distance(fitted, starts, n) <= _EDGE * _REACH)
+
+
+def _distance(x: Floats, start: Floats, n: int) -> Floats:
+    """The largest change of ln D; not a number where x is none."""
+    return np.asarray(np.abs(x[..., :n] - start[..., :n]).max(axis=-1))
 
 
 def design(predict: Predict, scales: Floats, at: Floats) -> Floats:

@@ -3,7 +3,8 @@
 A point of a board's law costs a fraction among many of what it costs alone. And where residuals are as large as noise,
 steps that leave the curvature of ln f out (Gauss and Newton) come nearer by a constant share each, twenty to a fit;
 with it a handful do. It changes little on the way, and is found anew only where a fit comes on slowly. What does not
-settle so, as at a veering too narrow for differences, is left to `bayesplate.estimates.refit`.
+settle so, as at a veering too narrow for differences, is left to `bayesplate.estimates.refit`. Where the loss is flat
+a step of Newton leads anywhere: it is shortened, and halved where the law gives no frequency.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.refit import Bounds, Floats, Misfit, Predict, most_likely, n_constants
+from bayesplate.estimates.refit import Bounds, Floats, Misfit, Predict, has_come_to_rest, most_likely, n_constants
 from bayesplate.modes.threads import in_threads
 
 _MOST_STEPS = 15
@@ -28,6 +29,8 @@ _ROUNDING = 1e-9
 """Rise of the same that is none."""
 _FAST = 0.01
 """Gain that a step promises, over that of the step before, up to which curvatures are kept."""
+_LONGEST = 7.0
+"""Change of ln D or of a standard coordinate in one step, at most."""
 _FLATTEST = 1e-12
 """Curvature in a direction over the highest of all, at least."""
 
@@ -53,13 +56,16 @@ def most_likely_of_each(
     Returns
     -------
     (n_problems, n_free) array
+        Not numbers where the law gives no frequency at the start.
     """
     found, is_settled = starts.copy(), np.zeros(len(starts), dtype=bool)
     if bounds is None or bounds.are_open:
         kept = np.ones((len(starts), predict(starts[:1]).shape[1]))
         for row, readings in zip(kept, left_out, strict=True):
             row[list(readings)] = 0.0
-        found, is_settled = _newton(_Problems(predict, misfit, kept), starts)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a step may go too far, and is halved
+            found, is_settled = _newton(_Problems(predict, misfit, kept), starts)
+        is_settled &= has_come_to_rest(found, starts, n_constants(predict))
     rest = np.flatnonzero(~is_settled).tolist()
     alone = in_threads(lambda i: most_likely(predict, misfit, starts[i], bounds, left_out[i]), rest)
     for i, one in zip(rest, alone, strict=True):
@@ -131,19 +137,16 @@ class _Problems:
         kept = self.kept[problems]
         pull, stiffness = kept * residuals * changes, kept * (high - low) / (2.0 * apart)
         loss = 0.5 * (np.sum(kept * residuals**2, axis=1) + np.sum(is_input * x**2, axis=1))
-        return _Place(
-            problems,
-            np.where(np.isfinite(slopes).all(axis=(1, 2)), loss, np.nan),
-            np.einsum("pik,pk->pi", slopes, pull) + is_input * x,
-            np.einsum("pik,pjk->pij", slopes * stiffness[:, None], slopes) + np.diag(is_input),
-            pull,
-        )
+        gradient = np.einsum("pik,pk->pi", slopes, pull) + is_input * x
+        flat = np.einsum("pik,pjk->pij", slopes * stiffness[:, None], slopes) + np.diag(is_input)
+        is_known = np.isfinite(gradient).all(axis=1) & np.isfinite(flat).all(axis=(1, 2))
+        return _Place(problems, np.where(is_known, loss, np.nan), gradient, flat, pull)
 
 
 def _newton(every: _Problems, starts: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Where the problems are lowest, from the start of each, and which of them have settled there.
 
-    A step is halved until it does not rise.
+    A step is halved until the loss there is known and does not rise.
     """
     n = len(starts)
     at, tried, steps, is_settled = starts.copy(), starts.copy(), np.zeros_like(starts), np.zeros(n, dtype=bool)
@@ -165,6 +168,7 @@ def _newton(every: _Problems, starts: Floats) -> tuple[Floats, NDArray[np.bool_]
         if is_slow.any():
             bent[taken[is_slow]] = curvatures(every.predict, at[taken[is_slow]])
             found, gains, is_bowl = there.steps(bent[taken])
+        found /= np.maximum(np.abs(found).max(axis=1, keepdims=True) / _LONGEST, 1.0)
         steps[taken], promised[taken] = found, gains
         is_settled[taken] = is_bowl & (gains <= _ENOUGH)
         tried = at + steps
@@ -184,7 +188,7 @@ def curvatures(predict: Predict, x: Floats) -> Floats:
     found = np.zeros((len(x), n_free, n_free, middle.shape[-1]))
     found[:, range(n_free), range(n_free)] = above + below - 2.0 * middle
     found[:, first, second] = found[:, second, first] = both - above[:, first] - above[:, second] + middle
-    return np.nan_to_num(np.moveaxis(found, -1, 1) / _SECOND**2)
+    return np.nan_to_num(np.moveaxis(found, -1, 1) / _SECOND**2, posinf=0.0, neginf=0.0)
 
 
 def _around(predict: Predict, x: Floats, ends: Floats) -> Floats:

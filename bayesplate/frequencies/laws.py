@@ -14,6 +14,9 @@ from bayesplate.modes.reduced import ReducedOrderModel
 
 LawName = Literal["linear", "exact"]
 
+_LARGEST = 1e150
+"""Weight above which a draw is no plate: its matrices, or products of them, would not be finite."""
+
 
 class Law(Protocol):
     """omega^2 of the wanted modes from the weights of the terms."""
@@ -53,8 +56,18 @@ class ExactLaw:
     name: LawName = "exact"
 
     def squared(self, weights: Weights) -> NDArray[np.float64]:
-        """omega^2 in s^-2: (n_draws, n_modes) array."""
-        return self.reduced.eigenvalues(weights)
+        """omega^2 in s^-2: (n_draws, n_modes) array; not a number at a draw that is no plate.
+
+        Weights that are not finite never reach a solver of eigenvalues, which would end everything at such a draw.
+        """
+        is_finite = [np.abs(weight).max(axis=1) < _LARGEST for weight in weights]
+        is_plate = is_finite[0] & is_finite[1]
+        if is_plate.all():
+            return self.reduced.eigenvalues(weights)
+        squared = np.full((is_plate.size, len(self.reduced.places)), np.nan)
+        if is_plate.any():
+            squared[is_plate] = self.reduced.eigenvalues(Weights(*(weight[is_plate] for weight in weights)))
+        return squared
 
     def tangent(self, weights: Weights) -> LinearLaw:
         """The linear law of the modes at one draw, which has the same slopes there."""

@@ -57,7 +57,7 @@ DECLARED = dict.fromkeys(FREE, PROFILES) | {"foam-panel-exciter": ("fluid_loadin
 
 @pytest.mark.parametrize("name", card_names("boards"))
 def test_what_a_shipped_board_declares_by_what_it_states(name: str) -> None:
-    """The free boards their support and shape, the foam its air; what a board of the paper states it does not declare."""
+    """The free boards their support and shape, the foam its air; what the paper states is not declared."""
     declared = prepare(name).board.effects
     assert tuple(one for one in declared if one != "exciter") == DECLARED.get(name, ())
 
