@@ -11,6 +11,7 @@ from bayesplate.estimates.identifiability import remarks
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.estimates.paper import PaperSystem, paper_system
 from bayesplate.estimates.percentile import percentile_estimate
+from bayesplate.estimates.undeclared_air import air_sentence
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.certificate import Certificate, does_not_apply
@@ -148,6 +149,7 @@ def summarise(
             *remarks(board, problem.identifiability, carrying_sentence(assessment.carrying)),
             *prior_remarks(draws, problem.prior),
             *input_remarks(draws, board),
+            *filter(None, [air_sentence(board, problem.estimate)]),
         ),
         warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
         doubts=doubts_of(problem, assessment, certificate),

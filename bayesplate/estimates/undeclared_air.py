@@ -1,0 +1,54 @@
+"""The air that nobody declares: by how much its mass would raise the constants of a board in a room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.effects import effects_of
+from bayesplate.effects.fluid_loading import BAFFLES, DEFAULT_DENSITY, FluidLoading
+from bayesplate.estimates.least_squares import Estimate
+from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.system import System
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import MODULI, moduli
+
+SMALLEST = 0.005
+"""Relative rise of a constant below which nothing is said."""
+
+
+def rise_with_air(board: Board, estimate: Estimate) -> NDArray[np.float64]:
+    """Relative rise of E_x, E_y and G_xy with open air of 1.2 kg/m3 around every setup: (3,) array.
+
+    The board's modes in air against those without, and the weighted least squares that make up for it. Zeros where a
+    fluid is declared: whatever it is, it is in the model.
+    """
+    if FluidLoading.name in board.effects:
+        return np.zeros(len(MODULI))
+    shifts = []
+    for setup, model in zip(board.setups, estimate.models, strict=True):
+        air = replace(FluidLoading.of(board, setup), density=DEFAULT_DENSITY, baffle=BAFFLES["none"])
+        values = {**estimate.values, air.name_of("density"): np.asarray(DEFAULT_DENSITY.mean)}
+        values[air.name_of("baffle")] = np.asarray(0.0)
+        with_air = setup_model(System(setup, (*effects_of(board, setup), air)), values)
+        shifts.append((with_air.log_frequencies(values, "linear") - model.log_frequencies(values, "linear"))[0])
+    weighted = board.symmetry.along(estimate.sensitivities) / estimate.scales[:, None]
+    step, *_ = np.linalg.lstsq(weighted, -np.concatenate(shifts) / estimate.scales, rcond=None)
+    rigidities = estimate.rigidities * np.exp(step[list(board.symmetry.follows)])
+    thickness, nu_xy = (estimate.values[name] for name in ("thickness", "poisson_xy"))
+    before, after = (np.stack(moduli(*each, thickness, nu_xy)) for each in (estimate.rigidities, rigidities))
+    return np.asarray(after / before - 1.0)
+
+
+def air_sentence(board: Board, estimate: Estimate) -> str:
+    """What the constants leave out of the air, and the two lines that put it in; empty where that is next to nothing."""
+    rise = rise_with_air(board, estimate)
+    if np.abs(rise).max() < SMALLEST:
+        return ""
+    told = [f"{name} {100.0 * part:+.1f} %" for name, part in zip(board.symmetry.moduli, rise, strict=False)]
+    return (
+        f"no air is declared, and a board in a room carries it along; with it the constants would change by "
+        f'{", ".join(told)}: add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"'
+    )

@@ -1,0 +1,67 @@
+"""The air that nobody declares: boards that rang in the generator's air, fitted without it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import made_boards
+import numpy as np
+import pytest
+from effect_plates import setup_of
+from generator.effects import FluidLoading
+from generator.known_boards import BEAMS, DRIVEN, HALF_TOP, STEEL
+from generator.naming import frequencies
+
+from bayesplate.effects import declare
+from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.estimates.undeclared_air import SMALLEST, air_sentence, rise_with_air
+from bayesplate.plate.material import moduli
+
+PLATES = {"clamped": DRIVEN, "half-top": HALF_TOP}
+
+
+def in_air(plate, beams, density=1.2, isotropic=False):
+    """A board read in the open air, and its estimate without any."""
+    hertz = frequencies(plate, [FluidLoading(density, 0.0)], beams)[0]
+    setup = made_boards.setup_of(plate.edges, hertz, name=setup_of(plate).name)
+    board = replace(made_boards.board_of(plate, [setup]), isotropic=isotropic)
+    return board, weighted_least_squares(board)
+
+
+def constants(estimate):
+    return np.stack(moduli(*estimate.rigidities, estimate.values["thickness"], estimate.values["poisson_xy"]))
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_the_rise_takes_a_board_to_its_true_constants(name):
+    """To a hundredth: the refit is linear, and a rise of 15 % has a second order of 0.15^2 / 2."""
+    plate = PLATES[name]
+    board, estimate = in_air(plate, BEAMS[name])
+    found = constants(estimate) * (1.0 + rise_with_air(board, estimate))
+    # The clamped board tells D_s + 2 nu_xy D_y alone: its G_xy is what the other two leave.
+    some = slice(2) if name == "clamped" else slice(3)
+    truth = np.array([plate.E_x, plate.E_y, plate.G_xy])
+    assert found[some] == pytest.approx(truth[some], rel=0.01)
+    assert (constants(estimate)[some] < 0.99 * truth[some]).all()
+
+
+def test_an_isotropic_board_has_one_constant_to_tell_of():
+    board, estimate = in_air(STEEL, BEAMS["steel"], density=30.0, isotropic=True)
+    # Air of 1.2 kg/m3 is a twenty-fifth of what it rang in, and nine millimetres of steel hardly feel it.
+    rise = rise_with_air(board, estimate)
+    assert rise == pytest.approx([rise[0]] * 3)
+    assert 0.0 < rise[0] < SMALLEST
+    assert air_sentence(board, estimate) == ""
+
+
+def test_the_sentence_says_by_how_much_and_what_to_add():
+    board, estimate = in_air(HALF_TOP, BEAMS["half-top"])
+    E_x, E_y, G_xy = (f"{100.0 * one:+.1f} %" for one in rise_with_air(board, estimate))
+    told = air_sentence(board, estimate)
+    assert f"E_x {E_x}, E_y {E_y}, G_xy {G_xy}" in told
+    assert told.endswith('add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"')
+
+
+def test_nothing_is_said_where_a_fluid_is_declared():
+    board, estimate = in_air(HALF_TOP, BEAMS["half-top"])
+    assert air_sentence(declare(replace(board, effects=("fluid_loading",))), estimate) == ""
