@@ -15,6 +15,12 @@ HALF_TOP = {"length_x": 550.0, "length_y": 200.0, "thickness": 2.8}
 """A guitar half-top, mm: stands in for what is not known yet; its density is that of the wood whatever its sizes."""
 
 SPRUCE_DENSITY = 420.0
+_AIR = (
+    "# The air of the room moves with the board; take these three lines out for frequencies computed without it.",
+    "[setup.fluid]",
+    "density_kg_m3 = 1.2",
+    'baffle = "none"  # "full" for a board that fills the opening of a wall',
+)
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,7 @@ def starter_text(starter: Starter, examples: Sequence[Label]) -> str:
     if "clamped" in starter.edges.values():
         lines.append("# clamped_mm = { x0 = 30 }  # what the clamp covers, where the plate's length includes it")
     lines.append("# unlabelled_hz = [404, 448.8]  # peaks of which you cannot tell the mode")
+    lines += ["", *_AIR]
     lines += ["", '[setup.frequencies_hz]  # "(m,n)": m nodal lines crossed along x, n along y']
     lines += [f"{_quoted(label)} = {hz:g}" for label, hz in starter.frequencies.items()]
     lines += [f'# "{label}" = ' for label in examples if str(label) not in starter.frequencies]

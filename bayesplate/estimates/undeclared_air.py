@@ -38,12 +38,14 @@ def rise_with_air(board: Board, estimate: Estimate) -> NDArray[np.float64]:
     step, *_ = np.linalg.lstsq(weighted, -np.concatenate(shifts) / estimate.scales, rcond=None)
     rigidities = estimate.rigidities * np.exp(step[list(board.symmetry.follows)])
     thickness, nu_xy = (estimate.values[name] for name in ("thickness", "poisson_xy"))
-    before, after = (np.stack(moduli(*each, thickness, nu_xy)) for each in (estimate.rigidities, rigidities))
+    before, after = (
+        np.stack(moduli(D_x, D_y, D_s, thickness, nu_xy)) for D_x, D_y, D_s in (estimate.rigidities, rigidities)
+    )
     return np.asarray(after / before - 1.0)
 
 
 def air_sentence(board: Board, estimate: Estimate) -> str:
-    """What the constants leave out of the air, and the two lines that put it in; empty where that is next to nothing."""
+    """What the constants leave out of the air, and the two lines that put it in; empty where it is in or hardly any."""
     rise = rise_with_air(board, estimate)
     if np.abs(rise).max() < SMALLEST:
         return ""
