@@ -16,6 +16,8 @@ from bayesplate.diagnosis.evidence.known import known_fit
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
+from bayesplate.planning.before import prior_beliefs
+from bayesplate.planning.gains import Readings, expected_gain
 from bayesplate.plate.material import isotropic_moduli, moduli, rigidities
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import as_json
@@ -122,6 +124,38 @@ def test_bending_alone_tells_nothing_of_the_poisson_ratio():
         "the modes tell nothing of nu: it stays at 0.3 ± 0.08, and E goes with it"
         in bayesplate.check(board).identifiability
     )
+
+
+@pytest.mark.slow
+def test_one_mode_leaves_nothing_to_judge_by():
+    result = bayesplate.diagnose(sheet({(2, 0): sheet_hz(70e9, 0.3)[2, 0]}))
+
+    assert result.diagnosis.verdict == "undetectable"
+    assert "one mode determines the one constant and leaves nothing to judge by" in repr(result.diagnosis.reason)
+
+
+def test_a_plate_clamped_all_round_does_not_tell_its_poisson_ratio():
+    """Its frequencies go with D alone, so that E = 12 (1 - nu^2) D / h^3 is as uncertain as 1 - nu^2."""
+    hz = {(0, 0): 220.0, (1, 0): 320.0, (2, 0): 500.0}
+    clamped = Setup.from_frequencies(hz, edges="clamped")
+    said = bayesplate.check(sheet({}, setups=clamped, poisson_xy=NU_UNKNOWN)).identifiability
+
+    assert any("clamped all round: only D is seen, whatever nu is" in one for one in said)
+    assert any("the modes tell nothing of nu" in one for one in said)
+
+
+def test_a_reading_to_come_informs_of_one_modulus():
+    """Of moduli that follow from one it is that one's information: half the log of how its variance shrinks."""
+    problem = bayesplate.Problem.from_card(sheet({(2, 0): 144.0}))
+    beliefs, _ = prior_beliefs(problem.prepared.board, problem.prior, np.random.default_rng(0))
+    (one,) = beliefs.explanations
+    n = one.n_terms
+    reading = Readings((np.zeros((n, 1)),), (np.full((n, 1, 1), 0.5),), (np.full((n, 1), 0.01**2),))
+    found = expected_gain(beliefs, reading, np.random.default_rng(0), 64)
+    before, after = np.log(20.0) ** 2, 1.0 / (np.log(20.0) ** -2 + (0.5 / 0.01) ** 2)
+
+    assert one.covariance[0] == pytest.approx(np.array([[before]]))
+    assert found.information == pytest.approx(0.5 * np.log(before / after), rel=1e-9)
 
 
 def test_without_any_label_nothing_is_told():
