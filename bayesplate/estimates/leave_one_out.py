@@ -34,7 +34,8 @@ class Leverages:
         Share of a reading in its own prediction, 0 to 1; of a mode that was read in several sessions, of these readings
         together.
     carries : (n_readings,) array of int
-        Which parameter the mode alone carries, the constants first; -1: none, because others tell it as well.
+        Which parameter the mode alone carries, the constants first; -1: none, because others tell it as well, or there
+        are too few modes to leave one out.
     """
 
     values: NDArray[np.float64]
@@ -59,16 +60,6 @@ class Errors:
     in_sample: NDArray[np.float64]
     left_out: NDArray[np.float64]
     leverages: Leverages
-
-    @property
-    def is_carried(self) -> NDArray[np.bool_]:
-        """Which readings are of a mode that alone carries a constant or a size: (n_modes,) array."""
-        return np.asarray(self.leverages.carries >= 0)
-
-    @property
-    def judged(self) -> NDArray[np.float64]:
-        """What is left out and counts: not a number where a mode alone carries a constant or a size."""
-        return np.where(self.is_carried, np.nan, self.left_out)
 
     def at(self, readings: NDArray[np.intp], n_readings: int) -> Errors:
         """The errors among those of more readings, by their indices; what the others have is not a number."""
@@ -130,10 +121,12 @@ def leverages_of(
     covariance = np.linalg.pinv(weighted.T @ weighted + np.diag(is_prior.astype(np.float64)), hermitian=True)
     hat = weighted @ covariance @ weighted.T
     values, carries = np.zeros(len(weighted)), np.full(len(weighted), -1)
-    for mode in map(list, [(i,) for i in range(len(weighted))] if modes is None else modes):
+    modes = [(i,) for i in range(len(weighted))] if modes is None else modes
+    for mode in map(list, modes):
         shares, directions = np.linalg.eigh(hat[np.ix_(mode, mode)])
         values[mode] = shares[-1]
-        if shares[-1] > HIGH_LEVERAGE:  # the variance of what it tells would grow most without it
+        if shares[-1] > HIGH_LEVERAGE and len(modes) >= _FEWEST:  # of fewer none is left out
+            # what it alone carries is what would be known least well without it
             told = covariance @ weighted[mode].T @ directions[:, -1]
             carries[mode] = np.argmax(told**2 / np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
     return Leverages(values, carries)

@@ -34,7 +34,7 @@ class Assessment:
     ----------
     left_out : (n_modes,) array
         ln measured - ln predicted of every reading by the most likely constants of the others; not a number where
-        too few modes are left, or where the mode alone carries a constant or a size.
+        too few modes are left.
     leverages : (n_modes,) array
         Share of each mode in its own prediction, at the posterior's median noise.
     carrying : tuple of CarryingMode
@@ -83,7 +83,7 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
     values = posterior_mean_values(problem, draws)
     found = spectra(models, values)
     errors = linearisation(inference, draws) if linear_errors is None else linear_errors
-    left_out = mode_errors(inference, draws)
+    errors_of_modes = mode_errors(inference, draws)
     conflicts = (
         sentence
         for model in models
@@ -91,9 +91,9 @@ def assess(inference: Inference, draws: Draws, linear_errors: Floats | None = No
         for sentence in sign_conflicts(model.setup, *found[model.setup.name], values, model.system.shaped)
     )
     return Assessment(
-        left_out=left_out.judged,
-        leverages=left_out.leverages.values,
-        carrying=carried_in_fit(inference, left_out),
+        left_out=errors_of_modes.left_out,
+        leverages=errors_of_modes.leverages.values,
+        carrying=carried_in_fit(inference, errors_of_modes),
         linear_errors=errors,
         linear_is_enough=linear_is_enough(inference, draws, errors),
         exact_worst=worst_cents(models),

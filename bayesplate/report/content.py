@@ -15,7 +15,7 @@ from bayesplate.report.words import effect_sentence
 from bayesplate.results.budget import budget, row_words
 from bayesplate.results.certified import CHECK, certificate_words
 from bayesplate.results.contract import Spread
-from bayesplate.results.summary import Percentile, Summary
+from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Percentile, Summary
 from bayesplate.results.tables import Table, modes_table, peaks_table
 from bayesplate.results.words import (
     CONSTANTS,
@@ -53,9 +53,8 @@ def summary_sentences(summary: Summary) -> list[str]:
     left_out = error.leave_one_out_rms_cents
     missed = f"The fit misses the frequencies by {_cents(error.in_sample_rms_cents)}"
     if left_out is None:
-        all_carry = "every mode alone carries a constant or a size, so that nothing is left"
-        untested = all_carry if summary.carrying_modes else "there are too few modes"
-        sentences.append(f"{missed}; {untested} to test it on one that it has not seen.")
+        too_few = "there are too few modes to test it on one that it has not seen"
+        sentences.append(f"{missed}; {too_few if summary.why_no_left_out == TOO_FEW_LEFT else NONE_JUDGED}.")
     else:
         sentences.append(f"{missed}; a mode that it has not seen, by {_cents(left_out)}.")
     if summary.model.isotropic:

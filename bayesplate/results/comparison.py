@@ -15,6 +15,7 @@ from bayesplate.plate.material import MODULI
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.methods import Method
 from bayesplate.results.contract import Elastic, finite, rms
+from bayesplate.results.modes import foretold
 
 FORMAT = 1
 SAME_CENTS = 0.5
@@ -173,15 +174,11 @@ def theory_row(problem: PosedProblem, system: PaperSystem, methods: Sequence[Met
 
 
 def judged_alike(rows: Sequence[TheoryRow], carrying: Sequence[CarryingMode]) -> tuple[TheoryRow, ...]:
-    """The theories without what modes say when left out that alone carry something in one of them."""
-    carried = {(one.setup, one.label) for one in carrying}
+    """The theories with left-out errors in which no mode counts that alone carries something in one of them."""
 
     def judged(row: TheoryRow) -> TheoryRow:
-        modes = tuple(
-            replace(one, left_out_cents=None) if (one.setup, one.label) in carried else one for one in row.modes
-        )
-        left_out = rms([one.left_out_cents for one in modes])
-        return replace(row, modes=modes, error=replace(row.error, leave_one_out_rms_cents=left_out))
+        left_out = rms([one.left_out_cents for one in foretold(row.modes, carrying)])
+        return replace(row, error=replace(row.error, leave_one_out_rms_cents=left_out))
 
     return tuple(map(judged, rows))
 

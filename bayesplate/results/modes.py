@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 
+from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.draws import Draws
@@ -41,8 +43,8 @@ class ModeRow:
     rounding_cents : tuple of float or None
         Ends of the rounding interval over the reading; None where it is not rounded.
     left_out_cents : float or None
-        Measured over predicted by the most likely constants of the other readings; None where too few are left, or
-        where the mode alone carries a constant or a size.
+        Measured over predicted by the most likely constants of the other readings; None where too few are left. Of a
+        mode that alone carries a constant or a size it says nothing, and no error counts it.
     leverage : float
         Share of the mode in its own prediction, what else is free counted in.
     label_correlation : float
@@ -110,6 +112,27 @@ def mode_rows(problem: PosedProblem, draws: Draws, assessment: Assessment) -> tu
         )
         made.append(row)
     return tuple(made)
+
+
+Row = TypeVar("Row", bound="Labelled")
+
+
+class Labelled(Protocol):
+    """A row of a mode of a setup."""
+
+    @property
+    def setup(self) -> str:
+        """Name of the setup."""
+
+    @property
+    def label(self) -> str:
+        """Label of the mode."""
+
+
+def foretold(rows: Iterable[Row], carrying: Iterable[CarryingMode]) -> list[Row]:
+    """Rows of the modes that others foretell: those that count in an error of modes left out."""
+    carried = {(one.setup, one.label) for one in carrying}
+    return [one for one in rows if (one.setup, one.label) not in carried]
 
 
 def rounding_intervals(problem: PosedProblem) -> list[tuple[float, float] | None]:

@@ -24,7 +24,7 @@ from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.certified import contradiction
 from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
 from bayesplate.results.joint import Joint
-from bayesplate.results.modes import mode_rows
+from bayesplate.results.modes import foretold, mode_rows
 from bayesplate.results.peaks import assigned_peaks
 from bayesplate.results.summary import (
     FORMAT,
@@ -137,7 +137,7 @@ def summarise(
         spectra=spectra,
         error=ErrorFigures(
             in_sample_rms_cents=float(np.sqrt(np.mean([row.residual_cents**2 for row in rows]))),
-            leave_one_out_rms_cents=rms([row.left_out_cents for row in rows]),
+            leave_one_out_rms_cents=rms([one.left_out_cents for one in foretold(rows, assessment.carrying)]),
             linearisation_rms_cents=rms(assessment.linear_errors),
             exact_law_worst_cents=assessment.exact_worst,
             surrogate_rms_cents=rms(assessment.surrogate_errors),

@@ -16,7 +16,7 @@ from bayesplate.results.words import GPA, constant_name, interval, plus_minus
 
 FORMAT = 1
 TOO_FEW_LEFT = "too few modes to leave one out"
-NONE_JUDGED = "no left-out error, because every mode alone carries a constant or a size"
+NONE_JUDGED = "there is no left-out error, for every mode alone carries a constant or a size"
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,8 @@ class Summary(Run):
     @property
     def why_no_left_out(self) -> str:
         """Why there is no error of modes left out, where there is none."""
-        return NONE_JUDGED if self.carrying_modes else TOO_FEW_LEFT
+        are_left_out = any(one.left_out_cents is not None for one in self.modes)
+        return NONE_JUDGED if are_left_out else TOO_FEW_LEFT
 
     def __repr__(self) -> str:
         constants = ", ".join(f"{name} = {plus_minus(entry, GPA)} GPa" for name, entry in self.elastic.items())

@@ -120,6 +120,7 @@ def test_three_modes_leave_nothing_out(problem):
     found = prediction_errors(lambda x: 5.0 + x @ slopes[:3].T, target[:3], misfit, ORIGIN)
     assert np.isnan(found.left_out).all()
     assert np.isfinite(found.in_sample).all()
+    assert (found.leverages.carries < 0).all()  # nothing is left out, so that there is nothing to count or not
 
 
 def test_an_input_stays_within_its_prior(problem):
@@ -255,7 +256,7 @@ def test_leverages_are_those_of_the_closed_form(problem):
     found = prediction_errors(lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN)
     _, leverages, _ = closed_form(slopes, scales, target, 5.0)
     assert found.leverages.values == pytest.approx(leverages, abs=1e-6)
-    assert (found.is_carried == (leverages > 0.9)).all()
+    assert ((found.leverages.carries >= 0) == (leverages > 0.9)).all()
     tight = prediction_errors(
         lambda x: 5.0 + x @ slopes.T, target, normal_misfit(target, scales), ORIGIN, scales=1e-3 * scales
     )
@@ -270,15 +271,13 @@ def test_readings_of_one_mode_carry_together_what_neither_carries_alone():
     assert found.values[5:] == pytest.approx(1.0)
 
 
-def test_a_mode_that_carries_something_counts_in_no_error_left_out():
-    errors = Errors(
-        np.ones(3), np.array([1.0, 300.0, 2.0]), Leverages(np.array([0.5, 0.95, 0.3]), np.array([-1, 1, -1]))
-    )
-    assert errors.judged == pytest.approx([1.0, np.nan, 2.0], nan_ok=True)
-    assert errors.left_out[1] == 300.0
-    spread = errors.at(np.array([0, 2, 3]), 4)
-    assert spread.judged == pytest.approx([1.0, np.nan, np.nan, 2.0], nan_ok=True)
-    assert spread.is_carried.tolist() == [False, False, True, False]
+def test_errors_of_some_readings_keep_their_places_among_all():
+    errors = Errors(np.ones(2), np.array([1.0, 300.0]), Leverages(np.array([0.5, 0.95]), np.array([-1, 1])))
+    spread = errors.at(np.array([0, 2]), 4)
+    assert spread.left_out == pytest.approx([1.0, np.nan, 300.0, np.nan], nan_ok=True)
+    assert spread.in_sample == pytest.approx([1.0, np.nan, 1.0, np.nan], nan_ok=True)
+    assert spread.leverages.carries.tolist() == [-1, -1, 1, -1]
+    assert spread.leverages.values.tolist() == [0.5, 0.0, 0.95, 0.0]
 
 
 def test_modes_that_carry_something_are_named():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,10 +12,14 @@ import pytest
 import ritz
 from made_boards import setup_of
 from made_reports import fitted
+from made_summaries import SUMMARY
 
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.quantities import Quantity
+from bayesplate.report.content import summary_sentences
+from bayesplate.results.folder import json_text
 from bayesplate.results.modes import mode_rows
+from bayesplate.workflow.shown import show_fit
 
 CARDS = Path(__file__).parents[2] / "models" / "boards"
 HERTZ = {(0, 0): 57.0, (0, 1): Quantity.from_mean(100.0, 0.5)}
@@ -79,3 +85,33 @@ def test_a_peak_of_a_sure_label_is_predicted_as_its_mode_is(tmp_path, monkeypatc
     assert len(summary.peaks) == len(by_label) == 6
     for peak in summary.peaks:
         assert peak.predicted_hz.mean == pytest.approx(by_label[peak.assignments[0].label].mean, rel=1e-12)
+
+
+def test_a_mode_that_alone_carries_a_constant_is_named_and_left_out_of_the_left_out_error(tmp_path):
+    """The paper's cantilever without (2,2): if (1,2) is left out too, nothing tells E_y."""
+    card = tmp_path / "five.toml"
+    text = (CARDS / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
+    lines = text.replace('name = "finnish-spruce-cantilever"', 'name = "five"').splitlines()
+    card.write_text("\n".join(line for line in lines if not line.startswith('"(2,2)"')), encoding="utf-8")
+    summary = fitted(str(card)).summary
+
+    (one,) = summary.carrying_modes
+    assert (one.label, one.carries) == ("(1,2)", "E_y")
+    assert one.leverage > 0.9 > max(row.leverage for row in summary.modes if row.label != "(1,2)")
+    others = [row.left_out_cents for row in summary.modes if row.label != "(1,2)"]
+    assert summary.error.leave_one_out_rms_cents == pytest.approx(np.sqrt(np.mean(np.square(others))))
+    assert all(row.left_out_cents is not None for row in summary.modes)
+    sentence = "mode (1,2) alone carries E_y: it is left out of the left-out error"
+    assert sentence in summary.identifiability
+    assert sentence in show_fit(summary).remarks
+    assert json.loads(json_text(summary))["carrying_modes"][0]["carries"] == "E_y"
+
+
+def test_where_every_mode_carries_something_alone_it_is_said_that_there_is_no_left_out_error():
+    none = replace(SUMMARY.error, leave_one_out_rms_cents=None)
+    carrying = replace(SUMMARY, error=none)
+    few = replace(carrying, modes=tuple(replace(row, left_out_cents=None) for row in SUMMARY.modes))
+    assert "there is no left-out error, for every mode alone carries a constant or a size" in show_fit(carrying).closing
+    assert "every mode alone carries a constant or a size." in summary_sentences(carrying)[1]
+    assert "too few modes to leave one out" in show_fit(few).closing
+    assert "too few modes to test it" in summary_sentences(few)[1]

@@ -38,6 +38,7 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
 from bayesplate.results.contract import Spread, finite, rms
+from bayesplate.results.modes import foretold
 from bayesplate.results.summary import Summary
 
 Floats = NDArray[np.float64]
@@ -188,10 +189,9 @@ def _errors(case: Case, side: Side) -> Errors:
 
 def left_out_rms_cents(summary: Summary, carrying: Sequence[CarryingMode]) -> float | None:
     """Error of a fit for modes left out, but of those that alone carry something in any of the models compared."""
-    carried = {(one.setup, one.label) for one in carrying}
-    if not carried - {(one.setup, one.label) for one in summary.carrying_modes}:
+    if set(carrying) <= set(summary.carrying_modes):
         return summary.error.leave_one_out_rms_cents
-    return rms([one.left_out_cents for one in summary.modes if (one.setup, one.label) not in carried])
+    return rms([one.left_out_cents for one in foretold(summary.modes, carrying)])
 
 
 def _log_score(case: Case, side: Side) -> float | None:
