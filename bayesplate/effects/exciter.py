@@ -155,8 +155,8 @@ class Exciter(Effect):
 
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
-        """Whether the setup states what an exciter weighs."""
-        return any(item.kind == cls.name and item.mass is not None for item in setup.attached)
+        """Whether the setup states what moves of an exciter: the whole, or the coil alone where the magnet is held."""
+        return any(item.kind == cls.name and _is_stated(item) for item in setup.attached)
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Exciter, ...]:
@@ -323,6 +323,10 @@ def _drive(board: Board, setup: Setup, item: AttachedItem) -> Drive:
         is_held=item.magnet == "held",
         places=fractions_on(board, setup, item.places),
     )
+
+
+def _is_stated(item: AttachedItem) -> bool:
+    return item.mass is not None or (item.magnet == "held" and item.coil is not None)
 
 
 def _with_known_coil(drive: Drive) -> Drive:
