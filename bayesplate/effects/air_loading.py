@@ -72,6 +72,11 @@ class AirLoading(Effect):
         """Whether a setup of the board declares its air."""
         return any(setup.air is not None for setup in board.setups)
 
+    @classmethod
+    def is_known(cls, board: Board) -> bool:
+        """Always: it is computed from the board, and air is around every one."""
+        return True
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Density of the air and share of the baffle; without density there is no air, whatever the baffle."""
         stated = self.density is not DEFAULT_DENSITY, self.baffle is not UNKNOWN_BAFFLE

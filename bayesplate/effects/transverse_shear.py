@@ -58,6 +58,11 @@ class TransverseShear(Effect):
         """The effect with the card's thick-plate constants where it gives them."""
         return cls(xz=board.shear_xz or DEFAULT_XZ, yz=board.shear_yz or DEFAULT_YZ)
 
+    @classmethod
+    def is_known(cls, board: Board) -> bool:
+        """Always: what the card does not state of the moduli is published."""
+        return True
+
     def parameters(self) -> tuple[Parameter, ...]:
         """G_xz and G_yz; a plate stiffer than any solid does not give way in shear."""
         given = (("G_xz", self.xz, DEFAULT_XZ), ("G_yz", self.yz, DEFAULT_YZ))

@@ -9,9 +9,8 @@ from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import campaign_check_tables, campaign_tables, diagnosis_tables
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
-from bayesplate.diagnosis.wording.told import alike_sentence, verdict_sentence, warnings
+from bayesplate.diagnosis.wording.told import alike_sentence, known_sentences, verdict_sentence, warnings
 from bayesplate.effects.words import effect_names
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.tables import plan_tables
@@ -154,7 +153,7 @@ def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
     if isinstance(diagnosis, CampaignDiagnosis):
         told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
         return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
-    told = (known_sentence(diagnosis.known), *diagnosis.sentences, alike_sentence(diagnosis), diagnosis.recommendation)
+    told = (*known_sentences(diagnosis), *diagnosis.sentences, alike_sentence(diagnosis), diagnosis.recommendation)
     remarks = tuple(sentence for sentence in told if sentence)
     return Shown(every_table(diagnosis), remarks, tuple(warnings(diagnosis)), verdict_sentence(diagnosis))
 
