@@ -177,12 +177,15 @@ class Exciter(Effect):
         )
         return Exciter(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
 
-    def at_known_size(self) -> Exciter:
-        """The same where places that nobody knows are four, as those of Gauss's rule over the board."""
-        spots = ([low + share * (high - low) for share in _QUADRATURE] for low, high in self._ranges)
-        along_x, along_y = spots
+    @classmethod
+    def at_known_size(cls, board: Board, setup: Setup) -> Exciter | None:
+        """The setup's exciters; places that nobody knows are four, those of Gauss's rule over the board."""
+        if cls.refusal(board, setup):
+            return None
+        whole = cls.of(board, setup)
+        along_x, along_y = ([low + share * (high - low) for share in _QUADRATURE] for low, high in whole._ranges)
         four = tuple((float(x), float(y)) for x in along_x for y in along_y)
-        return replace(self, drives=tuple(replace(drive, places=drive.places or four) for drive in self.drives))
+        return replace(whole, drives=tuple(replace(drive, places=drive.places or four) for drive in whole.drives))
 
     def within(self, shaped: Effect) -> Exciter:
         """The same exciters on the true outline."""
