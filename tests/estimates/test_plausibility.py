@@ -30,6 +30,8 @@ from bayesplate.quantities import Quantity
 
 PRIORS = ("spruce", "weakly-informative")
 LABELS = made_boards.FREE_LABELS[:6]
+OTHERS = ("steel-air-water", "foam-panel-exciter", "acrylic-panel")
+"""Of no wood: frequencies in a wrong unit make another material of them, and nothing is odd about that."""
 SIDES = ("length_x", "length_y")
 
 
@@ -73,7 +75,9 @@ def foretold(board: Board, prior: PriorCard, rng: np.random.Generator) -> PriorP
     return found
 
 
-@pytest.mark.parametrize("name", [name for name in card_names("boards") if load_board(name).setups[0].frequencies_hz])
+@pytest.mark.parametrize(
+    "name", [name for name in card_names("boards") if name not in OTHERS and load_board(name).setups[0].frequencies_hz]
+)
 @pytest.mark.parametrize("prior", PRIORS)
 def test_shipped_boards_are_asked_nothing_and_units_are_asked_about(name, prior):
     board = board_of(name, prior)
