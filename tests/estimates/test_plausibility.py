@@ -30,6 +30,8 @@ from bayesplate.quantities import Quantity
 
 PRIORS = ("spruce", "weakly-informative")
 LABELS = made_boards.FREE_LABELS[:6]
+OTHERS = ("steel-air-water", "foam-panel-exciter", "acrylic-panel")
+"""Of no wood: frequencies in a wrong unit make another material of them, and nothing is odd about that."""
 SIDES = ("length_x", "length_y")
 
 
