@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from bayesplate.diagnosis.decision.claim import Condition
+from bayesplate.diagnosis.decision.stated import StatedClaim
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import (
@@ -41,17 +42,32 @@ AFTER = Errors(
 
 
 def known_model(error: float, left_out: float | None, *effects: str, without: tuple[str, ...] = ()) -> KnownModel:
-    """The board with effects of known sizes."""
+    """A board that declares a sensor, with effects of known sizes."""
     factor = 1.0 if effects or without else 0.0
     return KnownModel(
+        combination=(*effects, *(() if without else ("attached_mass",))),
         effects=effects,
         without=without,
         in_sample_rms_cents=error,
         leave_one_out_rms_cents=left_out,
+        n_left_out=0 if left_out is None else 6,
+        n_readings=6,
         change_percent={"E_x": 1.25 * factor, "E_y": 0.0 - 2.5 * factor, "G_xy": 0.0},
     )
 
 
+STATED = (
+    StatedClaim(
+        effects=("attached_mass",),
+        predicts="",
+        before_rms_cents=61.0,
+        after_rms_cents=46.5,
+        log_score_gain=4.5,
+        standard_error=2.0,
+        n_modes=6,
+        holds=True,
+    ),
+)
 KNOWN = (
     known_model(21.25, 46.5),
     known_model(9.5, 12.25, "transverse_shear"),
@@ -149,6 +165,7 @@ def diagnosis(word: Word, effects: tuple[str, ...] = (), claim: bool = False, af
         reason="the reason of it",
         sentences=tuple(EFFECTS[name].sentence for name in effects),
         declared=(),
+        stated_claims=STATED if word == "named" else (),
         known=KNOWN if word == "named" else KNOWN[:1],
         probability_of_none=0.02,
         probability_of_none_with_halved_priors=0.02,

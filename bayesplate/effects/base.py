@@ -201,6 +201,22 @@ class Effect(ABC):
         return False
 
     @classmethod
+    def is_known(cls, board: Board) -> bool:
+        """Whether its size on a board is known without a fit: computed, published, or stated by the card.
+
+        What the card states counts as known also where the list of declared effects leaves it out.
+        """
+        return cls.is_implied(board)
+
+    @classmethod
+    def at_known_size(cls, board: Board, setup: Setup) -> Effect | None:
+        """The effect as it is computed in a setup without a fit; None if it cannot act there.
+
+        Its sizes stand at the medians of their priors.
+        """
+        return None if cls.refusal(board, setup) else cls.of(board, setup)
+
+    @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
         """Whether the setup itself states the effect, so that it is a fault if the effect cannot act there."""
         return False

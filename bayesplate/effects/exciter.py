@@ -155,8 +155,8 @@ class Exciter(Effect):
 
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
-        """Whether the setup states what an exciter weighs."""
-        return any(item.kind == cls.name and item.mass is not None for item in setup.attached)
+        """Whether the setup states what moves of an exciter: the whole, or the coil alone where the magnet is held."""
+        return any(item.kind == cls.name and _is_stated(item) for item in setup.attached)
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Exciter, ...]:
@@ -177,12 +177,15 @@ class Exciter(Effect):
         )
         return Exciter(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
 
-    def at_known_size(self) -> Exciter:
-        """The same where places that nobody knows are four, as those of Gauss's rule over the board."""
-        spots = ([low + share * (high - low) for share in _QUADRATURE] for low, high in self._ranges)
-        along_x, along_y = spots
+    @classmethod
+    def at_known_size(cls, board: Board, setup: Setup) -> Exciter | None:
+        """The setup's exciters; places that nobody knows are four, those of Gauss's rule over the board."""
+        if cls.refusal(board, setup):
+            return None
+        whole = cls.of(board, setup)
+        along_x, along_y = ([low + share * (high - low) for share in _QUADRATURE] for low, high in whole._ranges)
         four = tuple((float(x), float(y)) for x in along_x for y in along_y)
-        return replace(self, drives=tuple(replace(drive, places=drive.places or four) for drive in self.drives))
+        return replace(whole, drives=tuple(replace(drive, places=drive.places or four) for drive in whole.drives))
 
     def within(self, shaped: Effect) -> Exciter:
         """The same exciters on the true outline."""
@@ -323,6 +326,10 @@ def _drive(board: Board, setup: Setup, item: AttachedItem) -> Drive:
         is_held=item.magnet == "held",
         places=fractions_on(board, setup, item.places),
     )
+
+
+def _is_stated(item: AttachedItem) -> bool:
+    return item.mass is not None or (item.magnet == "held" and item.coil is not None)
 
 
 def _with_known_coil(drive: Drive) -> Drive:

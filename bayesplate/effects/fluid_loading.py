@@ -86,6 +86,11 @@ class FluidLoading(Effect):
             return "air"
         return "water" if abs(self.density.mean - WATER) < NEAR_WATER else "fluid"
 
+    @classmethod
+    def is_known(cls, board: Board) -> bool:
+        """Always: it is computed from the board, and air is around every one."""
+        return True
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Density of the fluid and share of the baffle; without density there is no fluid, whatever the baffle."""
         stated = self.density is not DEFAULT_DENSITY, self.baffle is not UNKNOWN_BAFFLE

@@ -74,6 +74,11 @@ class OutlineProfile(Effect):
         return profile is not None and not profile.is_uniform
 
     @classmethod
+    def is_known(cls, board: Board) -> bool:
+        """Never: the readings tell a field, whose width between them is uncertain and not a size."""
+        return False
+
+    @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
         """That readings of the width at stations serve for their mean alone, and why."""
         if not board.inputs["length_y"].has_profile:

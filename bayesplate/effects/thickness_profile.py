@@ -72,6 +72,11 @@ class ThicknessProfile(Effect):
         return profile is not None and not profile.is_uniform
 
     @classmethod
+    def is_known(cls, board: Board) -> bool:
+        """Never: the readings tell a field, whose thickness between them is uncertain and not a size."""
+        return False
+
+    @classmethod
     def notes(cls, board: Board) -> tuple[str, ...]:
         """That readings of the thickness at places serve for their mean alone where the effect is not declared."""
         if not board.inputs["thickness"].has_profile:

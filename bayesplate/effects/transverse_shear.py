@@ -60,6 +60,11 @@ class TransverseShear(Effect):
             return cls(xz=board.shear_xz, yz=board.shear_yz)
         return cls(xz=board.shear_xz or DEFAULT_XZ, yz=board.shear_yz or DEFAULT_YZ)
 
+    @classmethod
+    def is_known(cls, board: Board) -> bool:
+        """Always: what the card does not state of the moduli is published."""
+        return True
+
     def parameters(self) -> tuple[Parameter, ...]:
         """G_xz and G_yz, where they are not G_xy; a plate stiffer than any solid does not give way in shear."""
         given = (("G_xz", self.xz, DEFAULT_XZ), ("G_yz", self.yz, DEFAULT_YZ))

@@ -125,7 +125,7 @@ def leverages_of(
     for mode in map(list, modes):
         shares, directions = np.linalg.eigh(hat[np.ix_(mode, mode)])
         values[mode] = shares[-1]
-        if shares[-1] > HIGH_LEVERAGE and len(modes) >= _FEWEST:  # of fewer none is left out
+        if shares[-1] > HIGH_LEVERAGE and len(modes) > n_open:  # of fewer none is left out
             # what it alone carries is what would be known least well without it
             told = covariance @ weighted[mode].T @ directions[:, -1]
             carries[mode] = np.argmax(told**2 / np.maximum(np.diagonal(covariance), np.finfo(float).tiny))

@@ -51,6 +51,6 @@ def air_sentence(board: Board, estimate: Estimate) -> str:
         return ""
     told = [f"{name} {100.0 * part:+.1f} %" for name, part in zip(board.symmetry.moduli, rise, strict=False)]
     return (
-        f"no air is declared, and a board in a room carries it along; with it the constants would change by "
+        "no air is declared, and a board in a room carries it along; with it the constants would change by "
         f'{", ".join(told)}: add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"'
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.known import known_sentence, known_table
+from bayesplate.diagnosis.wording.known import known_table
 from bayesplate.diagnosis.wording.tables import (
     answers_table,
     candidates_table,
@@ -15,7 +15,14 @@ from bayesplate.diagnosis.wording.tables import (
     sizes_table,
     what_is_quoted,
 )
-from bayesplate.diagnosis.wording.told import headline_sentence, remarks, shown_model, verdict_sentences, warnings
+from bayesplate.diagnosis.wording.told import (
+    headline_sentence,
+    known_sentences,
+    remarks,
+    shown_model,
+    verdict_sentences,
+    warnings,
+)
 from bayesplate.diagnosis.wording.words import IN_PART, VERDICTS
 from bayesplate.report.content import constants_table, summary_sentences
 from bayesplate.results.contract import Elastic, Rigidity
@@ -34,7 +41,7 @@ class DiagnosisSection:
         Each word that a verdict may be, what it means, and whether it is the one given.
     sentences : tuple of str
     known : str
-        What known effects do to the error; empty if there are none.
+        What known effects do to the error, and what is claimed of those that the card states; empty if there are none.
     tables : tuple of Table
         Known effects, probabilities, errors, conditions of the claim, shift of the constants, sizes.
     explained : tuple of str
@@ -79,7 +86,7 @@ def diagnosis_section(diagnosis: Diagnosis) -> DiagnosisSection:
         heading=IN_PART if diagnosis.named_in_part else VERDICTS[diagnosis.verdict].heading,
         verdicts=tuple((word, one.heading, word == diagnosis.verdict) for word, one in VERDICTS.items()),
         sentences=tuple(verdict_sentences(diagnosis)),
-        known=known_sentence(diagnosis.known),
+        known=" ".join(known_sentences(diagnosis)),
         tables=tuple(table for table in tables if table is not None),
         explained=(_LOG_SCORE, *((_SHIFT,) if diagnosis.is_refitted else ())),
         model=shown_model(diagnosis),

@@ -17,6 +17,7 @@ from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.in_part import named_in_part
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.refits import refit_board
+from bayesplate.diagnosis.decision.stated import stated_claims
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, decide
 from bayesplate.diagnosis.evidence.folds import Nested
 from bayesplate.diagnosis.evidence.joint import full_search
@@ -259,6 +260,7 @@ def _case(
         claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
         recommendation=advice(found, verdict, before.problem.prior, before.summary.seed),
         known=known,
+        stated_claims=stated_claims(before.inference.problem, known) if known else (),
         finalists=[(one, refits[one.index].summary) for one in finals if one.index in refits],
         drawn={index: one.draws for index, one in refits.items()},
         has_slip=bool(before.inference.problem.slips),

@@ -9,9 +9,14 @@ from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import campaign_check_tables, campaign_tables, diagnosis_tables
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
-from bayesplate.diagnosis.wording.told import alike_sentence, carrying_words, verdict_sentence, warnings
+from bayesplate.diagnosis.wording.told import (
+    alike_sentence,
+    carrying_words,
+    known_sentences,
+    verdict_sentence,
+    warnings,
+)
 from bayesplate.effects.words import effect_names
 from bayesplate.estimates.leave_one_out import carrying_sentence
 from bayesplate.planning.plan import Plan
@@ -160,7 +165,7 @@ def show_diagnosis(diagnosis: Diagnosis | CampaignDiagnosis) -> Shown:
         told = tuple(one for one in (diagnosis.reason, diagnosis.recommendation) if one)
         return Shown(diagnosis_tables(diagnosis), told, diagnosis.notes, claim_sentence(diagnosis))
     told = (
-        known_sentence(diagnosis.known),
+        *known_sentences(diagnosis),
         carrying_words(diagnosis),
         *diagnosis.sentences,
         alike_sentence(diagnosis),

@@ -10,6 +10,7 @@ from calibration.plans import WAYS, bars, calibration, is_calibrated, settled, w
 
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
+from bayesplate.plate.material import ORTHOTROPIC
 
 N_BOARDS, N_TERMS = 120, 24
 NOISE = 0.5
@@ -28,7 +29,11 @@ def explanation(rng, members, probability):
 def board(rng):
     """Two explanations and two readings, the second effect of a size that is drawn."""
     share = rng.uniform(0.2, 0.8)
-    beliefs = Beliefs(SimpleNamespace(), (explanation(rng, (), share), explanation(rng, ("made",), 1.0 - share)), 0)
+    beliefs = Beliefs(
+        SimpleNamespace(symmetry=ORTHOTROPIC),
+        (explanation(rng, (), share), explanation(rng, ("made",), 1.0 - share)),
+        0,
+    )
     size = rng.uniform(0.5, 4.0) * np.abs(rng.standard_normal(N_TERMS))
     shift = (np.zeros((N_TERMS, 2)), np.outer(size, rng.standard_normal(2)))
     slopes = tuple(np.tile(0.2 * rng.standard_normal((2, 4)), (N_TERMS, 1, 1)) for _ in range(2))

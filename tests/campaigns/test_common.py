@@ -11,7 +11,7 @@ from bayesplate.campaigns.claim import SharedClaim
 from bayesplate.campaigns.common import CLEAR, _pooled, clear_of_zero, common_residuals
 from bayesplate.campaigns.diagnosis import next_step, pooled_rms
 from bayesplate.campaigns.search import Explanation
-from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.material import ORTHOTROPIC, RIGIDITIES
 from bayesplate.plate.setup import Setup
 
 N_MODES, N_CAMPAIGNS = 12, 400
@@ -111,7 +111,7 @@ def read(edges, labels, first=(0, 0), name="setup"):
     setup = Setup.from_frequencies(dict.fromkeys(labels, 100.0), edges=edges, first_label=first, name=name)
     rows = tuple(SimpleNamespace(setup=name, label=label, residual_cents=10.0) for label in labels)
     summary = SimpleNamespace(modes=rows, noise={name: SimpleNamespace(q50=0.003)})
-    return summary, SimpleNamespace(setup=lambda _: setup)
+    return summary, SimpleNamespace(setup=lambda _: setup, symmetry=ORTHOTROPIC)
 
 
 def pooled_of(**boards):

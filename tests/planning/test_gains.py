@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings, expected_gain, probabilities_after, together
+from bayesplate.plate.material import ORTHOTROPIC
 
 SIGMA = 0.3
 
@@ -24,7 +27,7 @@ def explanation(mean=0.0, probability=1.0, variance=(4.0, 1.0, 0.25), n_terms=1,
 
 
 def beliefs(*explanations):
-    return Beliefs(None, explanations, 0)
+    return Beliefs(SimpleNamespace(symmetry=ORTHOTROPIC), explanations, 0)
 
 
 def reading(of, row, variance=SIGMA**2, shift=0.0):

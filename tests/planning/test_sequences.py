@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings, expected_gain
 from bayesplate.planning.proposals import Proposal, sequences
+from bayesplate.plate.material import ORTHOTROPIC
 
 NOW = Explanation(
     members=(), words="made", probability=1.0, mean=np.zeros((1, 3)), covariance=np.eye(3)[None],
     noise=np.full((1, 1), 0.1), log_moduli=np.zeros((1, 3)), to_moduli=np.eye(3)[None],
     cells=np.zeros(1, dtype=np.intp),
 )  # fmt: skip
-BELIEFS = Beliefs(None, (NOW,), 0)
+BELIEFS = Beliefs(SimpleNamespace(symmetry=ORTHOTROPIC), (NOW,), 0)
 
 
 def proposal(what, constant, variance):

@@ -24,7 +24,7 @@ CONTRACT = {
          "noise", "inputs", "derived", "joint", "least_squares", "weighted_least_squares", "percentile", "linear_means",
          "exact_means", "modes", "peaks", "spectra", "error", "sampler", "certificate", "identifiability",
          "warnings", "doubts", "request", "carrying_modes"],
-    "model": ["theory", "law", "effects", "robust", "prior"],
+    "model": ["theory", "law", "effects", "robust", "prior", "isotropic"],
     "elastic": ELASTIC, "elastic/E_x": SPREAD,
     "rigidity": RIGIDITY, "rigidity/D_x": SPREAD,
     "effects/bench/attached_mass/mass": SPREAD, "noise/bench": SPREAD, "inputs/thickness": SPREAD,

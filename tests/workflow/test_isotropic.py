@@ -229,6 +229,8 @@ def test_a_free_poisson_ratio_takes_the_shear_modulus_along():
     stated, free = (bayesplate.Problem.from_card(sheet(hz), effects=each).posed for each in ([], ["poisson_ratio"]))
     values = free.parameters.values_at(free.centre)
 
+    prior = free.board.inputs["poisson_xy"]
+    assert (prior.mean, prior.upper) == (pytest.approx(0.3, abs=0.01), 0.5)  # of solids alike in all directions
     assert rms(cents(stated.estimate.residuals)) > 10.0
     assert float(values["poisson_xy"]) == pytest.approx(0.25, abs=0.005)
     assert float(values["D_s"] / values["D_x"]) == pytest.approx(2.0 * (1.0 - float(values["poisson_xy"])), rel=1e-12)

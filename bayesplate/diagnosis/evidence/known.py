@@ -1,8 +1,10 @@
-"""What physics knows and nobody needs to search: shear, air, a stated sensor; computed, and the error they lead to.
+"""What physics knows and nobody needs to search: shear, air, what the card states; computed, and the error it leads to.
 
-The sizes of a computed effect are the medians of their priors. Sizes that the board declares without stating them
-stand where its own fit has them, all other inputs at their nominal values, as in `bayesplate.estimates.least_squares`.
-Nothing is fitted but the constants, so that an error may rise as well as fall.
+Known effects are computed in every combination of up to three, for two of them may lower an error that each of them
+alone raises. Each says itself whether it is known (`Effect.is_known`). Its sizes are what the card states, or the
+medians of their priors. Sizes of other effects that the board declares without stating them stand where its own fit has
+them, all other inputs at their nominal values, as in `bayesplate.estimates.least_squares`. Nothing is fitted but the
+constants, so that an error may rise as well as fall.
 """
 
 from __future__ import annotations
@@ -14,13 +16,21 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.diagnosis.evidence.combinations import (
+    acting_at_known_size,
+    every_combination,
+    in_order,
+    is_stated_in_full,
+    known_effects,
+    with_combination,
+)
 from bayesplate.diagnosis.evidence.peaks import likely_labels
 from bayesplate.diagnosis.shifts.baseline import baseline_of, symmetry_of
 from bayesplate.diagnosis.shifts.laws import FormLaw
-from bayesplate.effects import EFFECTS, effects_of
+from bayesplate.effects import effects_of
 from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.leave_one_out import Errors, prediction_errors
-from bayesplate.estimates.refit import normal_misfit, refit
+from bayesplate.estimates.refit import normal_misfit, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
@@ -37,12 +47,7 @@ Floats = NDArray[np.float64]
 Models = Sequence[SetupModel]
 Rows = NDArray[np.intp]
 
-COMPUTED = ("transverse_shear", "fluid_loading")
-"""Effects of every board whose sizes are known: from its own size, and from what is published."""
-STATED = ("attached_mass", "fluid_loading")
-"""Effects that a card may state in full, so that they are declared."""
-
-_MOST_LABELLINGS = 4
+_MOST_LABELLINGS, _MOST_PLACES = 4, 4
 _NEAR = 0.1
 """Change of ln D up to which a law holds that was made before it: half a side of the smallest box it is trained in."""
 
@@ -53,29 +58,35 @@ class KnownFit:
 
     Attributes
     ----------
+    combination : tuple of str
+        All known effects that it has.
     effects : tuple of str
-        Computed beyond those that the board declares.
+        Those beyond what the board declares.
     without : tuple of str
-        Declared ones that are left out.
+        Known ones that the board declares and that are left out.
     log_rigidities : (n_constants,) array
         ln of the free rigidities (N m).
     moduli : (3,) array, Pa
         E_x, E_y, G_xy.
     errors : Errors
-        Of ln f, in sample and left out; not numbers for readings that are no mode.
+        Of ln f of every reading, in sample and left out; not a number where the reading is no mode.
+    slopes : (n_readings, n_constants) array
+        d ln f by ln of the free rigidities there.
     """
 
+    combination: tuple[str, ...]
     effects: tuple[str, ...]
     without: tuple[str, ...]
     log_rigidities: Floats
     moduli: Floats
     errors: Errors
+    slopes: Floats
 
 
 def known_fits(
     problem: PosedProblem, laws: Mapping[str, FormLaw], tell: Callable[[float], None] | None = None
 ) -> tuple[KnownFit, ...]:
-    """The board as it stands; with each known effect that it lacks, with all of them; without each stated one.
+    """The board as it stands, and with its known effects in every combination of up to three, fewer ones first.
 
     Parameters
     ----------
@@ -88,60 +99,56 @@ def known_fits(
     Returns
     -------
     tuple of KnownFit
-        The board as it stands first.
+        The board as it stands first. Of what the card states all together is among them, however much it is.
     """
-    known, own = computable(problem.board), stated(problem.board)
-    fits = [partial(known_fit, problem, solved=problem.posterior.models)]
-    fits += [partial(known_fit, problem, (name,), solved=laws[name].models if name in laws else ()) for name in known]
-    fits += [partial(known_fit, problem, without=(name,)) for name in own]
-    n_fits = len(fits) + (len(known) > 1)
+    board = problem.board
+    own = set(known_effects(board)) & set(board.effects)
+    is_full = is_stated_in_full(board, own)  # then the board as it stands is one of the combinations
+    sets = [set(one) for one in every_combination(board) if set(one) != own or not is_full]
+    near = [one for one in sets if len(one ^ own) == 1]
+    far = [one for one in sets if len(one ^ own) != 1]
+    n_fits = 1 + len(sets)
 
     def reached(n_done: float) -> None:
         if tell is not None:
             tell(n_done / n_fits)
 
-    found = in_threads(lambda fit: fit(), fits, lambda share: reached(share * len(fits)))
-    if len(known) > 1:
-        first, *each = (one.log_rigidities for one in found[: 1 + len(known)])
-        together = known_fit(problem, known, start=first + sum(one - first for one in each))
-        found.insert(1 + len(known), together)
-        reached(n_fits)
-    return tuple(found)
+    def fit(combination: set[str]) -> KnownFit:
+        solved = [laws[name] for name in combination - own if is_full and combination > own and name in laws]
+        models = [one.models for one in solved if _is_as_known(board, one)]
+        return known_fit(problem, in_order(combination), solved=models[0] if models else ())
 
+    first = [partial(known_fit, problem, solved=problem.posterior.models), *(partial(fit, one) for one in near)]
+    stands, *single = in_threads(lambda one: one(), first, lambda share: reached(share * len(first)))
+    shifts = {
+        next(iter(one ^ own)): found.log_rigidities - stands.log_rigidities
+        for one, found in zip(near, single, strict=True)
+    }
 
-def computable(board: Board) -> tuple[str, ...]:
-    """Effects of known size that are not declared and can act in a setup of the board."""
-    return tuple(
-        name
-        for name in COMPUTED
-        if name not in board.effects and not all(EFFECTS[name].refusal(board, setup) for setup in board.setups)
-    )
+    def fit_from_shifts(combination: set[str]) -> KnownFit:
+        start = stands.log_rigidities + sum((shifts[name] for name in combination ^ own if name in shifts), np.zeros(3))
+        return known_fit(problem, in_order(combination), start=start)
 
-
-def stated(board: Board) -> tuple[str, ...]:
-    """Effects that are declared because the card states them, with no size left to a prior of the library."""
-    return tuple(
-        name
-        for name in STATED
-        if name in board.effects and not any(one.source for one in board.uncertain if one.effect == name)
-    )
+    several = in_threads(fit_from_shifts, far, lambda share: reached(len(first) + share * len(far))) if far else []
+    found = [*single, *several]
+    return (stands, *sorted(found, key=lambda one: sets.index(set(one.combination))))
 
 
 def known_fit(
     problem: PosedProblem,
-    effects: Sequence[str] = (),
-    without: Sequence[str] = (),
+    combination: Sequence[str] | None = None,
     *,
     start: Floats | None = None,
     solved: Models = (),
 ) -> KnownFit:
-    """Fit the constants of a board with some effects at their known sizes, and without some of its own.
+    """Fit the constants of a board with some of its known effects and without the others.
 
     Parameters
     ----------
     problem : PosedProblem
         The board as it stands.
-    effects, without : sequence of str
+    combination : sequence of str, optional
+        By default the board as it stands, with sizes that it leaves open where its own fit has them.
     start : (n_constants,) array, optional
         ln of the free rigidities (N m) where the fit begins; by default the estimate of the board as it stands.
     solved : sequence of SetupModel
@@ -151,7 +158,9 @@ def known_fit(
     -------
     KnownFit
     """
-    board = with_known_sizes(problem.board.without(without), effects)
+    own = [name for name in known_effects(problem.board) if name in problem.board.effects]
+    board = problem.board if combination is None else with_combination(problem.board, combination)
+    combination = own if combination is None else combination
     inputs, target, scales = inputs_of(problem, board), log_measured(board), reading_scales(board)
     start = _estimated(problem) if start is None else start
     models = solved or _solved(problem, board, start)
@@ -166,16 +175,65 @@ def known_fit(
         if np.array_equal(rows, before):
             break
     kept = np.flatnonzero(before >= 0)
-    target, scales = target[kept], scales[kept]
-    labelled = before[kept]
     modes = [np.flatnonzero(np.isin(kept, mode)).tolist() for mode in same_modes(problem.board)]
     modes = [mode for mode in modes if mode]
-    misfit = normal_misfit(target, scales)
-    errors = prediction_errors(law.of(labelled), target, misfit, fitted[None, :], modes=modes).at(kept, before.size)
+    of_kept = law.of(before[kept])
+    misfit = normal_misfit(target[kept], scales[kept])
+    errors = prediction_errors(of_kept, target[kept], misfit, fitted[None, :], modes=modes)
     found = _values(board, fitted, inputs)
     D_x, D_y, D_s = (found[name] for name in RIGIDITIES)
-    constants = np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
-    return KnownFit(tuple(effects), tuple(without), fitted, constants, errors)
+    return KnownFit(
+        combination=tuple(combination),
+        effects=tuple(name for name in combination if name not in own),
+        without=tuple(name for name in own if name not in combination),
+        log_rigidities=fitted,
+        moduli=np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"])),
+        errors=errors.at(kept, target.size),
+        slopes=_of_all(sensitivities(of_kept, fitted), kept, target.size),
+    )
+
+
+def predicted_errors(problem: PosedProblem, combination: Sequence[str]) -> tuple[Floats, Floats]:
+    """Errors of all readings by the constants that the first setup alone tells, and their slopes.
+
+    Parameters
+    ----------
+    problem : PosedProblem
+    combination : sequence of str
+        The known effects of the board.
+
+    Returns
+    -------
+    errors : (n_readings,) array
+        ln measured - ln predicted; those of the first setup are of the fit.
+    slopes : (n_readings, n_constants) array
+    """
+    board = with_combination(problem.board, combination)
+    inputs, target, scales = inputs_of(problem, board), log_measured(board), reading_scales(board)
+    first = np.arange(len(board.setups[0].readings))
+    fitted = _estimated(problem)
+    for _ in range(_MOST_PLACES):
+        start, models = fitted, _solved(problem, board, fitted)
+        every = _law(board, models, inputs)
+        law, rows = every.of(_labelled(models)), _labelled(models)[first]
+        fitted = refit(every.of(rows), target[first], scales[first], start)
+        if np.abs(fitted - start).max() <= _NEAR:
+            break
+    return target - law(fitted[None, :])[0], sensitivities(law, fitted)
+
+
+def _is_as_known(board: Board, law: FormLaw) -> bool:
+    """Whether the form that a law was made for is the one that is computed."""
+    name = law.form.effect
+    tried = (one for setup in board.setups for one in effects_of(law.form.board, setup) if one.name == name)
+    return list(tried) == acting_at_known_size(board, name)
+
+
+def _of_all(values: Floats, kept: Rows, n_readings: int) -> Floats:
+    """Values of the readings that are a mode among those of all, not numbers elsewhere."""
+    found = np.full((n_readings, *values.shape[1:]), np.nan)
+    found[kept] = values
+    return found
 
 
 def _labelled(models: Models) -> Rows:
@@ -204,23 +262,14 @@ def _relabelled(problem: PosedProblem, predicted: Floats, rows: Rows) -> Rows:
     return likely_labels(baseline_of(problem), predicted, noise[None, :], rows)
 
 
-def with_known_sizes(board: Board, effects: Sequence[str]) -> Board:
-    """A board with further effects, every size of theirs fixed at the median of its prior."""
-    added = replace(board, effects=(*board.effects, *effects))
-    acting = (one for setup in board.setups for one in effects_of(added, setup) if one.name in effects)
-    sizes = (size for one in acting for size in one.parameters())
-    return added.with_parameters(replace(size, prior=Quantity.exact(size.prior.median)) for size in sizes)
-
-
 def inputs_of(problem: PosedProblem, board: Board) -> Values:
-    """Nominal inputs of a board, but for sizes that the problem's board declares and leaves to a prior of the library.
+    """Nominal inputs of a board, but for sizes that it declares and leaves to a prior of the library.
 
-    The readings tell those: they stand at the centre of the posterior.
+    The readings tell those: they stand at the centre of the posterior of the problem's board.
     """
     there = problem.parameters.values(problem.centre[None, :])
-    learnt = (one.name for one in problem.board.uncertain if one.is_of_effect and one.source and not one.is_component)
-    nominal = board.nominal()
-    return {**nominal, **{name: np.asarray(there[name][0]) for name in learnt if name in nominal}}
+    learnt = (one.name for one in board.uncertain if one.is_of_effect and one.source and not one.is_component)
+    return {**board.nominal(), **{name: np.asarray(there[name][0]) for name in learnt}}
 
 
 def _law(board: Board, models: Models, inputs: Values) -> Predictor:

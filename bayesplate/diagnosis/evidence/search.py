@@ -88,7 +88,7 @@ class Ground:
 
     @property
     def n_directions(self) -> int:
-        """Directions of the readings that the three constants cannot reach, and that are left to judge by."""
+        """Directions of the readings that the constants cannot reach, and that are left to judge by."""
         return len(self.whole.blind)
 
     def visibility(self, name: str) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bayesplate.diagnosis.decision.claim import Condition
+from bayesplate.diagnosis.decision.stated import StatedClaim
 from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry
 from bayesplate.diagnosis.wording.known import KnownModel
@@ -179,8 +180,10 @@ class Diagnosis:
     declared : tuple of str
         Effects that were part of the model from the beginning.
     known : tuple of KnownModel
-        What physics knows of the others, computed before the search and not fitted: the board as it stands first, then
-        with transverse shear, with fluid loading, with both, and without each effect that the card itself states.
+        What physics knows, computed before the search and not fitted: the board as it stands first, then with its
+        known effects in every combination of up to three, whether the card declares them or not.
+    stated_claims : tuple of StatedClaim
+        Whether it may be said that what the card states reduces the error; empty where it states no known effect.
     probability_of_none : float
     probability_of_none_with_halved_priors, probability_of_none_with_doubled_priors : float
     p_value : PValues
@@ -226,6 +229,7 @@ class Diagnosis:
     sentences: tuple[str, ...]
     declared: tuple[str, ...]
     known: tuple[KnownModel, ...]
+    stated_claims: tuple[StatedClaim, ...]
     probability_of_none: float
     probability_of_none_with_halved_priors: float
     probability_of_none_with_doubled_priors: float

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.decision.claim import Claim
 from bayesplate.diagnosis.decision.constants import draw_constants
+from bayesplate.diagnosis.decision.stated import StatedClaim
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives_words, answer_words, answers
 from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
@@ -75,6 +76,7 @@ class Case:
     recommendation : str
     known : sequence of KnownFit
         The board as it stands first.
+    stated_claims : sequence of StatedClaim
     finalists : sequence of (Answer, Summary)
         Explanations that were fitted again, best first, or the one that comes nearest where none is enough; each with
         the summary of its fit.
@@ -98,6 +100,7 @@ class Case:
     claim: Claim
     recommendation: str
     known: Sequence[KnownFit] = ()
+    stated_claims: Sequence[StatedClaim] = ()
     finalists: Sequence[tuple[Answer, Summary]] = ()
     drawn: Mapping[int, Draws] = field(default_factory=dict)
     has_slip: bool = False
@@ -144,6 +147,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
         sentences=_sentences(case, taken),
         declared=found.ground.baseline.board.effects,
         known=known_models(case.known, case.carried),
+        stated_claims=tuple(case.stated_claims),
         probability_of_none=found.none,
         probability_of_none_with_halved_priors=halved[""],
         probability_of_none_with_doubled_priors=doubled[""],

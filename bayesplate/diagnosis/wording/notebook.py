@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import every_table
-from bayesplate.diagnosis.wording.told import verdict_sentences, warnings
+from bayesplate.diagnosis.wording.told import known_sentences, verdict_sentences, warnings
 from bayesplate.diagnosis.wording.words import VERDICTS
 from bayesplate.results import notebook
 
@@ -13,7 +12,6 @@ from bayesplate.results import notebook
 def html(diagnosis: Diagnosis) -> str:
     """Heading, sentences, tables, and what to measure next; every text escaped."""
     advice = [f"What to measure next: {diagnosis.recommendation}"] if diagnosis.recommendation else []
-    known = [sentence] if (sentence := known_sentence(diagnosis.known)) else []
-    sentences = [*verdict_sentences(diagnosis), *known, *warnings(diagnosis), *advice]
+    sentences = [*verdict_sentences(diagnosis), *known_sentences(diagnosis), *warnings(diagnosis), *advice]
     heading = f"{diagnosis.name}: {VERDICTS[diagnosis.verdict].heading}"
     return notebook.html(heading, sentences, every_table(diagnosis))

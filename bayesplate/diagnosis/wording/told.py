@@ -5,6 +5,8 @@ from __future__ import annotations
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.wording.known import known_sentence
+from bayesplate.diagnosis.wording.stated import stated_sentences
 from bayesplate.diagnosis.wording.words import claim_sentence, meaning
 from bayesplate.effects.words import effect_names
 from bayesplate.estimates.leave_one_out import carrying_sentence
@@ -49,6 +51,12 @@ def verdict_sentences(diagnosis: Diagnosis) -> list[str]:
         claim_sentence(diagnosis),
         carrying_words(diagnosis),
     ]
+    return [sentence for sentence in told if sentence]
+
+
+def known_sentences(diagnosis: Diagnosis) -> list[str]:
+    """What known effects do to the error, and what may be claimed of those that the card states."""
+    told = (known_sentence(diagnosis.known), *stated_sentences(diagnosis.stated_claims))
     return [sentence for sentence in told if sentence]
 
 

@@ -12,7 +12,7 @@ from trial.shared import baseline_of_card
 from bayesplate.diagnosis.evidence.joint import with_joint_pairs
 from bayesplate.diagnosis.evidence.search import prepare_search, search
 
-PAIR = {"air_loading", "membrane_tension"}
+PAIR = {"fluid_loading", "membrane_tension"}
 TRIED = (*PAIR, "clamp_rotation", "density_gradient")
 
 
@@ -27,7 +27,7 @@ def test_a_pair_is_found_of_which_neither_alone_lowers_the_misfit(ground):
     found = search(ground)
     base = ground.baseline
     left = float(np.sum(base.whitened(base.residual) ** 2))
-    air = ground.candidates["air_loading"]
+    air = ground.candidates["fluid_loading"]
     assert np.sum(base.whitened(base.residual - air.visible) ** 2) > 2.0 * left  # the error rises with what is there
     evidence = {one.members: value for one, value in zip(ground.hypotheses, found.log_evidence, strict=True)}
     assert all(evidence[(name,)] < evidence[()] for name in PAIR)

@@ -10,8 +10,14 @@ from generator.boards import plant
 from generator.card import SHEAR_MEANS
 from scipy.stats import chi2
 
-from bayesplate.diagnosis.evidence import known
-from bayesplate.diagnosis.evidence.known import computable, known_fit, known_fits, stated, with_known_sizes
+from bayesplate.diagnosis.evidence import combinations, known
+from bayesplate.diagnosis.evidence.combinations import (
+    every_combination,
+    known_effects,
+    stated_effects,
+    with_combination,
+)
+from bayesplate.diagnosis.evidence.known import known_fit, known_fits
 from bayesplate.diagnosis.evidence.search import prepare_search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.known import known_models, known_sentence
@@ -94,7 +100,7 @@ def test_a_size_is_the_median_of_its_prior_where_the_card_states_none(tmp_path):
 
 
 def test_the_left_out_errors_are_those_of_full_refits(fiemme, fits):
-    board = with_known_sizes(fiemme.board, (AIR,))
+    board = with_combination(fiemme.board, (AIR,))
     (setup,) = board.setups
     errors, some = [], [0, 3, 5]
     for i in some:
@@ -150,7 +156,7 @@ def test_nothing_is_fitted_but_the_constants(tmp_path, monkeypatch):
 def test_sizes_are_fixed_at_their_medians_and_all_else_is_left(fiemme):
     prior = Quantity.from_median(3e7, 3.0)
     broad = replace(fiemme.board, shear_yz=prior)
-    sized = with_known_sizes(broad, (SHEAR, AIR))
+    sized = with_combination(broad, (SHEAR, AIR))
     added = {one.name: one.prior for one in sized.parameters if one.effect in (SHEAR, AIR)}
     assert added == {
         f"{SHEAR}.G_xz": Quantity.exact(0.62e9),
@@ -163,10 +169,22 @@ def test_sizes_are_fixed_at_their_medians_and_all_else_is_left(fiemme):
     assert {one.owner for one in sized.parameters if one.effect == SHEAR} == {BOARD}
 
 
-def test_only_what_is_not_declared_is_computed(fiemme):
-    assert computable(fiemme.board) == (SHEAR, AIR)
-    assert computable(replace(fiemme.board, effects=(SHEAR,))) == (AIR,)
-    assert computable(replace(fiemme.board, effects=(AIR, SHEAR))) == ()
+@pytest.mark.parametrize("declared", [(), (SHEAR,), (AIR, SHEAR)])
+def test_every_combination_is_computed_whatever_is_declared(fiemme, declared):
+    board = replace(fiemme.board, effects=declared)
+    assert known_effects(board) == (SHEAR, AIR)
+    assert every_combination(board) == [(), (SHEAR,), (AIR,), (SHEAR, AIR)]
+
+
+def test_four_known_effects_are_combined_by_up_to_three_and_all_where_the_card_states_them(fiemme, monkeypatch):
+    names = (MASS, "exciter", SHEAR, AIR)
+    monkeypatch.setattr(combinations, "known_effects", lambda _: names)
+    monkeypatch.setattr(combinations, "stated_effects", lambda _: names[:2])
+    found = every_combination(fiemme.board)
+    assert [len(one) for one in found] == [0] + 4 * [1] + 6 * [2] + 4 * [3]
+    assert len(set(found)) == len(found)
+    monkeypatch.setattr(combinations, "stated_effects", lambda _: names)
+    assert every_combination(fiemme.board) == [*found, names]
 
 
 def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path):
@@ -174,25 +192,53 @@ def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path):
     assert problem.board.effects == (MASS,)
     told: list[float] = []
     found = known_fits(problem, {}, told.append)
-    assert told == pytest.approx(np.arange(1.0, 6.0) / 5.0)
-    assert [(one.effects, one.without) for one in found][-2:] == [((SHEAR, AIR), ()), ((), (MASS,))]
-    assert are_alike(found[-1], *by_hand(FIEMME))
-    assert abs(found[0].moduli / found[-1].moduli - 1.0).max() > 0.005
+    assert told == pytest.approx(np.arange(1.0, 9.0) / 8.0)
+    assert [one.combination for one in found] == [
+        (MASS,), (), (SHEAR,), (AIR,), (SHEAR, AIR), (SHEAR, MASS), (AIR, MASS), (SHEAR, AIR, MASS),
+    ]  # fmt: skip
+    assert {(one.effects, one.without) for one in found[1:3]} == {((), (MASS,)), ((SHEAR,), (MASS,))}
+    assert are_alike(found[1], *by_hand(FIEMME))
+    assert abs(found[0].moduli / found[1].moduli - 1.0).max() > 0.005
+
+
+def test_what_a_card_states_and_does_not_declare_is_computed_as_if_it_did(tmp_path):
+    """The stated sensor of a card whose effects are taken from it, and the same card with the sensor declared."""
+    card = card_of(tmp_path, after=ATTACHED.format(mass=5))
+    declared, bare = (Problem.from_card(card, effects=effects).posed for effects in (None, ()))
+    assert (declared.board.effects, bare.board.effects) == ((MASS,), ())
+    wanted, found = known_fit(declared), known_fit(bare, (MASS,))
+    assert (found.effects, found.without) == ((MASS,), ())
+    assert rms(found.errors.in_sample) == pytest.approx(rms(wanted.errors.in_sample), abs=WITHIN)
+    assert found.moduli == pytest.approx(wanted.moduli, rel=5e-4)
+
+
+def test_a_declared_size_of_the_library_is_fixed_in_combinations_and_learnt_as_the_board_stands(tmp_path):
+    card = card_of(tmp_path, without=SHEAR_LINES)
+    problem = Problem.from_card(card, effects=(SHEAR,)).posed
+    bare = Problem.from_card(card).posed
+    found = {one.combination: one for one in known_fits(problem, {})[1:]}
+    assert set(found) == {(), (SHEAR,), (AIR,), (SHEAR, AIR)}
+    wanted = known_fit(bare, (SHEAR,))
+    assert rms(found[SHEAR,].errors.in_sample) == pytest.approx(rms(wanted.errors.in_sample), abs=WITHIN)
+    assert abs(rms(known_fit(problem).errors.in_sample) - rms(wanted.errors.in_sample)) > 10 * WITHIN
 
 
 @pytest.mark.parametrize(
     ("after", "effects", "expected"),
     [
         (ATTACHED.format(mass="{ mean = 0.6, sd = 0.1 }"), None, (MASS,)),
-        (ATTACHED.format(mass=0.6), (), ()),
-        (ATTACHED.format(mass=0.6) + UNWEIGHED, None, ()),
+        (ATTACHED.format(mass=0.6), (), (MASS,)),
         (UNWEIGHED, (MASS,), ()),
+        (UNWEIGHED, (), ()),
         ('\n[setup.fluid]\nbaffle = "none"\n', None, (AIR,)),
-        ("\n[setup.fluid]\ndensity_kg_m3 = 1.1\n", None, ()),
+        ('\n[setup.fluid]\nbaffle = "none"\n', (SHEAR,), (SHEAR, AIR)),
+        ("", (), ()),
+        ("", ("grain_angle",), ()),
     ],
 )
-def test_what_a_card_states_in_full_and_nothing_else_counts_as_stated(tmp_path, after, effects, expected):
-    assert stated(Problem.from_card(card_of(tmp_path, after=after), effects=effects).prepared.board) == expected
+def test_what_a_card_states_or_declares_of_known_effects_counts_as_stated(tmp_path, after, effects, expected):
+    board = Problem.from_card(card_of(tmp_path, after=after), effects=effects).prepared.board
+    assert stated_effects(board) == expected
 
 
 def planted(tmp_path, design, effects, noise, seed=1, **fixed):
@@ -266,7 +312,7 @@ MOVED = np.array([0.06, -0.02, 0.05])
 def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
     """On this board air brings two modes so close that their shapes would exchange names."""
     problem = Problem.from_card("spruce-free-3L").posed
-    board = with_known_sizes(problem.board, (AIR,))
+    board = with_combination(problem.board, (AIR,))
     (solved,) = known._solved(problem, board, np.log(problem.estimate.rigidities) + MOVED)
     (before,) = problem.posterior.models
     assert [(one.parity, one.rank) for one in solved.places] == [(one.parity, one.rank) for one in before.places]

@@ -17,7 +17,6 @@ from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import Amplitude
 from bayesplate.diagnosis.wording.diagnosis import Errors, diagnosis_json
 from bayesplate.diagnosis.wording.exports import before_after_csv, before_after_tex, write_before_after
-from bayesplate.diagnosis.wording.known import known_sentence
 from bayesplate.diagnosis.wording.tables import (
     answers_table,
     averaged_table,
@@ -29,6 +28,7 @@ from bayesplate.diagnosis.wording.tables import (
 from bayesplate.diagnosis.wording.told import (
     alike_sentence,
     headline_sentence,
+    known_sentences,
     remarks,
     shown_model,
     verdict_sentence,
@@ -40,7 +40,7 @@ from bayesplate.workflow.shown import show_diagnosis
 
 KEYS = [
     "format", "name", "seed", "card_sha256", "verdict", "claim", "conditions", "effects", "refitted", "reason",
-    "sentences", "declared", "known", "probability_of_none", "probability_of_none_with_halved_priors",
+    "sentences", "declared", "known", "stated_claims", "probability_of_none", "probability_of_none_with_halved_priors",
     "probability_of_none_with_doubled_priors", "p_value", "before", "after", "gain_null_percentile", "null_control",
     "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates", "recommendation", "notes",
     "named_in_part", "carrying_modes",
@@ -69,8 +69,15 @@ def test_the_json_has_the_names_and_the_order_of_the_contract():
     assert [list(one) for one in content["candidates"]] == [EFFECT, EFFECT, EFFECT, EXCHANGED]
     assert list(content["candidates"][0]["amplitude"]) == ["parameter", "form", "q05", "q50", "q95", "unit"]
     assert [list(one) for one in content["known"]] == 5 * [
-        ["effects", "without", "in_sample_rms_cents", "leave_one_out_rms_cents", "change_percent"]
-    ]
+        [
+            "effects", "without", "in_sample_rms_cents", "leave_one_out_rms_cents", "change_percent", "combination",
+            "n_left_out", "n_readings",
+        ]
+    ]  # fmt: skip
+    assert [list(one) for one in content["stated_claims"]] == [[
+        "effects", "predicts", "before_rms_cents", "after_rms_cents", "log_score_gain", "standard_error", "n_modes",
+        "holds",
+    ]]  # fmt: skip
     assert list(content["known"][0]["change_percent"]) == ["E_x", "E_y", "G_xy"]
     assert list(content["p_value"]) == ["before", "after"]
     assert list(content["null_control"]) == [
@@ -310,7 +317,7 @@ def test_the_terminal_shows_only_tables_that_there_are():
         "Candidates at their usual size",
     ]  # fmt: skip
     assert [table.title for table in bare.tables[1:]] == ["What may be the case", "Error: a-board"]
-    assert shown.remarks == (known_sentence(NAMED.known), *NAMED.sentences, NEXT)
+    assert shown.remarks == (*known_sentences(NAMED), *NAMED.sentences, NEXT)
     assert bare.remarks == (NEXT,)
 
 
@@ -370,7 +377,7 @@ def test_it_shows_itself():
     assert repr(DIAGNOSES["none needed"]) == "<Diagnosis of a-board, none needed>"
     page = _Tags(NAMED._repr_html_())
     assert page.tags.count("table") == 8
-    assert known_sentence(NAMED.known) in page.text
+    assert all(sentence in page.text for sentence in known_sentences(NAMED))
     for words in ("An effect was found", "point to membrane tension", "46.5", f"{AFTER.leave_one_out_rms_cents}", NEXT):
         assert words in page.text
 

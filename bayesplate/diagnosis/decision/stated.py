@@ -1,0 +1,162 @@
+"""The claim without selection: what the card states is not chosen by the readings, so that two conditions are enough.
+
+Known effects that the card states or declares are computed at their stated sizes, and nothing is searched for: neither
+chance selection nor priors of sizes can make an error fall. The same holds of a second setup that is predicted by the
+constants of the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.decision.claim import STANDARD_ERRORS, score_gain
+from bayesplate.diagnosis.evidence.combinations import acting_at_known_size, stated_effects
+from bayesplate.diagnosis.evidence.known import KnownFit, predicted_errors
+from bayesplate.diagnosis.evidence.scores import scores_given
+from bayesplate.frequencies.laws import cents
+from bayesplate.plate.board import Board
+from bayesplate.plate.sessions import same_modes
+from bayesplate.posterior.inference import PosedProblem
+from bayesplate.results.contract import rms
+
+Floats = NDArray[np.float64]
+
+LEAST_FALL = 0.2
+"""Share of the error by which it has to fall."""
+_FEWEST = 3
+"""Modes without which differences have no scatter worth the name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatedClaim:
+    """Whether it may be said that effects which the card states reduce the error.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        At their stated sizes, or the medians of their priors; nothing but the constants is fitted.
+    predicts : str
+        The setup that is predicted by constants of the first setup alone; empty where each mode is predicted by the
+        others.
+    before_rms_cents, after_rms_cents : float
+        Error of the predicted readings without these effects and with them.
+    log_score_gain, standard_error : float
+        Sum over the modes of what the effects add to the log density of each prediction, and its standard error from
+        their scatter.
+    n_modes : int
+        Which have a prediction both without and with the effects.
+    holds : bool
+        Whether the error falls by a fifth at least and the score rises by more than two standard errors.
+    """
+
+    effects: tuple[str, ...]
+    predicts: str
+    before_rms_cents: float
+    after_rms_cents: float
+    log_score_gain: float
+    standard_error: float
+    n_modes: int
+    holds: bool
+
+
+def judge_stated(
+    effects: Sequence[str], predicts: str, before: Floats, after: Floats, gains: Floats
+) -> StatedClaim | None:
+    """Judge effects that the card states.
+
+    Parameters
+    ----------
+    effects : sequence of str
+    predicts : str
+    before, after : (n_readings,) arrays
+        ln f, errors of prediction.
+    gains : (n_modes,) array
+        What the effects add to the log density of each mode.
+
+    Returns
+    -------
+    StatedClaim or None
+        None of too few modes.
+    """
+    if gains.size < _FEWEST:
+        return None
+    old, new = (rms(cents(errors)) or 0.0 for errors in (before, after))
+    gain, error = score_gain(gains)
+    falls, rises = new <= (1.0 - LEAST_FALL) * old, gain > STANDARD_ERRORS * error
+    return StatedClaim(
+        effects=tuple(effects),
+        predicts=predicts,
+        before_rms_cents=old,
+        after_rms_cents=new,
+        log_score_gain=gain,
+        standard_error=error,
+        n_modes=int(gains.size),
+        holds=falls and rises,
+    )
+
+
+def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[StatedClaim, ...]:
+    """Judge what the card states of a board: by modes left out, and by each further setup in which it is another.
+
+    Parameters
+    ----------
+    problem : PosedProblem
+    fits : sequence of KnownFit
+        Of its combinations.
+
+    Returns
+    -------
+    tuple of StatedClaim
+        Empty where the card states no known effect.
+    """
+    board = problem.board
+    effects = stated_effects(board)
+    if not effects:
+        return ()
+    without, having = (next(one for one in reversed(fits) if one.combination == wanted) for wanted in ((), effects))
+    left_out = [one.errors.left_out for one in (without, having)]
+    both = np.isfinite(np.stack(left_out)).all(axis=0)
+    both &= (without.errors.leverages.carries < 0) & (having.errors.leverages.carries < 0)
+    modes = [mode for mode in same_modes(board) if both[list(mode)].all()]
+    scores = [scores_given(board, one.errors.in_sample, one.slopes, modes) for one in (without, having)]
+    before, after = (one[both] for one in left_out)
+    claims = [judge_stated(effects, "", before, after, scores[1] - scores[0])]
+    further = [setup.name for setup in board.setups[1:] if _states_differently(board, effects, setup.name)]
+    if further:
+        claims += _of_further_setups(problem, effects, further)
+    return tuple(one for one in claims if one is not None)
+
+
+def _of_further_setups(problem: PosedProblem, effects: Sequence[str], names: Sequence[str]) -> list[StatedClaim | None]:
+    """Setups predicted by the constants of the first."""
+    board = problem.board
+    index = np.repeat(np.arange(len(board.setups)), [len(setup.readings) for setup in board.setups])
+    first = np.flatnonzero(index == 0).tolist()
+    sides = [predicted_errors(problem, one) for one in ((), effects)]
+    claims = []
+    for number, setup in enumerate(board.setups):
+        if setup.name in names:
+            own = np.flatnonzero(index == number)
+            groups = [[reading] for reading in own.tolist()]
+            scores = [scores_given(board, *side, groups, [first] * len(groups)) for side in sides]
+            claims.append(judge_stated(effects, setup.name, sides[0][0][own], sides[1][0][own], scores[1] - scores[0]))
+    return claims
+
+
+def _states_differently(board: Board, effects: Sequence[str], name: str) -> bool:
+    """Whether what the card states of known effects is another in a setup than in the first one."""
+
+    def sizes(setup: str) -> list[tuple[str, object]]:
+        return [
+            (one.key, one.prior)
+            for effect in effects
+            for acting in acting_at_known_size(board, effect)
+            if acting.owner.name == setup
+            for one in acting.parameters()
+        ]
+
+    return sizes(name) != sizes(board.setups[0].name)
