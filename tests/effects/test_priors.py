@@ -3,8 +3,9 @@
 A change of these changes what people are told, so it is made here as well, with a reason. The numbers are those of the
 literature on effects in wooden plates (shear moduli of spruce 0.5-0.75 GPa and 20-40 MPa; a clamp of k_R L / D = 30 and
 one with a lining of k_T L^3 / D = 1e4; tensions of 100-400 N/m in clamped boards; air of 1.2 kg/m^3; tapers and density
-gradients of 5 per cent end to end, gradients of E_x of 8; grain within 6 degrees; nu_xy of 0.3-0.6) and those of data
-sheets of sensors.
+gradients of 5 per cent end to end, gradients of E_x of 8; grain within 6 degrees; nu_xy of 0.3-0.6; a cup of half a per
+cent of the width, a bow of 0.4 of the length, a twist of one of the longer side) and those of data sheets of sensors and
+exciters (four exciters of 25 mm: suspensions of 2650-2810 N/m, coils of 1.5-1.7 g).
 """
 
 from __future__ import annotations
@@ -43,10 +44,28 @@ PRIORS = {
     ("thickness_profile", "taper_y"): ("1", "normal", 0.0, 0.05, ANY),
     ("density_gradient", "gradient"): ("1", "normal", 0.0, 0.05, ANY),
     ("stiffness_gradient", "gradient"): ("1", "normal", 0.0, 0.08, ANY),
+    ("warp", "cup"): ("m", "normal", 0.0, 2.06e-3, HALF),
+    ("warp", "bow"): ("m", "normal", 0.0, 2.4e-3, ANY),
+    ("warp", "twist"): ("m", "normal", 0.0, 6.0e-3, HALF),
+    ("exciter", "mass"): ("kg", "log-normal", 50e-3, log(1.6), ANY),
+    ("exciter", "coil"): ("kg", "log-normal", 1.6e-3, log(1.3), ANY),
+    ("exciter", "suspension"): ("N/m", "log-normal", 2700.0, log(1.5), ANY),
+    ("exciter", "place_x"): ("1", "normal", 0.25, 1.0, (0.0, 0.5)),
+    ("exciter", "place_y"): ("1", "normal", 0.25, 1.0, (0.0, 0.5)),
     ("grain_angle", "angle"): ("rad", "normal", 0.0, 3.0 * DEGREE, (0.0, 6.0 * DEGREE)),
     ("poisson_ratio", "nu_xy"): ("1", "normal", 0.4, 0.15, (0.0, 0.9)),
 }
-"""Unit, kind, median, standard deviation (of the logarithm if log-normal) and bounds."""
+"""Unit, kind, median, standard deviation (of the logarithm if log-normal) and bounds.
+
+The rises are those of the clamped board, 600 x 412 mm; the place of an exciter on it, where one quarter stands for all four.
+"""
+
+RISES = {
+    "cup": lambda sizes: 0.005 * sizes["length_y"].mean,
+    "bow": lambda sizes: 0.004 * sizes["length_x"].mean,
+    "twist": lambda sizes: 0.01 * max(sizes["length_x"].mean, sizes["length_y"].mean),
+}
+"""Standard deviation of a rise by the sizes of the board, m."""
 
 MASSES = {
     "accelerometer": (1.4e-3, 2.7),
@@ -60,6 +79,8 @@ FORGOTTEN_SHARE = 0.02
 """Of the board's mass: standard deviation of the half-normal prior of a thing that nobody mentioned."""
 
 BOARDS = [board_of(plate, [setup_of(plate)]) for plate in (FIEMME, FREE)]
+DRIVEN = board_of(FIEMME, [replace(setup_of(FIEMME), attached=(AttachedItem("exciter"),))])
+"""The clamped board with an exciter of which nothing is known."""
 
 
 def told(quantity: Quantity) -> tuple[str, float, float, tuple[float, float]]:
@@ -75,8 +96,8 @@ def same(quantity: Quantity, kind: str, median: float, sd: float, bounds: tuple[
 
 def acting(name: str):
     """The effect on the first of the boards on which it can act."""
-    cls = EFFECTS[name]
-    return next(cls.of(board, board.setups[0]) for board in BOARDS if not cls.refusal(board, board.setups[0]))
+    cls, boards = EFFECTS[name], (*BOARDS, DRIVEN)
+    return next(cls.of(board, board.setups[0]) for board in boards if not cls.refusal(board, board.setups[0]))
 
 
 def test_every_parameter_of_every_effect_stands_in_the_table():
@@ -120,7 +141,27 @@ def test_mass_of_a_thing_that_nobody_mentioned():
         assert same(found.prior, "normal", 0.0, sd, HALF), told(found.prior)
 
 
-@pytest.mark.parametrize("board", BOARDS, ids=["clamped", "free"])
+def test_where_an_exciter_may_be_on_a_board_whose_ends_differ():
+    """On a cantilever no half of the length stands for the other; the widths are alike."""
+    (clamped,) = DRIVEN.setups
+    cantilever = replace(clamped, ends_x=("clamped", "free"), ends_y=("free", "free"))
+    found = {one.key: one.prior for one in EFFECTS["exciter"].of(DRIVEN, cantilever).parameters()}
+
+    assert same(found["place_x"], "normal", 0.5, 2.0, (0.0, 1.0)), told(found["place_x"])
+    assert same(found["place_y"], "normal", 0.25, 1.0, (0.0, 0.5)), told(found["place_y"])
+
+
+def test_resonance_in_place_of_a_suspension():
+    stated = Quantity.from_mean(28.3, 0.5)
+    (clamped,) = DRIVEN.setups
+    setup = replace(clamped, attached=(AttachedItem("exciter", resonance=stated),))
+    found = {one.key: (one.unit, one.prior) for one in EFFECTS["exciter"].of(DRIVEN, setup).parameters()}
+
+    assert "suspension" not in found
+    assert found["resonance"] == ("Hz", stated)
+
+
+@pytest.mark.parametrize("board", [*BOARDS, DRIVEN], ids=["clamped", "free", "driven"])
 def test_a_search_keeps_prior_and_unit(board):
     """What it tries is the effect's own parameter, not one of another width or without a unit."""
     seen = set()
@@ -128,6 +169,8 @@ def test_a_search_keeps_prior_and_unit(board):
         for free in (free for form in each for free in form.free if (name, free.key) in PRIORS):
             unit, *prior = PRIORS[name, free.key]
             assert free.unit == unit
+            if name == "warp":
+                prior[2] = RISES[free.key](board.inputs)
             assert same(free.prior, *prior), (name, told(free.prior))
             seen.add(name)
 
