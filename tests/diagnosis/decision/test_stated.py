@@ -96,16 +96,16 @@ def both_fits(problem):
     return [known_fit(problem, one) for one in ((), ("attached_mass",))]
 
 
-@pytest.mark.parametrize("effects", [(), ("attached_mass",)], ids=["stated", "declared"])
-def test_a_stated_mass_that_is_there_is_claimed_and_one_that_is_not_is_not(weighed, effects):
-    problem = posed(with_item(weighed, 0.012), effects)
-    (there,) = stated_claims(problem, both_fits(problem))
-    assert there.effects == ("attached_mass",)
-    assert there.holds
-    assert there.after_rms_cents < 0.5 * there.before_rms_cents
-    problem = posed(with_item(weighed, 0.05), effects)
-    (too_heavy,) = stated_claims(problem, both_fits(problem))
-    assert not too_heavy.holds
+@pytest.mark.parametrize(
+    ("effects", "mass", "is_there"), [((), 0.012, True), (("attached_mass",), 0.012, True), ((), 0.05, False)]
+)
+def test_a_stated_mass_that_is_there_is_claimed_and_one_that_is_not_is_not(weighed, effects, mass, is_there):
+    """Whether the card's list of effects has it or leaves it out."""
+    problem = posed(with_item(weighed, mass), effects)
+    (claim,) = stated_claims(problem, both_fits(problem))
+    assert claim.effects == ("attached_mass",)
+    assert claim.holds is is_there
+    assert (claim.after_rms_cents < 0.5 * claim.before_rms_cents) is is_there
 
 
 def test_nothing_is_claimed_where_the_card_states_nothing(weighed):
