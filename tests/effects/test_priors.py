@@ -4,8 +4,8 @@ A change of these changes what people are told, so it is made here as well, with
 literature on effects in wooden plates (shear moduli of spruce 0.5-0.75 GPa and 20-40 MPa; a clamp of k_R L / D = 30 and
 one with a lining of k_T L^3 / D = 1e4; tensions of 100-400 N/m in clamped boards; air of 1.2 kg/m^3; tapers and density
 gradients of 5 per cent end to end, gradients of E_x of 8; grain within 6 degrees; nu_xy of 0.3-0.6; a cup of half a per
-cent of the width, a bow of 0.4 of the length, a twist of one of the longer side) and those of data sheets of sensors and
-exciters (four exciters of 25 mm: suspensions of 2650-2810 N/m, coils of 1.5-1.7 g).
+cent of the width, a bow of 0.4 of the length, a twist of one of the longer side) and those of data sheets of sensors
+and exciters (four exciters of 25 mm: suspensions of 2650-2810 N/m, coils of 1.5-1.7 g).
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ PRIORS = {
 }
 """Unit, kind, median, standard deviation (of the logarithm if log-normal) and bounds.
 
-The rises are those of the clamped board, 600 x 412 mm; the place of an exciter on it, where one quarter stands for all four.
+The rises are those of the clamped board, 600 x 412 mm, and so is the place of an exciter: one quarter of that board
+stands for all four.
 """
 
 RISES = {
