@@ -1,9 +1,9 @@
 """What physics knows of measured boards: the error with shear and air computed, nothing fitted but the constants.
 
 Transverse shear and air act on every board, and their sizes are known: from what is published, and from the board. A
-sensor weighs what its card states. Each is computed, alone and with the others, and the three constants are fitted
-again. Where the error falls, the ideal plate lacked the effect; where it rises, something that acts the other way is
-lacking, or the size is another one on that board. It is printed either way.
+sensor weighs what its card states. They are computed in every combination of up to three, and the three constants are
+fitted again. Where the error falls, the ideal plate lacked the effect; where it rises, something that acts the other
+way is lacking, or the size is another one on that board. It is printed either way.
 
     python examples/known_effects.py --out known-effects
 
@@ -20,7 +20,7 @@ from pathlib import Path
 
 from bayesplate.cards import card_names
 from bayesplate.diagnosis.evidence.known import known_fits
-from bayesplate.diagnosis.wording.known import KnownModel, known_models, model_words
+from bayesplate.diagnosis.wording.known import KnownModel, known_models, known_titles
 from bayesplate.plate.material import MODULI
 from bayesplate.workflow.problem import Problem
 
@@ -55,13 +55,13 @@ def rows(found: Mapping[str, Sequence[KnownModel]]) -> list[tuple[str | float | 
     return [
         (
             board,
-            model_words(one),
+            words,
             one.in_sample_rms_cents,
             one.leave_one_out_rms_cents,
             *(one.change_percent[name] for name in MODULI),
         )
         for board, models in found.items()
-        for one in models
+        for words, one in zip(known_titles(models), models, strict=True)
     ]
 
 
@@ -69,10 +69,10 @@ def markdown(found: Mapping[str, Sequence[KnownModel]]) -> str:
     """The table as Markdown, rounded."""
     lines = [COLUMNS, tuple("---" for _ in COLUMNS)]
     for board, models in found.items():
-        for one in models:
+        for words, one in zip(known_titles(models), models, strict=True):
             errors = (_cents(one.in_sample_rms_cents), _cents(one.leave_one_out_rms_cents))
             changes = (f"{value:+.1f}" if one is not models[0] else "-" for value in one.change_percent.values())
-            lines.append((board, model_words(one), *errors, *changes))
+            lines.append((board, words, *errors, *changes))
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 

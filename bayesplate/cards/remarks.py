@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from typing import Any
 
 from bayesplate.cards.board import BoardCard
-from bayesplate.cards.repeated import CALIPER, RULE, SCALES, are_alike
+from bayesplate.cards.repeated import CALIPER, FEELER, RULE, SCALES, are_alike
 from bayesplate.cards.setup import SetupSection
 from bayesplate.quantities import Quantity
 
@@ -58,6 +58,8 @@ def _exact_thickness(card: BoardCard) -> Iterator[str]:
 def _assumed_resolutions(card: BoardCard) -> Iterator[str]:
     plate = card.written.get("plate", {})
     assumed = [f"{name} to {step}" for key, (name, step) in _SIZES.items() if _lacks_resolution(plate.get(key))]
+    warp = plate.get("warp_mm", {})
+    assumed += [f"{name} to {FEELER:g} mm" for name, read in warp.items() if _lacks_resolution(read)]
     if assumed:
         yield (
             f"readings that are all alike were taken as rounded, {', '.join(assumed)}; "

@@ -236,7 +236,8 @@ def exact_models(
     the rigidities, so a common factor needs no training, and side lengths only rescale the same terms; of an isotropic
     board it spans D itself, which does no harm. Parameters of
     effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
-    the box, and effects whose place is open the places all over the board. Sessions that hold the plate alike are solved once.
+    the box, and effects whose place is open the places all over the board. Sessions that hold the plate alike are
+    solved once.
 
     Parameters
     ----------

@@ -26,12 +26,14 @@ LEAVES = st.one_of(
     st.text(max_size=20),
     st.just(""),
     st.dates(),
-    st.sampled_from(["clamped", "free", "+", "my-board", "log-normal", "accelerometer"]),
+    st.sampled_from(["clamped", "free", "+", "my-board", "log-normal", "accelerometer", "exciter", "held"]),
 )
 CARD_KEYS = [
     *("mean", "sd", "readings", "resolution", "at_x_mm", "at_y_mm", "median", "factor", "x0", "y1", "name"),
     *("(1,0)", "( 1,0)", "(0,0)", "edges", "kind", "at_mm", "mass_g"),
     *("peaks", "hz", "sign", "label_confidence", "missed_probability"),
+    *("warp_mm", "cup", "bow", "twist", "support", "bounce_hz", "fluid", "air", "density_kg_m3", "baffle"),
+    *("coil_mass_g", "suspension_n_per_m", "resonance_hz", "magnet"),
 ]
 KEYS = st.one_of(st.text(max_size=8), st.sampled_from(CARD_KEYS))
 TREES = st.recursive(LEAVES, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=4))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import bayesplate
-from bayesplate.cards import EFFECT_NAMES, load_campaign, physical_faults, read_board_text
+from bayesplate.cards import EFFECT_NAMES, load_campaign, physical_faults, read_board_text, remarks
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import implied_effects
 from bayesplate.errors import InputError
@@ -76,6 +76,12 @@ WARPS = {
 def test_what_no_board_is_warped_by(spoiled, warp):
     (fault,) = told(spoiled(PLATE, f"{PLATE}\nwarp_mm = {{ {warp} }}"))
     assert fault.startswith("my-board.toml [plate] warp_mm." + WARPS[warp])
+
+
+def test_readings_of_a_warp_that_are_all_alike_are_rounded_to_a_feeler_gauge(spoiled):
+    card = read_board_text(spoiled(PLATE, f"{PLATE}\nwarp_mm = {{ cup = [0.8, 0.8], bow = [1.0, 1.1] }}"), "my-board")
+    assert card.plate.warp_mm["cup"].sd == pytest.approx(0.1 / 12**0.5)
+    assert any("taken as rounded, cup to 0.1 mm; " in one for one in remarks(card, ()))
 
 
 def test_warp_is_a_table(spoiled):

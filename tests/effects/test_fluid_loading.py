@@ -125,6 +125,20 @@ def test_takes_what_the_card_declares():
     assert FluidLoading.is_implied(replace(board, setups=(declared,)))
 
 
+def test_a_setup_that_states_its_own_fluid_keeps_it():
+    setup = setup_of(FINNISH)
+    board = board_of(ritz.FINNISH, [setup])
+    wet = replace(setup, name="wet", fluid=DeclaredFluid(997.0))
+    assert FluidLoading.of(board, wet).in_setup(board, setup).density.mean == 997.0
+    assert FluidLoading.of(board, setup).in_setup(board, wet).density.mean == 997.0
+
+
+@pytest.mark.parametrize(("density", "word"), [(1.2, "air"), (99.0, "air"), (997.0, "water"), (790.0, "fluid")])
+def test_people_call_it_air_or_water(density, word):
+    density, _ = FluidLoading(MADE, density=Quantity.exact(density)).parameters()
+    assert density.words == f"density of the {word} of fluid loading"
+
+
 @pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
 def test_reduced_order_model_is_exact(card):
     assert worst_cents(posed(card, ["fluid_loading"]).posterior.models) < 0.5

@@ -57,8 +57,7 @@ PRIORS = {
 }
 """Unit, kind, median, standard deviation (of the logarithm if log-normal) and bounds.
 
-The rises are those of the clamped board, 600 x 412 mm, and so is the place of an exciter: one quarter of that board
-stands for all four.
+The rises are those of the clamped board, 600 x 412 mm; the place of an exciter on it, one quarter for all four.
 """
 
 RISES = {

@@ -48,12 +48,12 @@ def test_it_writes_its_table(example, tmp_path, monkeypatch, capsys):
     assert "\n".join(lines) in capsys.readouterr().out
     first = asked[0]
     assert lines[2] == f"| {first} | as it stands | 21.2 | 46.5 | - | - | - |"
-    assert lines[4] == f"| {first} | with fluid loading | 42.8 | 94.0 | +1.2 | -2.5 | +0.0 |"
+    assert lines[4] == f"| {first} | with fluid loading and attached mass | 42.8 | 94.0 | +1.2 | -2.5 | +0.0 |"
     assert len(lines) == 2 + 2 * len(KNOWN)
     with (tmp_path / "known-effects.csv").open(newline="", encoding="utf-8") as stream:
         header, *rows = csv.reader(stream)
     assert tuple(header) == example.COLUMNS
-    assert rows[2] == [first, "with fluid loading", "42.75", "94.0", "1.25", "-2.5", "0.0"]
+    assert rows[2] == [first, "with fluid loading and attached mass", "42.75", "94.0", "1.25", "-2.5", "0.0"]
 
 
 def test_on_a_measured_board_the_air_raises_the_error(example):

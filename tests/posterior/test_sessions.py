@@ -27,7 +27,7 @@ from bayesplate.modes.reduced import ReducedOrderModel
 from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.sessions import discrepancy_names, sessions, with_discrepancies
-from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem
+from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid
 from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.normal_case import NormalCase
 from bayesplate.quantities import Quantity
@@ -61,6 +61,8 @@ def test_setups_that_hold_and_load_the_board_alike_are_sessions():
         replace(one, name="deeper", clamped={"x0": Quantity.exact(0.03)}),
         replace(one, name="loaded", attached=(AttachedItem("weight", ((0.1, 0.1),), Quantity.exact(1e-3)),)),
         replace(one, name="free", ends_x=("free", "free")),
+        replace(one, name="wet", fluid=DeclaredFluid(997.0)),
+        replace(one, name="on foam", bounce=20.0),
         replace(one, name="third day", noise=Quantity.from_median(0.01, 2.0)),
     ]
     made = board_of(ritz.FINNISH, [one, *others])
@@ -72,7 +74,7 @@ def test_setups_that_hold_and_load_the_board_alike_are_sessions():
     assert len(found.parameters) == len(made.parameters) + 1 + len(CANTILEVER_LABELS)
     assert with_discrepancies(found) == found
     assert found.to_card() == made.to_card()
-    alone = board_of(ritz.FINNISH, [one, *others[1:4]])
+    alone = board_of(ritz.FINNISH, [one, *others[1:6]])
     assert with_discrepancies(alone) == alone
 
 

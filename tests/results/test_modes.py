@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ritz
+from carried_boards import CARRIES, LABEL, five_modes
 from made_boards import setup_of
 from made_reports import fitted
 from made_summaries import SUMMARY
@@ -88,23 +89,19 @@ def test_a_peak_of_a_sure_label_is_predicted_as_its_mode_is(tmp_path, monkeypatc
 
 
 def test_a_mode_that_alone_carries_a_constant_is_named_and_left_out_of_the_left_out_error(tmp_path):
-    """The paper's cantilever without (2,2): if (1,2) is left out too, nothing tells E_y."""
-    card = tmp_path / "five.toml"
-    text = (CARDS / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
-    lines = text.replace('name = "finnish-spruce-cantilever"', 'name = "five"').splitlines()
-    card.write_text("\n".join(line for line in lines if not line.startswith('"(2,2)"')), encoding="utf-8")
-    summary = fitted(str(card)).summary
+    summary = fitted(str(five_modes(tmp_path))).summary
 
     (one,) = summary.carrying_modes
-    assert (one.label, one.carries) == ("(1,2)", "E_y")
-    assert one.leverage > 0.9 > max(row.leverage for row in summary.modes if row.label != "(1,2)")
-    others = [row.left_out_cents for row in summary.modes if row.label != "(1,2)"]
+    assert (one.label, one.carries) == (LABEL, CARRIES)
+    assert one.leverage > 0.9 > max(row.leverage for row in summary.modes if row.label != LABEL)
+    others = [row.left_out_cents for row in summary.modes if row.label != LABEL]
     assert summary.error.leave_one_out_rms_cents == pytest.approx(np.sqrt(np.mean(np.square(others))))
-    assert all(row.left_out_cents is not None for row in summary.modes)
-    sentence = "mode (1,2) alone carries E_y: it is left out of the left-out error"
+    (own,) = (row.left_out_cents for row in summary.modes if row.label == LABEL)
+    assert abs(own) > 3.0 * summary.error.leave_one_out_rms_cents  # it would show
+    sentence = f"mode {LABEL} alone carries {CARRIES}: it is left out of the left-out error"
     assert sentence in summary.identifiability
     assert sentence in show_fit(summary).remarks
-    assert json.loads(json_text(summary))["carrying_modes"][0]["carries"] == "E_y"
+    assert json.loads(json_text(summary))["carrying_modes"][0]["carries"] == CARRIES
 
 
 def test_where_every_mode_carries_something_alone_it_is_said_that_there_is_no_left_out_error():

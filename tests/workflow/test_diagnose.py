@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import runs
+from carried_boards import CARRIES, LABEL, five_modes
 from click.testing import CliRunner
 from runs import files_in, read_json
 
@@ -23,7 +24,6 @@ from bayesplate.workflow.check import check
 from bayesplate.workflow.diagnose import diagnose as run_diagnose
 from bayesplate.workflow.fit import fit
 
-CARDS = Path(__file__).parents[2] / "models" / "boards"
 WITH_SHEAR = "paper-cantilever-fe"
 CALM = "fiemme-spruce-clamped"
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
@@ -343,18 +343,16 @@ def test_a_signal_while_sampling_is_heeded_and_the_run_resumes(tmp_path, stop):
 
 
 def test_a_mode_that_alone_carries_a_constant_counts_in_no_error_of_a_diagnosis(tmp_path, quick):
-    """The paper's cantilever without (2,2), where nothing but (1,2) tells E_y: before, after and with known effects."""
-    text = (CARDS / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
-    lines = text.replace('name = "finnish-spruce-cantilever"', 'name = "five"').splitlines()
-    card = tmp_path / "five.toml"
-    card.write_text("\n".join(line for line in lines if not line.startswith('"(2,2)"')), encoding="utf-8")
-    found = run_diagnose(str(card), n_null=50)
+    """Before, after and with known effects."""
+    found = run_diagnose(str(five_modes(tmp_path)), n_null=50)
 
     told = found.to_json()
     (one,) = told["carrying_modes"]
-    assert (one["label"], one["carries"]) == ("(1,2)", "E_y")
+    assert (one["label"], one["carries"]) == (LABEL, CARRIES)
     left_out = {row.label: row.left_out_cents for row in found.before.summary.modes}
-    others = np.array([value for label, value in left_out.items() if label != "(1,2)"])
-    assert told["before"]["leave_one_out_rms_cents"] == pytest.approx(np.sqrt(np.mean(others**2)))
-    assert told["known"][0]["leave_one_out_rms_cents"] == pytest.approx(np.sqrt(np.mean(others**2)), rel=0.2)
-    assert abs(left_out["(1,2)"]) > 2.0 * np.sqrt(np.mean(others**2))  # which the known effects would show as well
+    others = np.array([value for label, value in left_out.items() if label != LABEL])
+    rms = float(np.sqrt(np.mean(others**2)))
+    assert told["before"]["leave_one_out_rms_cents"] == pytest.approx(rms)
+    assert abs(left_out[LABEL]) > 3.0 * rms  # it would show
+    for row in told["known"]:
+        assert row["leave_one_out_rms_cents"] < 1.5 * rms

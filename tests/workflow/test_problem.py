@@ -20,8 +20,13 @@ UNCERTAIN = "spruce-free-2R"
 
 @pytest.fixture(scope="module")
 def problem() -> bayesplate.Problem:
-    """A board whose sizes, mass and Poisson ratio are uncertain, with effects whose priors have one bound and two."""
-    return bayesplate.Problem.from_card(UNCERTAIN, effects=["fluid_loading", "support_stiffness"])
+    """A board whose sizes, mass and Poisson ratio are uncertain, with effects whose priors have one bound and two.
+
+    How stiff its support is is not stated: the effect's own prior ends at zero.
+    """
+    board = bayesplate.Problem.from_card(UNCERTAIN).prepared.stated
+    lying = replace(board, setups=tuple(replace(one, bounce=None) for one in board.setups))
+    return bayesplate.Problem.from_card(lying, effects=["fluid_loading", "support_stiffness"])
 
 
 @pytest.fixture(scope="module")

@@ -118,13 +118,12 @@ def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[Stat
     if not effects:
         return ()
     without, having = (next(one for one in reversed(fits) if one.combination == wanted) for wanted in ((), effects))
-    left_out = [one.errors.left_out for one in (without, having)]
-    both = np.isfinite(np.stack(left_out)).all(axis=0)
+    before, after = without.errors.left_out, having.errors.left_out
+    both = np.asarray(np.isfinite(before) & np.isfinite(after))
     both &= (without.errors.leverages.carries < 0) & (having.errors.leverages.carries < 0)
     modes = [mode for mode in same_modes(board) if both[list(mode)].all()]
     scores = [scores_given(board, one.errors.in_sample, one.slopes, modes) for one in (without, having)]
-    before, after = (one[both] for one in left_out)
-    claims = [judge_stated(effects, "", before, after, scores[1] - scores[0])]
+    claims = [judge_stated(effects, "", before[both], after[both], scores[1] - scores[0])]
     further = [setup.name for setup in board.setups[1:] if _states_differently(board, effects, setup.name)]
     if further:
         claims += _of_further_setups(problem, effects, further)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.draws import draw_terms, members_of, standard_sizes_of
-from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, are_stated
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
@@ -104,10 +104,11 @@ class Verdict:
 def answers(found: Found) -> tuple[Answer, ...]:
     """Single effects and pairs by their support, best first.
 
-    A pair stands for itself only if it is three times as probable as its better member alone; otherwise it says no more
-    than that member, which gets its probability.
+    A pair stands for itself only if it is three times as probable as its better member alone, or if its members are
+    known ones that the card states; otherwise it says no more than that member, which gets its probability.
     """
     support: dict[int, float] = {}
+    board = found.ground.baseline.board
     singles = {
         one.members[0]: i for i, one in enumerate(found.ground.hypotheses) if len(one.members) == 1 and not one.swap
     }
@@ -119,7 +120,7 @@ def answers(found: Found) -> tuple[Answer, ...]:
             continue
         better = max((singles[name] for name in one.members), key=lambda j: float(found.probability[j]))
         share = float(found.probability[i])
-        if share >= CLEARLY * float(found.probability[better]):
+        if share >= CLEARLY * float(found.probability[better]) or are_stated(board, one.members):
             support[i] = share
         else:
             support[better] += share

@@ -65,4 +65,5 @@ def is_stated_in_full(board: Board, names: Collection[str]) -> bool:
 
 
 def in_order(names: Collection[str]) -> tuple[str, ...]:
+    """Names of effects in the order of the library."""
     return tuple(name for name in EFFECTS if name in names)

@@ -14,6 +14,8 @@ from bayesplate.diagnosis.evidence.terms import Fold, Terms, log_sum, normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import with_readings_exchanged
 from bayesplate.diagnosis.shifts.tables import Table, nothing, together
+from bayesplate.effects import EFFECTS
+from bayesplate.plate.board import Board
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -138,9 +140,26 @@ def hypotheses(
     found += [Hypothesis((name,), each, table, levels) for name, table in fine.items()]
     found += [Hypothesis((RELABELLING,), each / len(swaps), empty, levels, swap) for swap in swaps]
     found += [
-        Hypothesis((one, other), TWO / len(pairs), together(coarse[one], coarse[other]), few) for one, other in pairs
+        Hypothesis(
+            pair, each if are_stated(board, pair) else TWO / len(pairs), together(*(coarse[name] for name in pair)), few
+        )
+        for pair in pairs
     ]
     return tuple(replace(one, table=one.table.of(baseline.rows), wide=one.table) for one in found)
+
+
+def are_stated(board: Board, pair: Sequence[str]) -> bool:
+    """Whether two effects are known ones of which the card states at least one, without declaring it.
+
+    What is known to be there is no coincidence of two causes: such a pair has the prior of a single effect, and stands
+    for itself.
+    """
+    effects = [EFFECTS[name] for name in pair if name in EFFECTS]
+    return (
+        len(effects) == 2
+        and all(effect.is_known(board) for effect in effects)
+        and any(effect.is_implied(board) for effect in effects)
+    )
 
 
 def confusable(baseline: Baseline) -> tuple[Swap, ...]:

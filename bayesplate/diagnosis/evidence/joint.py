@@ -5,6 +5,8 @@ error, and both together explain it. Two large shifts of opposite signs are also
 approximation, by a fifth of what is left of them, so that the right pair may seem improbable. Where nothing explains
 the readings the most probable pairs are therefore solved together however improbable they are.
 
+A pair of known effects of which the card states one is solved together in any case.
+
 Pairs with transverse shear are left to the sampler, which fits whatever is named again: solving them takes minutes.
 """
 
@@ -17,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.draws import members_of
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, are_stated
 from bayesplate.diagnosis.evidence.peaks import with_own_labels
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
@@ -93,14 +95,16 @@ def _plausible(found: Found) -> list[int]:
     """Indices of the most probable pairs whose effects have laws and leave the plate thin."""
     log_probability = found.log_evidence + np.log([one.prior for one in found.ground.hypotheses])
     is_explained = found.p_value(int(np.argmax(found.probability))) >= PASSES
-    pairs = [
-        i
+    board = found.ground.baseline.board
+    cheap = [
+        int(i)
         for i in np.lexsort((-log_probability, -found.probability))  # by logarithms where they are too small to tell
-        if (found.probability[i] >= PLAUSIBLE or not is_explained)
-        and len(members_of(found, int(i))) == 2
+        if len(members_of(found, int(i))) == 2
         and all(_is_cheap(law) for one in members_of(found, int(i)) for law in one.laws)
     ]
-    return [int(i) for i in pairs[:_MOST_PAIRS]]
+    stated = [i for i in cheap if are_stated(board, found.ground.hypotheses[i].members)]
+    pairs = [i for i in cheap if i not in stated and (found.probability[i] >= PLAUSIBLE or not is_explained)]
+    return [*stated, *pairs[:_MOST_PAIRS]]
 
 
 def _is_cheap(law: FormLaw) -> bool:

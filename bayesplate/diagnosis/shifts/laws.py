@@ -115,8 +115,9 @@ class FormLaw:
         return tuple(result)
 
     def _without(self, baseline: Baseline) -> Values:
-        """Values of the baseline with the effect absent."""
-        nothing = {free.name: np.full(1, free.null) for free in self.form.free}
+        """Values of the baseline with the effect absent, whether its sizes are free or exact."""
+        sizes = [one for one in self.form.board.parameters if one.effect and one.effect not in baseline.board.effects]
+        nothing = {one.name: np.full(1, one.null) for one in sizes if one.null is not None}
         free = np.exp(baseline.log_rigidities)[:, None]
         return _with_rigidities(baseline, _inputs(baseline, self.form) | nothing, free)
 

@@ -142,11 +142,14 @@ class Explanation:
     probability : float
     words : str
         The same as people read it; not written to JSON.
+    is_stated : bool
+        Whether it is of known effects of which the card states one; not written to JSON.
     """
 
     effects: tuple[str, ...]
     probability: float
     words: str = field(metadata=NOT_IN_JSON)
+    is_stated: bool = field(default=False, metadata=NOT_IN_JSON)
 
 
 @dataclass(frozen=True, kw_only=True)

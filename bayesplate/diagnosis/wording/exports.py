@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.known import KnownModel, known_table, model_words
+from bayesplate.diagnosis.wording.known import KnownModel, known_table, known_titles
 from bayesplate.diagnosis.wording.words import MERITS
 from bayesplate.effects.words import effect_name
 from bayesplate.plate.material import MODULI
@@ -53,9 +53,9 @@ def known_csv(known: Sequence[KnownModel]) -> str:
     """Errors in cents and changes of the moduli in percent at full precision, model by model."""
     header = ["model", "in_sample_rms_cents", "leave_one_out_rms_cents", *(f"{name}_percent" for name in MODULI)]
     rows: list[list[Cell]] = [list(header)]
-    for one in known:
+    for words, one in zip(known_titles(known), known, strict=True):
         errors = (one.in_sample_rms_cents, one.leave_one_out_rms_cents)
-        rows.append([model_words(one), *errors, *one.change_percent.values()])
+        rows.append([words, *errors, *one.change_percent.values()])
     return csv_text(rows)
 
 

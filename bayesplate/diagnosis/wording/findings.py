@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.decision.claim import Claim
 from bayesplate.diagnosis.decision.constants import draw_constants
 from bayesplate.diagnosis.decision.stated import StatedClaim
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives_words, answer_words, answers
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives_words, answer_words, answers, p_words
 from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
-from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
+from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, are_stated
 from bayesplate.diagnosis.evidence.known import KnownFit
 from bayesplate.diagnosis.evidence.null_control import NullControl
+from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, inclusion_with_width
 from bayesplate.diagnosis.wording.diagnosis import (
@@ -161,7 +162,13 @@ def diagnosis_of(case: Case) -> Diagnosis:
         elastic_averaged={name: averaged[name] for name in MODULI},
         rigidity_averaged={name: averaged[name] for name in RIGIDITIES},
         answers=tuple(
-            Explanation(effects=one.members, probability=one.support, words=answer_words(found, one)) for one in ranked
+            Explanation(
+                effects=one.members,
+                probability=one.support,
+                words=answer_words(found, one),
+                is_stated=are_stated(found.ground.baseline.board, one.members),
+            )
+            for one in ranked
         ),
         candidates=(
             *(effect_entry(found, verdict, ranked, one, doubled[one.name]) for one in effects),
@@ -288,7 +295,23 @@ def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
         if (swap := case.found.ground.hypotheses[one.index].swap) is not None
     ]
     nearest = [_nearest_sentence(case, *one) for one in case.finalists if one[0] == case.verdict.nearest]
-    return (*effects, *exchanged, *nearest)
+    return (*effects, *exchanged, *nearest, *_stated_sentences(case, taken))
+
+
+def _stated_sentences(case: Case, taken: Sequence[Answer]) -> list[str]:
+    """Which known effects, stated and not declared, would explain the readings too, and how to fit them."""
+    board = case.found.ground.baseline.board
+    told = []
+    for one in answers(case.found):
+        p_value = case.found.p_value(one.index)
+        if one in taken or not are_stated(board, one.members) or p_value < PASSES:
+            continue
+        every = ",".join((*board.effects, *one.members))
+        told.append(
+            f"{answer_words(case.found, one).capitalize()}, which are known to be there, explain the readings together "
+            f"as well ({p_words(p_value)}): --effects {every} fits the constants with both."
+        )
+    return told
 
 
 def _nearest_sentence(case: Case, answer: Answer, summary: Summary) -> str:

@@ -89,10 +89,9 @@ def known_table(known: Sequence[KnownModel]) -> Table | None:
     if len(known) < 2:
         return None
     rows = []
-    for one in known:
+    for words, one in zip(known_titles(known), known, strict=True):
         left_out = MISSING if one.leave_one_out_rms_cents is None else f"{one.leave_one_out_rms_cents:.1f}"
         changes = (MISSING if one is known[0] else f"{value:+.1f}" for value in one.change_percent.values())
-        words = AS_IT_STANDS if one is known[0] else model_words(one)
         rows.append((words, f"{one.in_sample_rms_cents:.1f}", left_out, *changes))
     columns = ("model", "in the fit", "left out", *(f"{name}, %" for name in MODULI))
     title = (
@@ -100,6 +99,11 @@ def known_table(known: Sequence[KnownModel]) -> Table | None:
         "constants"
     )
     return Table(title, columns, tuple(rows))
+
+
+def known_titles(known: Sequence[KnownModel]) -> list[str]:
+    """Which model each is; the first is the board as it stands."""
+    return [AS_IT_STANDS, *map(model_words, known[1:])]
 
 
 def model_words(one: KnownModel) -> str:
@@ -190,9 +194,9 @@ def _only_together(known: Sequence[KnownModel], errors: _Errors) -> list[str]:
         neither, first, second, both = map(errors.of, models)
         if both < neither < min(first, second):
             shown = errors.shown(*models)
-            this, other = map(effect_name, pair)
+            name, other = map(effect_name, pair)
             said.append(
-                f"{effect_names(pair).capitalize()} work only together: {this} alone takes the {errors.name} from "
+                f"{effect_names(pair).capitalize()} work only together: {name} alone takes the {errors.name} from "
                 f"{shown[0]} to {shown[1]} cents, {other} alone to {shown[2]}, both to {shown[3]}."
             )
     return said

@@ -99,7 +99,7 @@ def averaged_table(diagnosis: Diagnosis) -> Table:
 
 def answers_table(diagnosis: Diagnosis) -> Table:
     """Every explanation that is worth a row, none of them, and the rest: probabilities that sum to one as printed."""
-    shown = [one for one in diagnosis.answers if one.probability >= _WORTH_A_ROW]
+    shown = [one for one in diagnosis.answers if one.probability >= _WORTH_A_ROW or one.is_stated]
     named = [("nothing is lacking", diagnosis.probability_of_none), *((one.words, one.probability) for one in shown)]
     rest = len(diagnosis.answers) - len(shown)
     if rest:
