@@ -188,19 +188,20 @@ def _matrices(ends_x: Ends, ends_y: Ends, aspect_ratio: float, thickness: Field 
         slope = grad(u)
         return slope[0, 0] / sides[0], slope[1, 1] / sides[1], slope[0, 1] / sides[1] + slope[1, 0] / sides[0]
 
-    def factor(at: Any) -> Any:
-        return 1.0 if thickness is None else thickness(*at.x)
+    at_points = np.asarray(fields.global_coordinates())
+    factor = np.ones(at_points.shape[1:]) if thickness is None else thickness(*at_points)
 
     def stiffness(i: int, j: int) -> Any:
         def form(u: Any, v: Any, at: Any) -> Any:
             of_u, of_v = strains(u), strains(v)
             both = of_u[i] * of_v[j]
-            return factor(at) * (both if i == j else both + of_u[j] * of_v[i])
+            return at.factor * (both if i == j else both + of_u[j] * of_v[i])
 
-        return BilinearForm(form).assemble(fields)
+        return BilinearForm(form).assemble(fields, factor=factor)
 
     def load(i: int) -> Any:
-        return BilinearForm(lambda w, v, at: factor(at) * strains(v)[i] * w).assemble(deflection, fields)
+        form = BilinearForm(lambda w, v, at: at.factor * strains(v)[i] * w)
+        return form.assemble(deflection, fields, factor=factor)
 
     held = [
         fields.get_dofs(side).all()
@@ -210,7 +211,7 @@ def _matrices(ends_x: Ends, ends_y: Ends, aspect_ratio: float, thickness: Field 
     return _Matrices(
         stiffness=(stiffness(0, 0), stiffness(0, 1), stiffness(1, 1), stiffness(2, 2)),
         loads=tuple(load(i) for i in range(3)),
-        mass=BilinearForm(lambda w, v, at: factor(at) * w * v).assemble(deflection),
+        mass=BilinearForm(lambda w, v, at: at.factor * w * v).assemble(deflection, factor=factor),
         places=deflection.doflocs,
         held=np.unique(np.concatenate(held)) if held else np.empty(0, dtype=np.intp),
     )
