@@ -316,6 +316,10 @@ class Effect(ABC):
         """Inputs of the board that its fields follow: another value of them is another plate, not the same scaled."""
         return ()
 
+    def also_at(self) -> tuple[Mapping[str, float], ...]:
+        """Where an exact law is made too, beyond the two ends of each parameter: shares of their reach by name."""
+        return ()
+
     def stations(self) -> tuple[Effect, ...]:
         """The effect at each place over which it roved: what is read is the mean of the frequencies there."""
         return (self,)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
@@ -29,6 +30,7 @@ _LEAST_MAGNET = 0.05
 _STANDS_STILL = 1e-3
 """Lowest resonance, Hz: on no spring at all the magnet still has a frequency of its own, far below every mode."""
 _ACROSS = 4.0
+_PLACES_A_SIDE = 8
 _FEWEST_ORDER = 2
 _QUADRATURE = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 
@@ -243,6 +245,22 @@ class Exciter(Effect):
             for (low, high), order in zip(self._ranges, self.orders, strict=True)
         )
 
+    def also_at(self) -> tuple[Mapping[str, float], ...]:
+        """Places all over where it may be, on its stiffest spring: a plate gives way there alone, as at no other place.
+
+        Ends of the place alone would leave out what the middle does, and a usual spring most of what a stiff one does.
+        """
+        return tuple(
+            {
+                self.name_of(self._key(i, "place_x")): x,
+                self.name_of(self._key(i, "place_y")): y,
+                self.name_of(self._key(i, "resonance" if drive.is_resonance else "suspension")): 1.0,
+            }
+            for i, drive in enumerate(self.drives)
+            if not drive.places
+            for x, y in product(*(_all_over(*each) for each in self._ranges))
+        )
+
     def keeps_symmetry(self) -> tuple[bool, bool]:
         """The halves differ: even in the middle of the board, the magnet's mode belongs to one class alone."""
         return False, False
@@ -339,6 +357,12 @@ def _with_known_coil(drive: Drive) -> Drive:
 
 def _turn(places: Fractions, k: int) -> Fractions:
     return (places[k % len(places)],) if places else ()
+
+
+def _all_over(low: float, high: float) -> list[float]:
+    """Shares of a range of places, so dense that the modes that are read hardly change from one to the next."""
+    n_places = round(_PLACES_A_SIDE * (high - low))
+    return [(k + 1) / n_places for k in range(n_places)]
 
 
 def _orders(setup: Setup) -> tuple[int, int]:

@@ -236,7 +236,8 @@ def exact_models(
     the rigidities, so a common factor needs no training, and side lengths only rescale the same terms; of an isotropic
     board it spans D itself, which does no harm. Parameters of
     effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
-    the box. Sessions that hold the plate alike are solved once.
+    the box, and effects whose place is open the places all over the board. Sessions that hold the plate alike are
+    solved once.
 
     Parameters
     ----------
@@ -273,7 +274,9 @@ def exact_models(
         ends[2 * row, [*boxed, i]] = [*corners[row % len(corners), boxed], 1.0]
         ends[2 * row + 1, [*boxed, i]] = [*-corners[row % len(corners), boxed], -1.0]
     half = [corners[[0, -1]], ends[::2]]
-    corners = np.concatenate(half if is_rough else [*half, corners[1:-1], ends[1::2]])
+    reach = _BOX_SDS * sds
+    everywhere = _also_at(models, parameters, centre, reach) / np.where(half_widths > 0.0, half_widths, 1.0)
+    corners = np.concatenate(half if is_rough else [*half, corners[1:-1], ends[1::2], everywhere])
     n_held_out = 1 if is_rough else _N_HELD_OUT
     held_out = np.random.default_rng(0).uniform(-1.0, 1.0, (n_held_out, parameters.n_dim))
 
@@ -296,6 +299,28 @@ def exact_models(
         solved = with_exact_of(model, twin) if twin else with_exact(model, middle, around, checks, accepted_cents)
         made.append(solved)
     return tuple(made)
+
+
+def _also_at(models: Sequence[SetupModel], parameters: Parameters, centre: Floats, reach: Floats) -> Floats:
+    """Where effects want a law to be made too: (n_points, n_dim) array of steps from the centre.
+
+    A share of 0 is the lower end of what a parameter reaches within the bounds of its prior, and 1 the upper end; one
+    that is exact stays.
+    """
+    asked = dict.fromkeys(
+        tuple(each.items()) for model in models for effect in model.system.effects for each in effect.also_at()
+    )
+    column = {name: i for i, name in enumerate(parameters.inputs, start=parameters.first_input)}
+    low, high = centre - reach, centre + reach
+    fitted, bounds = parameters.fitted_columns, parameters.fitted_bounds
+    low[fitted], high[fitted] = (np.clip(end[fitted], bounds.lower, bounds.upper) for end in (low, high))
+    steps = np.zeros((len(asked), parameters.n_dim))
+    for step, shares in zip(steps, asked, strict=True):
+        for name, share in shares:
+            if name in column:
+                i = column[name]
+                step[i] = low[i] + share * (high[i] - low[i]) - centre[i]
+    return steps
 
 
 def worst_cents(models: Sequence[SetupModel]) -> float:

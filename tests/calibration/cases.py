@@ -9,7 +9,9 @@ import numpy as np
 from generator import effects as planted
 from generator.basis import Counts
 from generator.effects import NoEffect
+from generator.exciter import Exciter
 from generator.plate import FINE_SHEAR, Plate
+from generator.warp import Warp
 
 Values = Mapping[str, float]
 Place = tuple[float, float]
@@ -40,6 +42,8 @@ class Case:
         What the card says beyond the sizes, as TOML.
     is_attached : bool
         Whether something of unknown mass sits at a random place.
+    is_driven : bool
+        Whether an exciter does.
     n : (int, int), optional
         Polynomials of the generator, if not its own number.
     """
@@ -49,6 +53,7 @@ class Case:
     main: str
     stated: Mapping[str, str] = field(default_factory=dict)
     is_attached: bool = False
+    is_driven: bool = False
     n: Counts | None = None
     effect: str = ""
     others: tuple[str, ...] = ()
@@ -70,6 +75,19 @@ CASES: dict[str, Case] = {
         "free-12", lambda v, p, at: planted.TransverseShear(v["G_xz"], v["G_yz"]), "G_yz", n=FINE_SHEAR
     ),
     "attached_mass": Case("free-12", _attached, "mass", is_attached=True),
+    "exciter": Case(
+        "clamped-9",
+        lambda v, p, at: Exciter(v["mass"], (at,), v["coil"], v["suspension"]),
+        "suspension",
+        {
+            "exciter_mass_g": "{ mean = 8, sd = 0.8 }",
+            "coil_mass_g": "{ mean = 0.4, sd = 0.08 }",
+            "suspension_n_per_m": "{ mean = 400, sd = 80 }",
+        },
+        is_driven=True,
+        n=(24, 24),
+    ),
+    "warp": Case("free-12", lambda v, p, at: Warp(v["cup"], v["bow"], v["twist"]), "cup"),
     "clamp_rotation": Case("cantilever-9", _compliant(planted.ClampRotation, 1), "compliance"),
     "clamp_rotation, board free too": Case(
         "cantilever-6-free-6",

@@ -105,6 +105,7 @@ def prepared(folder: Path, name: str, hertz: Readings, place: Place) -> Prepared
         hertz,
         noise_cents=0.0,
         places=(place,) if case.is_attached else (),
+        driven=(place,) if case.is_driven else (),
         prior="./spread.toml",
         stated={"effects": f'["{effect_of(name)}"]', "poisson_xy": POISSON, "noise_percent": NOISE, **case.stated},
     )

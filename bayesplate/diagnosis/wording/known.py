@@ -63,6 +63,8 @@ def known_models(fits: Sequence[KnownFit], carried: Sequence[int] = ()) -> tuple
 
     Readings that are carried, whose mode alone carries a constant or a size, count in the left-out error of none.
     """
+    if not fits:
+        return ()
     left_out = np.array([one.errors.left_out for one in fits])
     is_of_all = np.isfinite(left_out).all(axis=0)
     is_of_all[list(carried)] = False

@@ -36,14 +36,16 @@ SHEAR, AIR, MASS = "transverse_shear", "fluid_loading", "attached_mass"
 SHEAR_LINES = ("shear_xz_gpa", "shear_yz_gpa")
 ATTACHED = '\n[[setup.attached]]\nkind = "accelerometer"\nmass_g = {mass}\nat_mm = [450, 100]\n'
 UNWEIGHED = '\n[[setup.attached]]\nkind = "accelerometer"\nat_mm = [100, 200]\n'
+EXCITER = "\n[[setup.attached]]"
+"""Begins what the card says of the exciter, which it states and, by an empty list of effects, does not declare."""
 WITHIN = 0.02
 """Cents by which the exact law on few vectors, and the mesh of the board as it stands, may differ from full solves."""
 
 
 def card_of(tmp_path, *, lines=(), without=(), after=""):
-    """The clamped card with lines of its material in place of others, and more after it."""
-    text = Problem.from_card(FIEMME).prepared.card_text
-    kept = [line for line in text.splitlines() if not line.startswith(tuple(without))]
+    """The clamped card without its exciter, with lines of its material in place of others, and more after it."""
+    text = Problem.from_card(FIEMME).prepared.card_text.partition(EXCITER)[0]
+    kept = [line for line in text.splitlines() if not line.startswith((*without, "effects ="))]
     at = kept.index("[material]") + 1
     path = tmp_path / f"{FIEMME}.toml"
     path.write_text("\n".join([*kept[:at], *lines, *kept[at:]]) + "\n" + after, encoding="utf-8")
@@ -70,8 +72,8 @@ def rms(errors):
 
 
 @pytest.fixture(scope="module")
-def fiemme():
-    return Problem.from_card(FIEMME).posed
+def fiemme(tmp_path_factory):
+    return Problem.from_card(card_of(tmp_path_factory.mktemp("bare"))).posed
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +176,13 @@ def test_every_combination_is_computed_whatever_is_declared(fiemme, declared):
     board = replace(fiemme.board, effects=declared)
     assert known_effects(board) == (SHEAR, AIR)
     assert every_combination(board) == [(), (SHEAR,), (AIR,), (SHEAR, AIR)]
+
+
+def test_an_exciter_of_stated_mass_is_known_and_stated_though_an_empty_list_declares_nothing():
+    board = Problem.from_card(FIEMME).posed.board
+    assert board.effects == ()
+    assert (known_effects(board), stated_effects(board)) == ((SHEAR, AIR, "exciter"), ("exciter",))
+    assert len(every_combination(board)) == 2**3
 
 
 def test_four_known_effects_are_combined_by_up_to_three_and_all_where_the_card_states_them(fiemme, monkeypatch):

@@ -167,6 +167,8 @@ def test_signatures_and_tables_tell_the_same_of_every_effect(finnish):
     for name, one in ground.candidates.items():
         if name == "attached_mass":  # the card names no item: the search tries places that signatures do not know
             continue
+        if name == "warp":  # the search tries curvatures and a twist apart, a signature is that of all together
+            continue
         law = one.laws[0]
         raw, visible, _ = nominal_shift(ground.baseline, law)
         (here,) = signatures(problem, [name])
