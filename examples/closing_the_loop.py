@@ -55,8 +55,7 @@ class Stated:
     Attributes
     ----------
     board : str
-    effects : tuple of tuple of str
-        What is fitted after the plate without any: each cause by itself, then all of them.
+    effects : tuple of str
     known : str
         Where they are known from.
     fact : str
@@ -64,7 +63,7 @@ class Stated:
     """
 
     board: str
-    effects: tuple[tuple[str, ...], ...]
+    effects: tuple[str, ...]
     known: str
     fact: str
 
@@ -72,41 +71,43 @@ class Stated:
 STATED = (
     Stated(
         "fiemme-spruce-clamped",
-        (("fluid_loading",), ("exciter",), ("fluid_loading", "exciter")),
+        ("fluid_loading", "exciter"),
         "the paper names the drive, 48 g, and a board in a room is in air",
         "suspensions of such drives were measured at 2650 to 2810 N/m",
     ),
     Stated(
         "foam-panel-exciter",
-        (("fluid_loading",), ("exciter",), ("fluid_loading", "exciter")),
+        ("fluid_loading", "exciter"),
         "coil and suspension measured on four samples, sizes taken as stated",
         "the author's model without air was tuned to E = 0.028 GPa",
     ),
     Stated(
         "steel-air-water",
-        (("transverse_shear",), ("fluid_loading",), ("fluid_loading", "transverse_shear")),
+        ("fluid_loading", "transverse_shear"),
         "the plate rang in air and under water",
         "two papers compute with E = 208.8 GPa",
     ),
 )
-STATED_COLUMNS = ("board", "what acts on it", "error, cents", "left out, cents", "E_x, GPa", "known from", "compare")
+STATED_COLUMNS = ("board", "with", "how", "error, cents", "left out", "E_x, GPa", "known from", "compare")
+COMPUTED, FITTED = "computed, nothing of it fitted", "fitted"
 STATED_HEAD = """# Closing the loop on measured boards
 
 Written by `examples/closing_the_loop.py`; do not edit.
 
 ## What is known to act on a board, taken in
 
-Each row is one fit of one board. The first takes it for an ideal plate; the others add what is known to be there, with
-its stated size or the prior of such things, and choose nothing by the readings. Error: of the fit, rms over the modes;
-left out: of each mode by a fit that has not seen it. Where one cause alone makes the error larger and two together make
-it smaller, they act in opposite directions.
+The first row of a board takes it for an ideal plate. "Computed": what is known to be there is added, with its stated
+size or the middle of the prior of such things, and nothing but the constants is fitted. "Fitted": its sizes and places
+are marginalised within these priors. Error: of the fit, rms over the modes, cents; left out: of each mode by a fit that
+has not seen it. Where one cause alone makes the error larger and two together make it smaller, they act in opposite
+directions.
 
 """
 HEAD = """## What was searched for: error before and after, board by board
 
 Each board is fitted as an ideal plate with what its card declares, an effect that it lacks is searched for, and where
-the verdict is a name or a group, the most probable effect is fitted too. "In part": it explains most of the residual and
-leaves more than noise.
+the verdict is a name or a group, the most probable effect is fitted too. "In part": it explains most of the residual
+and leaves more than noise.
 
 - In sample, left out, nested: error in cents, rms over the modes, without the effect → with it. In sample: of the fit
   itself; left out: of each mode by a fit that has not seen it; nested: the same, and the effect is searched for again
@@ -154,38 +155,43 @@ def close_the_loop(boards: Sequence[str] = BOARDS, seed: int = 1) -> dict[str, D
     return found
 
 
-def fit_stated(boards: Sequence[Stated] = STATED, seed: int = 1) -> list[tuple[str, ...]]:
-    """Fit boards without and with what is known to act on them.
+def stated_rows(
+    diagnoses: Mapping[str, Diagnosis], boards: Sequence[Stated] = STATED, seed: int = 1
+) -> list[tuple[str, ...]]:
+    """Boards without and with what is known to act on them.
 
     Parameters
     ----------
+    diagnoses : dict of Diagnosis
+        By board; they hold what is computed of known effects. Boards without one are left out.
     boards : sequence of Stated
     seed : int
+        Of the fits.
 
     Returns
     -------
     list of tuple of str
-        A row per fit.
     """
     found = []
     for one in boards:
-        for effects in ((), *one.effects):
-            summary = bayesplate.fit(one.board, effects=effects, seed=seed).summary
-            E_x = summary.elastic.E_x
-            is_last = effects == one.effects[-1]
-            found.append(
-                (
-                    one.board,
-                    effect_names(effects) or "nothing, an ideal plate",
-                    _cents(summary.error.in_sample_rms_cents),
-                    _cents(summary.error.leave_one_out_rms_cents),
-                    f"{1e-9 * E_x.mean:.4g} ± {1e-9 * E_x.sd:.2g}",
-                    one.known if is_last else "",
-                    one.fact if is_last else "",
-                )
-            )
-            print(" | ".join(found[-1]), flush=True)
+        if one.board not in diagnoses:
+            continue
+        found.append((one.board, "nothing, an ideal plate", FITTED, *_fitted(one.board, (), seed), "", ""))
+        for model in diagnoses[one.board].known:
+            if model.combination and {*model.combination} <= {*one.effects}:
+                error = _cents(model.in_sample_rms_cents)
+                found.append(("", effect_names(model.combination), COMPUTED, error, "", "", "", ""))
+        figures = _fitted(one.board, one.effects, seed)
+        found.append(("", effect_names(one.effects), FITTED, *figures, one.known, one.fact))
     return found
+
+
+def _fitted(board: str, effects: Sequence[str], seed: int) -> tuple[str, str, str]:
+    """Errors of a fit with some effects, cents, and E_x, GPa."""
+    summary = bayesplate.fit(board, effects=effects, seed=seed).summary
+    error, E_x = summary.error, summary.elastic.E_x
+    errors = (_cents(one) for one in (error.in_sample_rms_cents, error.leave_one_out_rms_cents))
+    return (*errors, f"{1e-9 * E_x.mean:.4g} ± {1e-9 * E_x.sd:.2g}")
 
 
 def rows(diagnoses: Mapping[str, Diagnosis]) -> list[tuple[str, ...]]:
@@ -254,8 +260,8 @@ def main() -> None:
     parser.add_argument("boards", nargs="*", default=BOARDS, help="cards (default: the shipped boards)")
     parser.add_argument("--out", type=Path, help="folder for closing-the-loop.csv and .md")
     arguments = parser.parse_args()
-    stated = fit_stated([one for one in STATED if one.board in arguments.boards])
     diagnoses = close_the_loop(arguments.boards)
+    stated = stated_rows(diagnoses)
     print(page(stated, diagnoses))
     if "paper-cantilever-fe" in diagnoses:
         assert "transverse_shear" in diagnoses["paper-cantilever-fe"].effects
