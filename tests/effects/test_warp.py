@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import generator.effects
 import made_boards
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from generator.designs import CANTILEVER
 from generator.known_boards import BEAMS, DRIVEN, HALF_TOP, STEEL
 from generator.warp import Warp as GeneratorWarp
 
+from bayesplate.effects.thickness_profile import ThicknessProfile
 from bayesplate.effects.warp import Warp
 from bayesplate.modes.membrane import CURVATURES
 from bayesplate.plate.parameter import BOARD
@@ -53,6 +55,15 @@ def test_against_the_generator(edges, rises, is_sheared):
     shape = GeneratorWarp(*rises)
     apart = hertz_apart(plate, [warp(plate)], sizes(*rises), [shape], 8, is_sheared)
     assert apart == pytest.approx(0.0, abs=0.5)
+
+
+@pytest.mark.parametrize("tapers", [(0.15, 0.0), (0.0, 0.15)], ids=["along", "across"])
+def test_the_membrane_is_as_thick_as_the_board(tapers):
+    """A board that tapers by 15 % and is warped: half a cent, as for each of the two alone."""
+    values = sizes(1.3e-3, 2e-3, 0.0) | {f"thickness_profile.taper_{a}": t for a, t in zip("xy", tapers, strict=True)}
+    effects = [ThicknessProfile(), warp(HALF_TOP, ("cup", "bow"))]
+    independent = [generator.effects.ThicknessProfile(*tapers), GeneratorWarp(1.3e-3, 2e-3, 0.0)]
+    assert hertz_apart(HALF_TOP, effects, values, independent, 6) == pytest.approx(0.0, abs=0.5)
 
 
 def test_limit_of_a_stiff_section():
