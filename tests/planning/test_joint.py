@@ -9,6 +9,7 @@ import pytest
 
 from bayesplate.planning import joint as home
 from bayesplate.planning.joint import BoardInJoint, Joint
+from bayesplate.plate.material import ORTHOTROPIC
 from bayesplate.plate.setup import DEFAULT_NOISE
 from bayesplate.quantities import Quantity
 
@@ -22,7 +23,8 @@ def member(own, shared, setup=None):
     readings = (None,) * len(own)
     station = SimpleNamespace(setup=SimpleNamespace(readings=readings), n_old=len(own), base=base, is_new=False)
     one = BoardInJoint(
-        board=None, values={}, laws=(SimpleNamespace(station=station),), own=(own,), shared=(shared,),
+        board=SimpleNamespace(symmetry=ORTHOTROPIC), values={},
+        laws=(SimpleNamespace(station=station),), own=(own,), shared=(shared,),
         moduli=np.eye(3), names=("a", "b", "c"), noise=np.array([SD]),
     )  # fmt: skip
     object.__setattr__(one, "variance", lambda setup: np.full(len(own), SD**2))

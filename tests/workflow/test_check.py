@@ -89,15 +89,24 @@ DEAR = (
 
 BOARDS = [pytest.param(name, marks=pytest.mark.slow) if name in DEAR else name for name in card_names("boards")]
 
+ISOTROPIC = {"acrylic-panel", "foam-panel-exciter", "steel-air-water"}
+
 
 @pytest.mark.parametrize("name", BOARDS)
 def test_every_shipped_board_can_be_checked(name):
-    """Leverages sum to the number of constants, energy shares to the whole, less what a support that bounces takes."""
+    """Leverages sum to the number of constants, energy shares to the whole, less what a support that bounces takes.
+
+    So does the spring of an exciter, by no closed formula: that board is checked without it, too.
+    """
     checked = bayesplate.check(name)
+    if "exciter" in (declared := checked.problem.posed.board.effects):
+        assert all(sum(mode.share_percent) < 100.2 for mode in checked.modes)
+        checked = bayesplate.check(name, effects=[one for one in declared if one != "exciter"])
     report = as_json(checked)
     (bounce, *_) = [0.0 if setup.bounce is None else setup.bounce.median for setup in checked.problem.board.setups]
 
-    assert sum(mode["leverage"] for mode in report["modes"]) == pytest.approx(3.0, abs=1e-9)
+    n_constants = 1.0 if name in ISOTROPIC else 3.0
+    assert sum(mode["leverage"] for mode in report["modes"]) == pytest.approx(n_constants, abs=1e-9)
     for mode in report["modes"]:
         taken = 100.0 * (bounce / mode["measured_hz"]) ** 2
         assert sum(mode["share_percent"]) == pytest.approx(100.0 - taken, abs=0.2)  # each is rounded to 0.1
