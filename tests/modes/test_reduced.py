@@ -169,7 +169,7 @@ def test_modes_of_draws_are_named_as_those_of_full_solves(name):
 
 @pytest.mark.parametrize("name", WANTED)
 def test_a_heavier_plate_has_the_same_names_as_surely(name):
-    """Water makes a plate ten times as heavy; a shape fits its name by itself, whatever the mass it is normalised in."""
+    """Water makes a plate ten times as heavy; a shape fits its name whatever the mass it is normalised in."""
     draws, _ = trial(name)
     reduced = prepared(name)[2]
 
