@@ -126,7 +126,7 @@ def known_fits(
     }
 
     def fit_from_shifts(combination: set[str]) -> KnownFit:
-        start = stands.log_rigidities + sum((shifts[name] for name in combination ^ own if name in shifts), np.zeros(3))
+        start = sum((shifts[name] for name in combination ^ own if name in shifts), stands.log_rigidities)
         return known_fit(problem, in_order(combination), start=start)
 
     several = in_threads(fit_from_shifts, far, lambda share: reached(len(first) + share * len(far))) if far else []

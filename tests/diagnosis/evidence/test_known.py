@@ -328,3 +328,13 @@ def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
     constants = dict(zip(RIGIDITIES, problem.estimate.rigidities * np.exp(MOVED), strict=True))
     anew = setup_model(solved.system, {**board.nominal(), **constants}, solved.plate)
     assert [one.rank for one in anew.places] != [one.rank for one in solved.places]
+
+
+def test_of_an_isotropic_plate_every_combination_fits_one_modulus():
+    """And, of two effects together, the one that full solves of a card with both declared give."""
+    posed = Problem.from_card("steel-air-water").posed
+    found = {one.combination: one for one in known_fits(posed, {})}
+
+    assert {one.log_rigidities.shape for one in found.values()} == {(1,)}
+    assert {one.slopes.shape for one in found.values()} == {(10, 1)}
+    assert are_alike(found[SHEAR, AIR], *by_hand("steel-air-water", (SHEAR, AIR)))
