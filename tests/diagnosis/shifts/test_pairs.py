@@ -119,7 +119,7 @@ def test_pairs_with_shear_are_left_to_the_sampler(finnish_few):
 
 
 def test_air_and_exciter_keep_the_labels_of_the_board_without_either():
-    """The air has an exact density: where both are absent it is too, or modes are followed from those of a board in air.
+    """The air has an exact density: where both are absent it is too, or modes are followed from those of a board in it.
 
     Against full solves: a law errs by half a cent, and a place between nodes by another half.
     """
