@@ -12,7 +12,8 @@ from generator.exciter import Exciter as GeneratorExciter
 from generator.known_boards import BEAMS, DRIVEN, FINNISH
 from generator.naming import frequencies
 
-from bayesplate.effects.exciter import Drive, Exciter, Spot
+from bayesplate.effects.drives import Drive, Spot
+from bayesplate.effects.exciter import Exciter
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.model import setup_model
