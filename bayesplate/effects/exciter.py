@@ -156,7 +156,8 @@ class Exciter(Effect):
             for axis, (low, high) in zip("xy", self._ranges, strict=True):
                 middle, words = 0.5 * (low + high), f"place along {axis}"
                 prior = Quantity.from_mean(middle, 2.0 * (high - low), "normal", lower=low, upper=high)
-                found.append(self._parameter(i, f"place_{axis}", (prior, _ANYWHERE), "1", middle, words))
+                place = self._parameter(i, f"place_{axis}", (prior, _ANYWHERE), "1", middle, words)
+                found.append(replace(place, usual=middle))
         return tuple(found)
 
     def _parameter(
