@@ -99,6 +99,8 @@ class Sheet:
     limits : ((n,) array, (n,) array) or None
         Where the board begins and ends along y at `points` of its length, as fractions of its widest width; None: a
         rectangle.
+    isotropic : bool
+        Whether the board has no grain.
     """
 
     title: str
@@ -112,6 +114,7 @@ class Sheet:
     combined: tuple[CombinedMode, ...]
     likely: str = ""
     limits: Limits | None = None
+    isotropic: bool = False
 
     def drawn_at(self, x: float, y: float) -> tuple[float, float]:
         """A place, as fractions of the length and of the width there, as fractions of the sides that are drawn."""
@@ -245,7 +248,10 @@ def sheet(
     first = str(setup.first_label)
     likely = "" if all(row.band_hz is None for row in rows) else _BY_MODES if precision is not None else _BY_PRIOR
     mixtures = _combined(rows)
-    return Sheet(title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, mixtures, likely, limits)
+    return Sheet(
+        title, setup.name, setup.edges, first, ratio, system.theory, basis, rows, mixtures, likely, limits,
+        board.isotropic,
+    )  # fmt: skip
 
 
 def _band(mode: NamedMode, bands: Mapping[str, tuple[float, float]] | None) -> tuple[float, float] | None:

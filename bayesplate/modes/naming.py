@@ -56,15 +56,19 @@ class Found:
     mass: NDArray[np.float64]
 
 
-def name_shapes(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity) -> list[tuple[Beams, float]]:
+def name_shapes(
+    plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity, on_plate: NDArray[np.float64]
+) -> list[tuple[Beams, float]]:
     """Beam product and correlation of each mode of a class, each product given to one mode only.
 
     Parameters
     ----------
     plate : PlateMatrices
     shapes : (n_modes, n_dof_x, n_dof_y) array
-        Mass-normalised deflections of the lowest modes of the class.
+        Deflections of the lowest modes of the class, of any size.
     parity : Parity
+    on_plate : (n_modes,) array
+        Share of the kinetic energy of each that is the plate's, with all that it carries along.
 
     Returns
     -------
@@ -72,7 +76,8 @@ def name_shapes(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parit
         In the order of the modes.
     """
     parts = beam_parts(plate, shapes, parity)
-    products, named = list(parts), name_parts(np.stack(list(parts.values()), axis=1))
+    squares = np.einsum("nij,nij->n", shapes, plate.line_x.mass @ shapes @ plate.line_y.mass)
+    products, named = list(parts), name_parts(fits(np.stack(list(parts.values()), axis=1), squares, on_plate))
     return [(products[column], correlation) for column, correlation in named]
 
 
@@ -89,6 +94,25 @@ def beam_parts(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity
     beams_y = plate.line_y.beams.T @ plate.line_y.mass
     correlations = beams_x @ shapes @ beams_y.T
     return {(i, j): correlations[:, i, j] for i, j in plate.elastic_products[parity]}
+
+
+def fits(
+    parts: NDArray[np.float64], squares: NDArray[np.float64], on_plate: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """How well each shape fits each product: its correlation by the root of the plate's share of the motion.
+
+    A shape is measured by itself, for the water that a plate carries along may weigh ten times what it weighs, and
+    changes no shape by it. A magnet that bounces on its spring bends the plate a little, in a shape like that of the
+    lowest mode: by the share it takes no name.
+
+    Parameters
+    ----------
+    parts : (n_modes, n_products) array
+    squares : (n_modes,) array
+        Mean square of the deflection.
+    on_plate : (n_modes,) array
+    """
+    return np.asarray(parts * np.sqrt(np.maximum(on_plate, 0.0) / squares)[:, None])
 
 
 def name_parts(parts: NDArray[np.float64]) -> list[tuple[int, float]]:
@@ -115,7 +139,8 @@ def name_modes(modes: Modes) -> list[tuple[Beams, float]]:
     names: dict[int, tuple[Beams, float]] = {}
     for parity in set(modes.parities):
         members = [i for i, p in enumerate(modes.parities) if p == parity]
-        names |= zip(members, name_shapes(modes.plate, modes.shapes[members], parity), strict=True)
+        on_plate = modes.classes[parity].on_plate[modes.ranks[members]]
+        names |= zip(members, name_shapes(modes.plate, modes.shapes[members], parity, on_plate), strict=True)
     return [names[i] for i in range(len(names))]
 
 
@@ -199,7 +224,7 @@ def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) 
 def _places(plate: PlateMatrices, modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
     """Those of the wanted names that some of the lowest modes of a class have."""
     parity = modes.block.parity
-    of_each = name_shapes(plate, modes.block.spread(modes.vectors), parity)
+    of_each = name_shapes(plate, modes.block.spread(modes.vectors), parity, modes.on_plate)
     return {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}
 
 

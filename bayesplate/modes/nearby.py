@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bayesplate.modes.banded import BandFactor
 from bayesplate.modes.plate import Block, Weights
-from bayesplate.modes.solve import ClassModes, shift_below
+from bayesplate.modes.solve import ClassModes, class_modes, shift_below
 
 Floats = NDArray[np.float64]
 
@@ -57,8 +57,7 @@ def modes_nearby(block: Block, weights: Weights, known: ClassModes, n_modes: int
     for _ in range(_N_STEPS):
         loads = _without_rigid(loads, vectors[:, : block.n_rigid])
         values, vectors, loads = _ritz(block, weights, pencil, factor.solve(loads))
-    first, last = block.n_rigid, block.n_rigid + n_modes
-    return ClassModes(block, values[first:last], vectors[:, first:last], vectors[:, :first])
+    return class_modes(block, weights, values[: block.n_rigid + n_modes], vectors)
 
 
 def _factor(block: Block, stored: Floats) -> Any:

@@ -270,6 +270,26 @@ class Block:
         further = self._on_span(self.projected_terms, vectors)
         return np.tensordot(weights.stiffness[..., len(self.terms) :], further, axes=1)
 
+    def beside(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The coordinates beside the plate in (n_dof, n_vectors) vectors: (n_beside, n_vectors) array."""
+        return vectors[self.n_dof - self.n_beside :]
+
+    @cached_property
+    def masses_beside(self) -> NDArray[np.float64]:
+        """What each stored mass term gives to the coordinates beside the plate: (n_masses, n_beside) array."""
+        return self.masses[:, self.diagonal[self.n_dof - self.n_beside :]]
+
+    def share_on_plate(self, weights: Weights, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Share of the kinetic energy that is no magnet's: (n_vectors,) array.
+
+        Parameters
+        ----------
+        weights : Weights
+        vectors : (n_dof, n_vectors) array
+            Normalised in the mass of these weights.
+        """
+        return np.asarray(1.0 - (weights.mass[: len(self.masses)] @ self.masses_beside) @ self.beside(vectors) ** 2)
+
     def _on_span(self, terms: Sequence[OnDeflections], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         if not terms:
             return np.empty((0, vectors.shape[1], vectors.shape[1]))

@@ -6,14 +6,14 @@ its diagonal at the centre is the linear law. `bayesplate.modes.reduction` build
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.definite import packed
-from bayesplate.modes.naming import Place, name_parts
+from bayesplate.modes.naming import Place, fits, name_parts
 from bayesplate.modes.pencils import (
     condensed_eigenvalues,
     pencil_eigenvalues,
@@ -56,6 +56,10 @@ class ReducedBlock:
         modes of each draw are found from so many of them (`bayesplate.modes.pencils`).
     n_steps : int
         Steps of inverse iteration that they go; where it is 0, they take all others along to first order instead.
+    squares : (r, r) array
+        Mean products of the vectors' deflections.
+    beside : (n_masses, r, r) array
+        What each mass term gives to the coordinates beside the plate.
     """
 
     parity: Parity
@@ -67,6 +71,8 @@ class ReducedBlock:
     shift: float = 1.0
     n_kept: int = 0
     n_steps: int = 0
+    squares: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    beside: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0, 0)))
 
     def eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
         """Elastic eigenvalues of many draws, increasing: (n_draws, n) array, s^-2.
@@ -144,10 +150,16 @@ class ReducedBlock:
         values, vectors = self.modes(weights, n_modes)
         for draw in np.flatnonzero(np.isfinite(values).all(axis=1)):
             found[draw] = n_modes
-            for mode, (product, correlation) in enumerate(name_parts(vectors[draw].T @ self.parts)):
+            for mode, (product, correlation) in enumerate(name_parts(self._fits(weights.mass[draw], vectors[draw]))):
                 if correlation >= least:
                     found[draw, product] = mode
         return found
+
+    def _fits(self, mass: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How well each mode of a draw fits each product: (n_modes, n_products) array."""
+        forms = np.stack([self.squares, np.tensordot(mass[: len(self.beside)], self.beside, axes=1)])
+        squares, beside = np.einsum("rm,frs,sm->fm", vectors, forms, vectors, optimize=True)
+        return fits(vectors.T @ self.parts, squares, 1.0 - beside)
 
     def energies(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What each term has of the lowest modes of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays.

@@ -197,10 +197,17 @@ def _projected(
     stiffness = block.project(block.stored_stiffness(points), basis) + block.further_stiffness(points, basis)
     size = basis.shape[1]
     masses = np.empty((0, size, size)) if is_steady else block.project_masses(basis)
-    parts = beam_parts(plate, block.spread(basis), block.parity)
+    deflections = block.spread(basis)
+    parts = beam_parts(plate, deflections, block.parity)
     named = np.stack(list(parts.values()), axis=1)
+    weighed = plate.line_x.mass @ deflections @ plate.line_y.mass
+    squares = deflections.reshape(size, -1) @ weighed.reshape(size, -1).T
+    magnets = block.beside(basis)
+    beside = np.einsum("kj,jr,js->krs", block.masses_beside, magnets, magnets, optimize=True)
     first = float(centre.eigenvalues[0])
-    return ReducedBlock(block.parity, stiffness, masses, named, tuple(parts), n_rigid, first)
+    return ReducedBlock(
+        block.parity, stiffness, masses, named, tuple(parts), n_rigid, first, squares=squares, beside=beside
+    )
 
 
 def _worst_cents(block: ReducedBlock, checked: Weights, exact: NDArray[np.float64]) -> float:
@@ -248,7 +255,9 @@ def _on_modes(
 
 def _turned(whole: ReducedBlock, turn: NDArray[np.float64]) -> ReducedBlock:
     stiffness, masses = (turn.T @ terms @ turn for terms in (whole.stiffness, whole.masses))
-    return replace(whole, stiffness=stiffness, masses=masses, parts=turn.T @ whole.parts)
+    squares, beside = turn.T @ whole.squares @ turn, turn.T @ whole.beside @ turn
+    parts = turn.T @ whole.parts
+    return replace(whole, stiffness=stiffness, masses=masses, parts=parts, squares=squares, beside=beside)
 
 
 def _is_steady(points: Sequence[Weights]) -> bool:

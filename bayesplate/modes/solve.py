@@ -34,16 +34,22 @@ class ClassModes:
         Mass-normalised.
     rigid : (n_dof, n_rigid) array
         The class's rigid motions, mass-normalised.
+    on_plate : (n_modes,) array
+        Share of the kinetic energy of each mode that is not of coordinates beside the plate.
     """
 
     block: Block
     eigenvalues: NDArray[np.float64]
     vectors: NDArray[np.float64]
     rigid: NDArray[np.float64]
+    on_plate: NDArray[np.float64]
 
     def of(self, ranks: Sequence[int] | NDArray[np.intp]) -> ClassModes:
         """Some of the modes."""
-        return replace(self, eigenvalues=self.eigenvalues[list(ranks)], vectors=self.vectors[:, list(ranks)])
+        own = list(ranks)
+        return replace(
+            self, eigenvalues=self.eigenvalues[own], vectors=self.vectors[:, own], on_plate=self.on_plate[own]
+        )
 
     def coefficients(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """phi' K_i phi and phi' M_j phi of each mode: (n_modes, n_terms) and (n_modes, n_masses) arrays.
@@ -88,10 +94,16 @@ def solve_class(block: Block, weights: Weights, n_modes: int) -> ClassModes:
         tol=_TOLERANCE,
     )
     values, vectors = _ritz(block, weights, stiffness, mass, vectors)
-    n_last = block.n_rigid + n_modes
-    return ClassModes(
-        block, values[block.n_rigid : n_last], vectors[:, block.n_rigid : n_last], vectors[:, : block.n_rigid]
-    )
+    return class_modes(block, weights, values[: block.n_rigid + n_modes], vectors)
+
+
+def class_modes(
+    block: Block, weights: Weights, values: NDArray[np.float64], vectors: NDArray[np.float64]
+) -> ClassModes:
+    """Modes of a class from its lowest eigenvalues and at least as many vectors, rigid motions first."""
+    elastic = vectors[:, block.n_rigid : values.size]
+    rigid, on_plate = vectors[:, : block.n_rigid], block.share_on_plate(weights, elastic)
+    return ClassModes(block, values[block.n_rigid :], elastic, rigid, on_plate)
 
 
 def shift_below(block: Block, stiffness: NDArray[np.float64], mass: NDArray[np.float64]) -> float:

@@ -63,7 +63,9 @@ def board_picture(board: Board) -> Picture:
         panel = figure.add_axes((left / WIDTH, bottom / height, size[0] / WIDTH, size[1] / height))
         panel.set(xlim=(0, length), ylim=(0, width))
         panel.set_axis_off()
-        _draw_board(panel, setup, outline, values, scale)
+        if not board.isotropic:
+            _draw_grain(panel, outline)
+        _draw_board(panel, setup, outline, values, scale, _along(board))
         if len(board.setups) > 1:
             heading = (length / 2, width + 0.3 / scale)
             panel.text(*heading, short(setup.name, 44), ha="center", fontsize=WORDS, weight="bold", parse_math=False)
@@ -73,16 +75,17 @@ def board_picture(board: Board) -> Picture:
             handles=list(handles.values()), loc="lower center", ncols=3, frameon=False, fontsize=SMALL,
             handletextpad=0.4,
         )  # fmt: skip
-    caption = _CAPTION if all(one.is_rectangle for one in outlines) else f"{_CAPTION} {_OUTLINE}"
+    caption = " ".join([_SEEN, *([] if board.isotropic else [_GRAIN]), _EDGES])
+    if not all(one.is_rectangle for one in outlines):
+        caption = f"{caption} {_OUTLINE}"
     if _is_warped(board):
         caption = f"{caption} {_WARP}"
     return Picture("board", "The board, drawn to scale", _alt(board, values, outlines), caption, figure)
 
 
-_CAPTION = (
-    "Seen from above, drawn to scale. The fine lines run along the grain. Hatched: held by a clamp; dashed: resting on "
-    "a support; thin: free."
-)
+_SEEN = "Seen from above, drawn to scale."
+_GRAIN = "The fine lines run along the grain."
+_EDGES = "Hatched: held by a clamp; dashed: resting on a support; thin: free."
 _OUTLINE = (
     "The outline is what the readings of the width make probable. Which edge recedes they do not say: where both are "
     "free, both are drawn to recede alike."
@@ -136,12 +139,16 @@ def _outline(system: System, values: Values) -> _Outline:
     return _Outline(x, low * width, float(adjusted["length_y"]) - (1.0 - high) * width, limits is None)
 
 
-def _draw_board(panel: Axes, setup: Setup, outline: _Outline, values: Values, scale: float) -> None:
-    """Grain, edges and dimensions."""
-    length, width = float(values["length_x"]), outline.width
-    for y in np.linspace(0, width, _N_GRAIN + 2)[1:-1]:
+def _draw_grain(panel: Axes, outline: _Outline) -> None:
+    """Fine lines along the board."""
+    for y in np.linspace(0, outline.width, _N_GRAIN + 2)[1:-1]:
         within = (outline.low <= y) & (y <= outline.high)
         panel.plot(outline.x, np.where(within, y, np.nan), color=LIGHT, lw=0.7, zorder=1)
+
+
+def _draw_board(panel: Axes, setup: Setup, outline: _Outline, values: Values, scale: float, along: str) -> None:
+    """Edges and dimensions."""
+    length, width = float(values["length_x"]), outline.width
     covered = {edge: float(values[setup.input_name(edge)]) for edge in setup.clamped}
     low_x, high_x = covered.get("x0", 0.0), length - covered.get("x1", 0.0)
     low_y, high_y = covered.get("y0", 0.0), width - covered.get("y1", 0.0)
@@ -152,7 +159,7 @@ def _draw_board(panel: Axes, setup: Setup, outline: _Outline, values: Values, sc
     panel.plot(around, np.concatenate([outline.low, outline.high[::-1], outline.low[:1]]), color=GREY, lw=0.7,
                clip_on=False, zorder=2)  # fmt: skip
     across = 0.34 / scale
-    _dimension(panel, (0, -across), (length, -across), f"{length * 1e3:.4g} mm, along the grain", below=True)
+    _dimension(panel, (0, -across), (length, -across), f"{length * 1e3:.4g} mm, {along}", below=True)
     _dimension(panel, (-across, 0), (-across, width), outline.across(), below=False)
 
 
@@ -264,8 +271,13 @@ def _points(panel: Axes, places: Sequence[tuple[float, float]], marker: str, lab
     return panel.plot(x, y, marker=marker, label=label, **style)[0]
 
 
+def _along(board: Board) -> str:
+    """What the length of a board runs along."""
+    return "along x" if board.isotropic else "along the grain"
+
+
 def _alt(board: Board, values: Values, outlines: Sequence[_Outline]) -> str:
-    size = f"{float(values['length_x']) * 1e3:.4g} mm along the grain, {outlines[0].across()}"
+    size = f"{float(values['length_x']) * 1e3:.4g} mm {_along(board)}, {outlines[0].across()}"
     held = []
     for setup in board.setups:
         words = ", ".join(f"{edge} {word}" for edge, word in setup.edges.items())

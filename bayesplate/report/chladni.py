@@ -12,7 +12,7 @@ from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.frequencies.system import Limits
 from bayesplate.report.style import BLUE, GREEN, VERMILLION, drawable
 from bayesplate.report.symbols import in_figure
-from bayesplate.results.words import STIFFNESS
+from bayesplate.results.words import STIFFNESS, STIFFNESS_OF_ISOTROPIC
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -159,10 +159,11 @@ def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> No
     told = "No board rings like this: the mixtures show where each stiffness is at work (darker: moves more)."
     _text(figure, A4[0] / 2, top - 0.28, told, fontsize=8)
     wide = replace(plan, cell=((A4[0] - 2 * _MARGIN) / _N_COMBINED, plan.cell[1]))
+    names = STIFFNESS_OF_ISOTROPIC if sheet.isotropic else STIFFNESS
     for column, one in enumerate(sheet.combined):
         panel = _panel(figure, wide, _left(wide, column, len(sheet.combined)), top - _BETWEEN + _GAP / 2, sheet)
         _draw_mixture(panel, one, sheet.limits)
-        _caption(panel, one.name, f"{STIFFNESS[one.modulus]}, {in_figure(one.modulus)}")
+        _caption(panel, one.name, f"{names[one.modulus]}, {in_figure(one.modulus)}")
 
 
 def _left(plan: Layout, column: int, in_row: int) -> float:
@@ -259,10 +260,11 @@ def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:
     """What the drawing means, at the foot of the page."""
     drawn = {"clamped": "hatched", "supported": "dashed", "free": "thin"}
     edges = ", ".join(f"{drawn[word]} = {word}" for word in dict.fromkeys(sheet.edges.values()))
+    along, begins = ("x", "x") if sheet.isotropic else ("the grain", "The grain")
     lines = (
-        f"Edges: {edges}. The grain runs from left to right.",
+        f"Edges: {edges}. {begins} runs from left to right.",
         "Black lines stay at rest, sand gathers there; white and grey parts move against each other.",
-        "A name counts the lines crossed on the way along the grain, then on the way across it; "
+        f"A name counts the lines crossed on the way along {along}, then on the way across it; "
         f"here the counts begin at {sheet.first_label}.",
     )
     told = [f"Likely: two times in three, {sheet.likely}."] if sheet.likely else []

@@ -12,7 +12,7 @@ from bayesplate.plate.material import MODULI
 from bayesplate.report.style import PAPER, POSTERIOR, SMALL, WEIGHTED, WORDS, Picture, legend_below, plain_axes, stacked
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.summary import Percentile, Summary
-from bayesplate.results.words import GPA, STIFFNESS, interval, plus_minus
+from bayesplate.results.words import GPA, STIFFNESS, STIFFNESS_OF_ISOTROPIC, interval, plus_minus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,9 +68,9 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
     return Picture("constants", "The elastic constants", f"Three distributions: {told}.", caption, figure)
 
 
-def modulus_title(name: str) -> str:
+def modulus_title(name: str, *, isotropic: bool = False) -> str:
     """What stands above the panel of a modulus."""
-    return f"{in_figure(name)}: {STIFFNESS[name]}"
+    return f"{in_figure(name)}: {(STIFFNESS_OF_ISOTROPIC if isotropic else STIFFNESS)[name]}"
 
 
 def _draw(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64]) -> None:
@@ -96,7 +96,7 @@ def _draw(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64])
     _mark(panel, paper, limits, "paper's least squares", color="#9A6A00", ls=":", lw=2.0)
     _mark(panel, weighted, limits, "weighted least squares", color=WEIGHTED, ls="--", lw=1.2)
     panel.set(xlim=limits, ylim=(0, 1.04), yticks=[])
-    panel.set_title(modulus_title(name), fontsize=WORDS, loc="left", weight="bold")
+    panel.set_title(modulus_title(name, isotropic=summary.model.isotropic), fontsize=WORDS, loc="left", weight="bold")
     panel.set_xlabel(f"GPa    ({plus_minus(entry, GPA)})", fontsize=SMALL)
     panel.spines["left"].set_visible(False)
 

@@ -80,7 +80,8 @@ def constants_table(summary: Summary, title: str) -> Table:
         points = (summary.least_squares, summary.weighted_least_squares)
         cells = (number(estimate[name], digits, factor=GPA) for estimate in points)
         trimmed = _trimmed(summary.percentile, name)
-        rows.append((constant_name(name), plus_minus(entry, GPA), interval(entry, GPA), *cells, trimmed))
+        told = constant_name(name, isotropic=summary.model.isotropic)
+        rows.append((told, plus_minus(entry, GPA), interval(entry, GPA), *cells, trimmed))
     columns = ("GPa", "mean ± sd", "90 % interval", "paper's least squares", "weighted", "percentile method")
     return Table(title, columns, tuple(rows))
 

@@ -20,6 +20,7 @@ _STYLES = {
     "G_xy": (GREEN, "..", "twisting, G_xy"),
     "effects": (GREY, "xx", "effects"),
 }
+_OF_ISOTROPIC = {"E_x": (BLUE, "", "bending along x"), "E_y": (ORANGE, "////", "bending along y")}
 _ROW = 0.27
 
 
@@ -46,7 +47,8 @@ def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Pi
     figure, (panel,) = stacked([_ROW * len(modes) + 0.05], left=left, right=0.75, top=0.28, bottom=0.98)
     rows = np.arange(len(modes))
     start = np.zeros(len(modes))
-    for share, (colour, hatch, label) in zip(shares.T, _STYLES.values(), strict=False):
+    styles = _STYLES | (_OF_ISOTROPIC if found.symmetry.is_isotropic else {})
+    for share, (colour, hatch, label) in zip(shares.T, styles.values(), strict=False):
         wide = np.maximum(share, 0.0)
         panel.barh(
             rows, 100 * wide, left=100 * start, height=0.72, color=colour, hatch=hatch, edgecolor="white", lw=0.6,

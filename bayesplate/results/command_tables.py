@@ -12,6 +12,7 @@ from bayesplate.results.words import (
     MISSING,
     chances,
     decimals,
+    is_isotropic,
     mode_name,
     narrow_name,
     number,
@@ -41,7 +42,7 @@ def check_tables(report: CheckReport) -> tuple[Table, ...]:
     """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
     constants = tuple(
         (
-            narrow_name(name),
+            narrow_name(name, isotropic=is_isotropic(report.estimate)),
             number(estimate, decimals(estimate * report.expected_sd_percent[name] / 100 * GPA), factor=GPA),
             f"± {two_digits(report.expected_sd_percent[name])} %",
         )

@@ -94,7 +94,14 @@ class Spread:
 
     @classmethod
     def of(cls, values: NDArray[np.float64], unit: str) -> Spread:
-        """Those of draws, in an array of any shape."""
+        """Those of draws, in an array of any shape.
+
+        An exact value is the same in every draw. It has no spread, but the rounding of a mean would give it one, and a
+        number is written with as many digits as its spread has meaning.
+        """
+        if np.all(values == values.flat[0]):
+            exact = float(values.flat[0])
+            return cls(exact, 0.0, exact, exact, exact, exact, exact, unit)
         q05, q25, q50, q75, q95 = (float(value) for value in np.quantile(values, _QUANTILES))
         return cls(float(np.mean(values)), float(np.std(values, ddof=1)), q05, q25, q50, q75, q95, unit)
 

@@ -239,7 +239,8 @@ class Summary(Run):
     def _repr_html_(self) -> str:
         """The constants as a notebook shows them."""
         rows = "".join(
-            f"<tr><th>{constant_name(name)}</th><td>{plus_minus(entry, GPA)}</td><td>{interval(entry, GPA)}</td></tr>"
+            f"<tr><th>{constant_name(name, isotropic=self.model.isotropic)}</th>"
+            f"<td>{plus_minus(entry, GPA)}</td><td>{interval(entry, GPA)}</td></tr>"
             for name, entry in self.elastic.items()
         )
         head = "<tr><th>GPa</th><th>mean ± sd</th><th>90 % interval</th></tr>"

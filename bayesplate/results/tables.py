@@ -53,7 +53,8 @@ def constants_table(summary: Summary) -> Table:
         entry = summary.elastic[name]
         least_squares = number(summary.weighted_least_squares[name], decimals(entry.sd * GPA), factor=GPA)
         share = two_digits(entry.sd / entry.mean, 100)
-        rows.append((narrow_name(name), plus_minus(entry, GPA), interval(entry, GPA), share, least_squares))
+        told = narrow_name(name, isotropic=summary.model.isotropic)
+        rows.append((told, plus_minus(entry, GPA), interval(entry, GPA), share, least_squares))
     return Table(
         f"Elastic constants of {summary.name}, GPa",
         ("constant", "mean ± sd", "90 % interval", "sd, %", "weighted"),

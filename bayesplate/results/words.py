@@ -12,12 +12,15 @@ MISSING = "–"
 """Stands where there is no number."""
 
 CONSTANTS = {"E_x": "along the grain", "E_y": "across the grain", "G_xy": "shear"}
+_ANY = "in any direction"
+CONSTANTS_OF_ISOTROPIC = {"E_x": _ANY, "E_y": _ANY, "G_xy": "shear"}
 STIFFNESS = {
     "E_x": "stiffness along the grain",
     "E_y": "stiffness across the grain",
     "G_xy": "shear stiffness",
 }
 """What each modulus is, to be read without its symbol."""
+STIFFNESS_OF_ISOTROPIC = {"E_x": f"stiffness {_ANY}", "E_y": f"stiffness {_ANY}", "G_xy": "shear stiffness"}
 
 _ALIKE = 1e-12
 _MOST_DECIMALS = 8
@@ -47,14 +50,19 @@ class Interval(Uncertain, Protocol):
         """The upper end."""
 
 
-def constant_name(name: str) -> str:
-    """A modulus with its words: "E_x, along the grain"."""
-    return f"{name}, {CONSTANTS[name]}"
+def constant_name(name: str, *, isotropic: bool = False) -> str:
+    """A modulus with its words: "E_x, along the grain"; an isotropic plate has no grain."""
+    return f"{name}, {(CONSTANTS_OF_ISOTROPIC if isotropic else CONSTANTS)[name]}"
 
 
-def narrow_name(name: str) -> str:
-    """The same for a table of 80 columns: "E_x, along grain"."""
-    return constant_name(name).replace(" the ", " ")
+def narrow_name(name: str, *, isotropic: bool = False) -> str:
+    """The same for a table of 80 columns: "E_x, along grain", "E_x, any direction"."""
+    return constant_name(name, isotropic=isotropic).replace(" the ", " ").replace(" in any ", " any ")
+
+
+def is_isotropic(moduli: Mapping[str, object]) -> bool:
+    """Whether E_x and E_y are one modulus: to the last digit they agree of isotropic plates alone."""
+    return moduli["E_x"] == moduli["E_y"]
 
 
 def decimals(sd: float) -> int:

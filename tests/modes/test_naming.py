@@ -8,13 +8,24 @@ from itertools import product
 import numpy as np
 import pytest
 import ritz
+from effect_plates import MADE, modes_of, setup_of
+from generator.designs import CANTILEVER
+from generator.effects import FluidLoading as GeneratorFluid
+from generator.exciter import Exciter as GeneratorExciter
+from generator.known_boards import DRIVEN
+from generator.naming import correlations, named
+from generator.plate import Plate
+from generator.plate import solve as generated
 
+from bayesplate.effects.exciter import Drive, Exciter
+from bayesplate.effects.fluid_loading import FluidLoading
 from bayesplate.labels import HIGHEST_ORDER
 from bayesplate.modes.mesh import mesh
-from bayesplate.modes.naming import CERTAIN, find, name_modes, product_coefficients
+from bayesplate.modes.naming import CERTAIN, beam_parts, find, fits, name_modes, product_coefficients
 from bayesplate.modes.plate import Weights, is_rigid
 from bayesplate.modes.solve import solve
 from bayesplate.modes.thin import thin_plate
+from bayesplate.quantities import Quantity
 
 # Beam products in the order of the frequencies, (0, 0) the lowest beam function of each side.
 ORDER = {
@@ -182,3 +193,41 @@ def test_beam_products_bound_the_lowest_mode_from_above(board, order):
     lowest = find(plate, weights, order[:1])[order[0]].eigenvalue
 
     assert lowest <= quotients[order[0]] < 1.2 * lowest
+
+
+STRIP = Plate.isotropic(70e9, 0.33, 2700.0, 2e-3, 0.300, 0.100, CANTILEVER)
+
+
+def test_names_in_water_are_as_sure_as_in_air():
+    """The water on this strip weighs up to fifty times what the strip does, and changes its shapes hardly."""
+    fluid = FluidLoading(MADE, STRIP.L_x / STRIP.L_y)
+    found = name_modes(modes_of(STRIP, [fluid], {"fluid_loading.density": 997.0, "fluid_loading.baffle": 0.0}, 5))
+    independent = named(generated(STRIP, [GeneratorFluid(997.0)], 8), CANTILEVER)
+
+    assert {(0, 0), (0, 1), (1, 0)} < {beams for beams, _ in found}
+    # The package's water is made of fewer panels, which moves shapes by less than a hundredth.
+    assert dict(found) == pytest.approx({beams: independent[beams][1] for beams, _ in found}, abs=0.01)
+    assert min(fit for _, fit in found) > 0.9
+
+
+def test_a_magnet_that_bounces_takes_no_name_from_the_board():
+    """Of a heavy drive in the middle of a clamped board the magnet's mode has the better shape of the two."""
+    middle = (0.5, 0.5)
+    drive = Drive(*((Quantity.exact(value), "") for value in (48e-3, 1.6e-3, 38.6)), True, False, (middle,))
+    setup = setup_of(DRIVEN)
+    effect = Exciter(MADE, (drive,), setup.ends_x, setup.ends_y, (1, 2))
+    sizes = {"exciter.mass": 48e-3, "exciter.coil": 1.6e-3, "exciter.resonance": 38.6}
+    modes = modes_of(DRIVEN, [effect], sizes, 2)
+    at = ((0.5 * DRIVEN.L_x, 0.5 * DRIVEN.L_y),)
+    independent = generated(DRIVEN, [GeneratorExciter.at_resonance(38.6, 48e-3, at)], 8)
+    table = correlations(independent, ("clamped",) * 4)[:2, 0]
+    plate, (parity,) = modes.plate, set(modes.parities[:1])
+    parts = beam_parts(plate, modes.shapes[:2], parity)[0, 0]
+    squares = np.einsum("nij,nij->n", modes.shapes, plate.line_x.mass @ modes.shapes @ plate.line_y.mass)
+    on_plate = modes.classes[parity].on_plate[modes.ranks]
+    own, whole = fits(parts[:, None], squares, on_plate), fits(parts[:, None], squares, np.ones(2))
+
+    # A point force converges slowly on the generator's polynomials.
+    assert np.abs(own[:, 0]) == pytest.approx(table, abs=0.01)
+    assert np.abs(whole[0, 0]) > np.abs(whole[1, 0]), "by shape alone the magnet's mode would be the board's"
+    assert np.abs(own[0, 0]) < np.abs(own[1, 0])

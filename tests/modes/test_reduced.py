@@ -168,6 +168,18 @@ def test_modes_of_draws_are_named_as_those_of_full_solves(name):
 
 
 @pytest.mark.parametrize("name", WANTED)
+def test_a_heavier_plate_has_the_same_names_as_surely(name):
+    """Water makes a plate ten times as heavy; a shape fits its name whatever the mass it is normalised in."""
+    draws, _ = trial(name)
+    reduced = prepared(name)[2]
+
+    ranks, heavier = (reduced.ranks(Weights(draws.stiffness, n * draws.mass), 0.75) for n in (1.0, 10.0))
+
+    assert all(np.array_equal(heavier[beams], own) for beams, own in ranks.items())
+    assert sum(int(np.sum(own < 8)) for own in ranks.values()) > 0
+
+
+@pytest.mark.parametrize("name", WANTED)
 def test_eigenvalues_are_homogeneous_of_degree_one_in_the_stiffness(name):
     draws, _ = trial(name)
     reduced = prepared(name)[2]

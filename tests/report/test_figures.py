@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from diagnoses import DIAGNOSES
+from made_isotropic import steel
 from made_reports import fitted
 from made_summaries import spread
 from payloads import PAYLOADS
@@ -19,6 +20,7 @@ from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
 from bayesplate.report.board import board_picture
 from bayesplate.report.chladni import chladni_sheet
+from bayesplate.report.constants import modulus_title
 from bayesplate.report.content import inputs_table
 from bayesplate.report.health import health_picture
 from bayesplate.report.null_control import null_picture
@@ -183,6 +185,24 @@ def test_a_board_that_is_not_flat_is_drawn_so():
     assert not any(str(label).startswith("twist") for label in lines)
     assert picture.alt.endswith("Not flat: cup 1 mm, bow -4 mm.")
     assert "lies along it and across it" in picture.caption
+
+
+def test_a_plate_without_grain_is_drawn_and_told_so():
+    """Board, panels of the constants and printed sheet; the same board with a grain has lines and words of it."""
+    told = {}
+    for isotropic in (True, False):
+        board = steel(isotropic=isotropic)
+        picture = board_picture(board)
+        panel = picture.figure.axes[0]
+        words = [picture.alt, picture.caption, modulus_title("E_x", isotropic=isotropic)]
+        values = {**board.nominal(), "D_x": 13e3, "D_y": 13e3, "D_s": 18e3}
+        drawn = chladni_sheet(sheet(board, system_of(board, board.setups[0]), values, "as given")).texts
+        words += [text.get_text() for text in (*panel.texts, *drawn)]
+        told[isotropic] = sum("grain" in text for text in words), len(panel.lines)
+
+    assert told[True][0] == 0
+    assert told[False][0] >= 5
+    assert told[False][1] > told[True][1], "the lines of the grain"
 
 
 def test_figures_of_a_board_that_narrows_end_at_its_outline(tapered):

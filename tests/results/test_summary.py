@@ -133,3 +133,11 @@ def test_it_shows_itself_in_a_line_and_in_a_notebook():
     assert "<caption>&lt;b&gt;</caption>" in html
     assert "<th>E_y, across the grain</th><td>1.00 ± 0.12</td><td>0.75 to 1.25</td>" in html
     assert html.count("<tr>") == 1 + len(Elastic.NAMES)
+
+
+def test_the_spread_of_an_exact_value_is_none():
+    """The mean of many 1.2 is 1.2 but for rounding, which no reader may take for an uncertainty of 2e-16."""
+    found = Spread.of(np.full((1000, 32), 1.2), "kg/m3")
+
+    assert (found.mean, found.sd, found.q05, found.q95) == (1.2, 0.0, 1.2, 1.2)
+    assert np.std(np.full((1000, 32), 1.2), ddof=1) > 0, "else the test shows nothing"

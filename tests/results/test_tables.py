@@ -11,7 +11,7 @@ from made_summaries import SUMMARY, mode, spread
 from bayesplate.report import content
 from bayesplate.results.contract import Elastic
 from bayesplate.results.tables import constants_table, modes_table, peaks_table, rounding_that_decides
-from bayesplate.results.words import decimals, interval, number, percent, plus_minus, rounded, two_digits
+from bayesplate.results.words import decimals, interval, is_isotropic, number, percent, plus_minus, rounded, two_digits
 from bayesplate.workflow.prepare import prepare
 from bayesplate.workflow.shown import show_fit
 
@@ -26,6 +26,20 @@ def test_constants_beside_their_least_squares():
     assert table.rows[0] == ("E_x, along grain", "10.50 ± 0.25", "10.00 to 11.00", "2.4", "10.25")
     assert column(table, "weighted") == ["10.25", "1.12", "0.500"]
     assert table.title == "Elastic constants of made, GPa"
+
+
+def test_an_isotropic_plate_has_no_grain():
+    """Its two moduli are one, which is all that a report without the card's word can see."""
+    one = replace(SUMMARY, model=replace(SUMMARY.model, isotropic=True))
+
+    for found in (constants_table(one), content.constants_table(one, "made")):
+        assert [row[0].replace(" in ", " ") for row in found.rows] == [
+            "E_x, any direction", "E_y, any direction", "G_xy, shear",
+        ]  # fmt: skip
+    assert "grain" in SUMMARY._repr_html_()
+    assert "grain" not in one._repr_html_()
+    assert is_isotropic({"E_x": 2.0, "E_y": 2.0})
+    assert not is_isotropic({"E_x": 2.0, "E_y": 2.0 + 1e-12})
 
 
 def test_the_columns_of_the_modes_agree_with_each_other():

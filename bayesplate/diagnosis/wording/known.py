@@ -16,7 +16,7 @@ from bayesplate.results.contract import rms
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING
 
-_COMPUTED = "Computed at its known size, with nothing fitted but the three constants by weighted least squares, "
+_COMPUTED = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
 AS_IT_STANDS = "as it stands"
 _RISES = (
     " Where the error rises, something that acts the other way is lacking, or the effect has another size on this "
@@ -26,7 +26,7 @@ _RISES = (
 
 @dataclass(frozen=True, kw_only=True)
 class KnownModel:
-    """The board with effects of known sizes, nothing fitted but the three constants: errors and change of the moduli.
+    """The board with effects of known sizes, nothing fitted but the constants: errors and change of the moduli.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ from bayesplate.diagnosis.wording.words import CONDITIONS, MERITS, MISSING, Meri
 from bayesplate.effects.words import effect_name
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.tables import Table
-from bayesplate.results.words import GPA, decimals, interval, narrow_name, number, plus_minus
+from bayesplate.results.words import GPA, decimals, interval, is_isotropic, narrow_name, number, plus_minus
 
 _WORTH_A_ROW = 0.01
 _NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")
@@ -92,8 +92,9 @@ def what_is_quoted(diagnosis: Diagnosis) -> str:
 
 def averaged_table(diagnosis: Diagnosis) -> Table:
     """The moduli to quote."""
-    every = diagnosis.elastic_averaged.items()
-    rows = tuple((narrow_name(name), plus_minus(one, GPA), interval(one, GPA)) for name, one in every)
+    every = diagnosis.elastic_averaged
+    names = {name: narrow_name(name, isotropic=is_isotropic(every)) for name in every}
+    rows = tuple((names[name], plus_minus(one, GPA), interval(one, GPA)) for name, one in every.items())
     return Table(f"The constants, {what_is_quoted(diagnosis)}, GPa", ("constant", "mean ± sd", "90 % interval"), rows)
 
 

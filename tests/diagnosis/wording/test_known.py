@@ -20,7 +20,7 @@ from bayesplate.report.verdict import diagnosis_section
 
 CENTS = np.log(2.0) / 1200.0
 STANDS, SHEAR, AIR, _, SENSOR = KNOWN
-BEGINNING = "Computed at its known size, with nothing fitted but the three constants by weighted least squares, "
+BEGINNING = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
 RISE = "Where the error rises, something that acts the other way is lacking"
 
 
