@@ -9,96 +9,33 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.attached_items import Fractions, fractions_on, places_on
+from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.effects.base import Contribution, Effect, Floats, Masses, Scope, Stiffnesses
+from bayesplate.effects.drives import (
+    Drive,
+    Spot,
+    all_over,
+    at_station,
+    drive_of,
+    is_stated,
+    range_of,
+    with_known_coil,
+)
 from bayesplate.modes.line import Line
 from bayesplate.modes.plate import Beside, KronSum, Term
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.setup import AttachedItem, Ends, Setup
+from bayesplate.plate.setup import Ends, Setup
 from bayesplate.quantities import Quantity
 
-_MASS = Quantity.from_median(50e-3, 1.6), "log-normal: voice-coil exciters weigh 20-120 g"
-_COIL = Quantity.from_median(1.6e-3, 1.3), "log-normal: the coils of exciters of 25 mm weigh 1.5-1.8 g"
-_SUSPENSION = (
-    Quantity.from_median(2700.0, 1.5),
-    "log-normal: suspensions of exciters of 25 mm were measured at 2650-2810 N/m; others differ by half",
-)
 _ANYWHERE = "nearly uniform over the board, mirror places once"
 _LEAST_MAGNET = 0.05
 """Share of the whole that is left to the magnet, however heavy a draw makes the coil."""
 _STANDS_STILL = 1e-3
 """Lowest resonance, Hz: on no spring at all the magnet still has a frequency of its own, far below every mode."""
 _ACROSS = 4.0
-_PLACES_A_SIDE = 8
 _FEWEST_ORDER = 2
 _QUADRATURE = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
-
-
-@dataclass(frozen=True)
-class Spot:
-    """Where an exciter may be along one side, as fractions of the vibrating part.
-
-    Attributes
-    ----------
-    low, high : float
-        The same where it is known.
-    n_nodes : int
-        Of the polynomial that the squared deflection is between them.
-    """
-
-    low: float
-    high: float
-    n_nodes: int = 1
-
-    @property
-    def nodes(self) -> Floats:
-        """Chebyshev's points of the second kind, or the place itself."""
-        if self.n_nodes == 1:
-            return np.array([self.low])
-        steps = np.cos(np.pi * np.arange(self.n_nodes) / (self.n_nodes - 1))
-        return np.asarray(self.low + 0.5 * (self.high - self.low) * (1.0 - steps))
-
-    def shares(self, at: Floats) -> Floats:
-        """What each node has of a polynomial's value at places: (..., n_nodes) array, summing to one.
-
-        Lagrange's polynomials in their barycentric form (Berrut and Trefethen, SIAM Review 46, 2004).
-        """
-        if self.n_nodes == 1:
-            return np.ones((*np.shape(at), 1))
-        nodes = self.nodes
-        signs = (-1.0) ** np.arange(self.n_nodes)
-        signs[[0, -1]] *= 0.5
-        apart = np.asarray(at)[..., None] - nodes
-        is_node = np.abs(apart) < 1e-12
-        weights = signs / np.where(is_node, 1.0, apart)
-        weights = np.where(is_node.any(axis=-1, keepdims=True), is_node, weights)
-        return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
-
-
-@dataclass(frozen=True)
-class Drive:
-    """One exciter: what it weighs and how it hangs; a source is empty where the card states the value.
-
-    Attributes
-    ----------
-    mass, coil : (Quantity, str), kg
-        Of the whole, and of the coil with what is glued to the board.
-    suspension : (Quantity, str)
-        Stiffness in N/m, or the resonance of the magnet on its suspension in Hz.
-    is_resonance : bool
-    is_held : bool
-        Whether the magnet is held, so that the suspension is a spring to the ground.
-    places : tuple of (float, float)
-        As fractions of the vibrating sides; several are those over which it roved, none: anywhere.
-    """
-
-    mass: tuple[Quantity, str]
-    coil: tuple[Quantity, str]
-    suspension: tuple[Quantity, str]
-    is_resonance: bool = False
-    is_held: bool = False
-    places: Fractions = ()
 
 
 @dataclass(frozen=True)
@@ -140,7 +77,7 @@ class Exciter(Effect):
     @classmethod
     def of(cls, board: Board, setup: Setup) -> Exciter:
         """The effect with the setup's exciters."""
-        drives = tuple(_drive(board, setup, item) for item in setup.attached if item.kind == cls.name)
+        drives = tuple(drive_of(board, setup, item) for item in setup.attached if item.kind == cls.name)
         return cls(setup.owner, drives, setup.ends_x, setup.ends_y, _orders(setup))
 
     @classmethod
@@ -158,7 +95,7 @@ class Exciter(Effect):
     @classmethod
     def is_wanted(cls, setup: Setup) -> bool:
         """Whether the setup states what moves of an exciter: the whole, or the coil alone where the magnet is held."""
-        return any(item.kind == cls.name and _is_stated(item) for item in setup.attached)
+        return any(item.kind == cls.name and is_stated(item) for item in setup.attached)
 
     @classmethod
     def candidates(cls, board: Board, setup: Setup) -> tuple[Exciter, ...]:
@@ -166,7 +103,7 @@ class Exciter(Effect):
         if cls.refusal(board, setup):
             return ()
         whole = cls.of(board, setup)
-        return (replace(whole, drives=tuple(_with_known_coil(drive) for drive in whole.drives)),)
+        return (replace(whole, drives=tuple(with_known_coil(drive) for drive in whole.drives)),)
 
     def in_setup(self, board: Board, setup: Setup) -> Exciter | None:
         """The same exciters at the same places of the board, held another way; none where none is fixed to it."""
@@ -200,7 +137,7 @@ class Exciter(Effect):
         if n_places < 2:
             return (self,)
         return tuple(
-            replace(self, drives=tuple(replace(one, places=_turn(one.places, k)) for one in self.drives))
+            replace(self, drives=tuple(replace(one, places=at_station(one.places, k)) for one in self.drives))
             for k in range(n_places)
         )
 
@@ -219,7 +156,8 @@ class Exciter(Effect):
             for axis, (low, high) in zip("xy", self._ranges, strict=True):
                 middle, words = 0.5 * (low + high), f"place along {axis}"
                 prior = Quantity.from_mean(middle, 2.0 * (high - low), "normal", lower=low, upper=high)
-                found.append(self._parameter(i, f"place_{axis}", (prior, _ANYWHERE), "1", middle, words))
+                place = self._parameter(i, f"place_{axis}", (prior, _ANYWHERE), "1", middle, words)
+                found.append(replace(place, usual=middle))
         return tuple(found)
 
     def _parameter(
@@ -234,7 +172,7 @@ class Exciter(Effect):
     @property
     def _ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Where along both sides a place may be, mirror places once."""
-        return (_range(self.ends_x), _range(self.ends_y))
+        return (range_of(self.ends_x), range_of(self.ends_y))
 
     def _spots(self, drive: Drive) -> tuple[Spot, Spot]:
         if drive.places:
@@ -258,7 +196,7 @@ class Exciter(Effect):
             }
             for i, drive in enumerate(self.drives)
             if not drive.places
-            for x, y in product(*(_all_over(*each) for each in self._ranges))
+            for x, y in product(*(all_over(*each) for each in self._ranges))
         )
 
     def keeps_symmetry(self) -> tuple[bool, bool]:
@@ -333,47 +271,11 @@ class Exciter(Effect):
         return np.asarray(each.reshape(*each.shape[:-2], -1))
 
 
-def _drive(board: Board, setup: Setup, item: AttachedItem) -> Drive:
-    """An exciter of the card, with the priors of its kind for what the card does not say."""
-    suspension = item.suspension if item.resonance is None else item.resonance
-    return Drive(
-        mass=_MASS if item.mass is None else (item.mass, ""),
-        coil=_COIL if item.coil is None else (item.coil, ""),
-        suspension=_SUSPENSION if suspension is None else (suspension, ""),
-        is_resonance=item.resonance is not None,
-        is_held=item.magnet == "held",
-        places=fractions_on(board, setup, item.places),
-    )
-
-
-def _is_stated(item: AttachedItem) -> bool:
-    return item.mass is not None or (item.magnet == "held" and item.coil is not None)
-
-
-def _with_known_coil(drive: Drive) -> Drive:
-    coil, source = drive.coil
-    return replace(drive, coil=(Quantity.exact(coil.median), "")) if source else drive
-
-
-def _turn(places: Fractions, k: int) -> Fractions:
-    return (places[k % len(places)],) if places else ()
-
-
-def _all_over(low: float, high: float) -> list[float]:
-    """Shares of a range of places, so dense that the modes that are read hardly change from one to the next."""
-    n_places = round(_PLACES_A_SIDE * (high - low))
-    return [(k + 1) / n_places for k in range(n_places)]
-
-
 def _orders(setup: Setup) -> tuple[int, int]:
     """Highest orders of the beam functions among the readings."""
     beams = [reading.beams for reading in setup.readings]
     highest = [max((one[axis] for one in beams), default=0) for axis in (0, 1)]
     return max(highest[0], _FEWEST_ORDER), max(highest[1], _FEWEST_ORDER)
-
-
-def _range(ends: Ends) -> tuple[float, float]:
-    return (0.0, 0.5) if ends[0] == ends[1] else (0.0, 1.0)
 
 
 def _rows(x: Line, y: Line, spots: Sequence[Spot]) -> list[tuple[Floats, Floats]]:

@@ -71,6 +71,8 @@ class Parameter:
         What people call it; empty where that is its key.
     look : str
         What it does to the board if it is one of an effect's components, in words; empty for what has a meaning alone.
+    usual : float or None
+        A representative size where one standard deviation above the mean is none: the place of something.
     assumed : Quantity or None
         What was taken for the prior because nobody stated one; see `is_assumed`.
     """
@@ -85,6 +87,7 @@ class Parameter:
     source: str = ""
     words: str = ""
     look: str = ""
+    usual: float | None = None
     assumed: Quantity | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -115,6 +118,8 @@ class Parameter:
     @property
     def nominal(self) -> float:
         """A representative size: the median of a log-normal prior, one sd above a normal one if its bounds allow."""
+        if self.usual is not None and not self.prior.is_exact:
+            return self.usual
         if self.prior.is_exact or self.prior.kind != "normal":
             return self.prior.median
         return float(np.clip(self.prior.value(1.0), self.prior.lower, self.prior.upper))

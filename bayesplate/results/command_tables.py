@@ -42,7 +42,7 @@ def check_tables(report: CheckReport) -> tuple[Table, ...]:
     """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
     constants = tuple(
         (
-            narrow_name(name, isotropic=is_isotropic(report.estimate)),
+            narrow_name(name, isotropic=is_isotropic(dict(report.estimate.items()))),
             number(estimate, decimals(estimate * report.expected_sd_percent[name] / 100 * GPA), factor=GPA),
             f"± {two_digits(report.expected_sd_percent[name])} %",
         )

@@ -12,7 +12,8 @@ from generator.exciter import Exciter as GeneratorExciter
 from generator.known_boards import BEAMS, DRIVEN, FINNISH
 from generator.naming import frequencies
 
-from bayesplate.effects.exciter import Drive, Exciter, Spot
+from bayesplate.effects.drives import Drive, Spot
+from bayesplate.effects.exciter import Exciter
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.model import setup_model
@@ -141,3 +142,9 @@ def test_shares_are_those_of_lagranges_polynomials():
     for degree in range(7):
         assert shares @ spot.nodes**degree == pytest.approx(at**degree, abs=1e-12)
     assert Spot(0.3, 0.3).shares(at) == pytest.approx(np.ones((5, 1)))
+
+
+def test_the_usual_place_is_the_middle_of_where_it_may_be():
+    """Not one standard deviation above it, which is the middle of the board, where a drive does most of all."""
+    places = [one for one in exciter(DRIVEN, drive()).parameters() if one.key.startswith("place")]
+    assert [one.nominal for one in places] == [0.25, 0.25]

@@ -87,6 +87,11 @@ CHECKS = (
         "The same, nothing named as shared: what they have alike is searched for.",
     ),
     (
+        "spruce-half-tops-set-aside",
+        "python examples/campaign.py spruce-half-tops-set-aside --out docs/validation --results results/set-aside",
+        "Four half-tops that were set aside until the rules of search and claim stood, tried unseen: what they share.",
+    ),
+    (
         "campaigns",
         "make campaigns",
         "Simulated campaigns of eight boards: with one sensor and the shear of one species on all, intervals of "

@@ -152,6 +152,13 @@ def test_a_pair_below_that_counts_for_its_better_member(base):
     assert sum(one.support for one in answers(found)) == pytest.approx(1.0)
 
 
+def test_a_pair_that_the_card_states_stands_for_itself_however_improbable(base, monkeypatch):
+    monkeypatch.setattr("bayesplate.diagnosis.decision.verdict.are_stated", lambda board, members: members == PAIR)
+    found = found_with(base, {("a",): 0.9, ("b",): 0.09, PAIR: 0.01})
+    assert {one.members: round(one.support, 6) for one in answers(found)}[PAIR] == 0.01
+    assert answers(found)[0].support == pytest.approx(0.9)
+
+
 def test_exchanged_labels_can_win(base):
     swap = Swap(1, 2)
     mixed = swap.applied(base, np.zeros((1, 6)))[0]

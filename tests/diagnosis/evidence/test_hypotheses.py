@@ -13,6 +13,7 @@ from bayesplate.diagnosis.evidence.hypotheses import (
     RELABELLING,
     Hypothesis,
     Swap,
+    are_stated,
     confusable,
     hypotheses,
     log_evidences,
@@ -22,7 +23,9 @@ from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.diagnosis.shifts.forms import with_labels_exchanged, with_readings_exchanged
 from bayesplate.diagnosis.shifts.tables import nothing, together
+from bayesplate.plate.setup import AttachedItem
 from bayesplate.quantities import Quantity
+from bayesplate.workflow.prepare import prepare
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]
 
@@ -49,6 +52,34 @@ def test_prior_shares(base):
     assert shares == pytest.approx({0: 0.5, 1: 0.3, "swap": 0.1, 2: 0.1})
     assert [one.members for one in found if len(one.members) == 2] == [("a", "c")]
     assert probabilities(found, np.zeros(len(found))) == pytest.approx([one.prior for one in found])
+
+
+AIR, EXCITER, TENSION = "fluid_loading", "exciter", "membrane_tension"
+
+
+@pytest.mark.parametrize(
+    ("board", "pair", "expected"),
+    [
+        ("fiemme-spruce-clamped", (AIR, EXCITER), True),
+        ("fiemme-spruce-clamped", (EXCITER, TENSION), False),  # nobody knows of a tension
+        ("fiemme-spruce-clamped", ("transverse_shear", AIR), False),  # known, and nothing of them is stated
+        ("finnish-spruce-cantilever", (AIR, EXCITER), False),
+        ("steel-air-water", ("transverse_shear", AIR), True),
+    ],
+)
+def test_known_effects_of_which_the_card_states_one_are_stated(board, pair, expected):
+    assert are_stated(prepare(board).board, pair) is expected
+
+
+def test_a_stated_pair_has_the_prior_of_a_single_effect(base):
+    rng = np.random.default_rng(4)
+    (setup,) = base.board.setups
+    item = AttachedItem("exciter", (), Quantity.exact(0.048))
+    board = replace(base.board, setups=(replace(setup, attached=(item,)),))
+    fine = {name: table(rng, name=name) for name in (AIR, EXCITER, TENSION)}
+    priors = {one.members: one.prior for one in hypotheses(replace(base, board=board), fine, fine, list(fine))}
+    assert priors[AIR, EXCITER] == priors[AIR,]
+    assert priors[AIR, TENSION] == priors[EXCITER, TENSION] == pytest.approx(0.1 / 3)
 
 
 def test_two_effects_add(base):

@@ -1,0 +1,127 @@
+"""What an exciter is as a board carries it: its masses, its spring, and the places where it may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesplate.effects.attached_items import Fractions, fractions_on
+from bayesplate.effects.base import Floats
+from bayesplate.plate.board import Board
+from bayesplate.plate.setup import AttachedItem, Ends, Setup
+from bayesplate.quantities import Quantity
+
+_MASS = Quantity.from_median(50e-3, 1.6), "log-normal: voice-coil exciters weigh 20-120 g"
+_COIL = Quantity.from_median(1.6e-3, 1.3), "log-normal: the coils of exciters of 25 mm weigh 1.5-1.8 g"
+_SUSPENSION = (
+    Quantity.from_median(2700.0, 1.5),
+    "log-normal: suspensions of exciters of 25 mm were measured at 2650-2810 N/m; others differ by half",
+)
+_PLACES_A_SIDE = 8
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where an exciter may be along one side, as fractions of the vibrating part.
+
+    Attributes
+    ----------
+    low, high : float
+        The same where it is known.
+    n_nodes : int
+        Of the polynomial that the squared deflection is between them.
+    """
+
+    low: float
+    high: float
+    n_nodes: int = 1
+
+    @property
+    def nodes(self) -> Floats:
+        """Chebyshev's points of the second kind, or the place itself."""
+        if self.n_nodes == 1:
+            return np.array([self.low])
+        steps = np.cos(np.pi * np.arange(self.n_nodes) / (self.n_nodes - 1))
+        return np.asarray(self.low + 0.5 * (self.high - self.low) * (1.0 - steps))
+
+    def shares(self, at: Floats) -> Floats:
+        """What each node has of a polynomial's value at places: (..., n_nodes) array, summing to one.
+
+        Lagrange's polynomials in their barycentric form (Berrut and Trefethen, SIAM Review 46, 2004).
+        """
+        if self.n_nodes == 1:
+            return np.ones((*np.shape(at), 1))
+        nodes = self.nodes
+        signs = (-1.0) ** np.arange(self.n_nodes)
+        signs[[0, -1]] *= 0.5
+        apart = np.asarray(at)[..., None] - nodes
+        is_node = np.abs(apart) < 1e-12
+        weights = signs / np.where(is_node, 1.0, apart)
+        weights = np.where(is_node.any(axis=-1, keepdims=True), is_node, weights)
+        return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One exciter: what it weighs and how it hangs; a source is empty where the card states the value.
+
+    Attributes
+    ----------
+    mass, coil : (Quantity, str), kg
+        Of the whole, and of the coil with what is glued to the board.
+    suspension : (Quantity, str)
+        Stiffness in N/m, or the resonance of the magnet on its suspension in Hz.
+    is_resonance : bool
+    is_held : bool
+        Whether the magnet is held, so that the suspension is a spring to the ground.
+    places : tuple of (float, float)
+        As fractions of the vibrating sides; several are those over which it roved, none: anywhere.
+    """
+
+    mass: tuple[Quantity, str]
+    coil: tuple[Quantity, str]
+    suspension: tuple[Quantity, str]
+    is_resonance: bool = False
+    is_held: bool = False
+    places: Fractions = ()
+
+
+def drive_of(board: Board, setup: Setup, item: AttachedItem) -> Drive:
+    """An exciter of the card, with the priors of its kind for what the card does not say."""
+    suspension = item.suspension if item.resonance is None else item.resonance
+    return Drive(
+        mass=_MASS if item.mass is None else (item.mass, ""),
+        coil=_COIL if item.coil is None else (item.coil, ""),
+        suspension=_SUSPENSION if suspension is None else (suspension, ""),
+        is_resonance=item.resonance is not None,
+        is_held=item.magnet == "held",
+        places=fractions_on(board, setup, item.places),
+    )
+
+
+def is_stated(item: AttachedItem) -> bool:
+    """Whether the card states what moves of an exciter."""
+    return item.mass is not None or (item.magnet == "held" and item.coil is not None)
+
+
+def with_known_coil(drive: Drive) -> Drive:
+    """An exciter with the usual coil where the card states none."""
+    coil, source = drive.coil
+    return replace(drive, coil=(Quantity.exact(coil.median), "")) if source else drive
+
+
+def at_station(places: Fractions, k: int) -> Fractions:
+    """The k-th place of what roved; what stayed where it was has one."""
+    return (places[k % len(places)],) if places else ()
+
+
+def all_over(low: float, high: float) -> list[float]:
+    """Shares of a range of places, so dense that the modes that are read hardly change from one to the next."""
+    n_places = round(_PLACES_A_SIDE * (high - low))
+    return [(k + 1) / n_places for k in range(n_places)]
+
+
+def range_of(ends: Ends) -> tuple[float, float]:
+    """Where along a side something may be, mirror places once, as fractions of what vibrates."""
+    return (0.0, 0.5) if ends[0] == ends[1] else (0.0, 1.0)
