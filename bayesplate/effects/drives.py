@@ -48,14 +48,16 @@ class Spot:
     def shares(self, at: Floats) -> Floats:
         """What each node has of a polynomial's value at places: (..., n_nodes) array, summing to one.
 
-        Lagrange's polynomials in their barycentric form (Berrut and Trefethen, SIAM Review 46, 2004).
+        A place beyond the ends, where the prior is zero but a proposal may fall, counts as the end: far from its nodes
+        a polynomial loses all digits. Lagrange's polynomials in their barycentric form (Berrut and Trefethen, SIAM
+        Review 46, 2004).
         """
         if self.n_nodes == 1:
             return np.ones((*np.shape(at), 1))
         nodes = self.nodes
         signs = (-1.0) ** np.arange(self.n_nodes)
         signs[[0, -1]] *= 0.5
-        apart = np.asarray(at)[..., None] - nodes
+        apart = np.clip(at, self.low, self.high)[..., None] - nodes
         is_node = np.abs(apart) < 1e-12
         weights = signs / np.where(is_node, 1.0, apart)
         weights = np.where(is_node.any(axis=-1, keepdims=True), is_node, weights)

@@ -142,6 +142,8 @@ def test_shares_are_those_of_lagranges_polynomials():
     for degree in range(7):
         assert shares @ spot.nodes**degree == pytest.approx(at**degree, abs=1e-12)
     assert Spot(0.3, 0.3).shares(at) == pytest.approx(np.ones((5, 1)))
+    beyond = spot.shares(np.array([-1e17, 1e17]))  # where a proposal may fall, and the prior is zero
+    assert beyond == pytest.approx(spot.shares(np.array([0.0, 0.5])))
 
 
 def test_the_usual_place_is_the_middle_of_where_it_may_be():
