@@ -49,8 +49,12 @@ def air_sentence(board: Board, estimate: Estimate) -> str:
     rise = rise_with_air(board, estimate)
     if np.abs(rise).max() < SMALLEST:
         return ""
+    stated = any(setup.fluid is not None for setup in board.setups)
+    remedy = "the card states it: --effects fluid_loading, or its name among the effects of the card, puts it in"
+    if not stated:
+        remedy = 'add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"'
     told = [f"{name} {100.0 * part:+.1f} %" for name, part in zip(board.symmetry.moduli, rise, strict=False)]
     return (
         "no air is declared, and a board in a room carries it along; with it the constants would change by "
-        f'{", ".join(told)}: add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"'
+        f"{', '.join(told)}: {remedy}"
     )

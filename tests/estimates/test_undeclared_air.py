@@ -16,6 +16,7 @@ from bayesplate.effects import declare
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.undeclared_air import SMALLEST, air_sentence, rise_with_air
 from bayesplate.plate.material import moduli
+from bayesplate.plate.setup import DeclaredFluid
 
 PLATES = {"clamped": DRIVEN, "half-top": HALF_TOP}
 
@@ -60,6 +61,15 @@ def test_the_sentence_says_by_how_much_and_what_to_add():
     told = air_sentence(board, estimate)
     assert f"E_x {E_x}, E_y {E_y}, G_xy {G_xy}" in told
     assert told.endswith('add to [setup.fluid] the lines density_kg_m3 = 1.2 and baffle = "none"')
+
+
+def test_lines_that_the_card_has_are_not_asked_for_again():
+    """By `effects = []` what a card states is not declared: a fit without it is meant."""
+    board, estimate = in_air(HALF_TOP, BEAMS["half-top"])
+    stated = [replace(setup, fluid=DeclaredFluid(1.2, "none")) for setup in board.setups]
+    told = air_sentence(replace(board, setups=tuple(stated), effects=()), estimate)
+    assert told.endswith("--effects fluid_loading, or its name among the effects of the card, puts it in")
+    assert "add to" not in told
 
 
 def test_nothing_is_said_where_a_fluid_is_declared():
