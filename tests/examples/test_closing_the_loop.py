@@ -89,6 +89,15 @@ def test_the_readme_begins_with_measured_boards(example):
     assert f"by {gain} ± {error} in log score, {first} to {last.rstrip('.')} cents" in words
 
 
+def test_the_readme_says_where_the_search_claims():
+    words = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    (claimed,) = [row for row in shown_rows() if row[3] == "error reduced" and not row[0].startswith("paper-")]
+    assert claimed[:3] == ("spruce-free-1R", "indistinguishable group", "transverse_shear, grain_angle")
+    before, after = claimed[6].split(" → ")
+    assert f"the error left out, the search repeated, goes from {before} to {after} cents" in words
+    assert "On the other measured boards it claims nothing." in words
+
+
 def test_nothing_is_named_on_the_control():
     control = next(row for row in shown_rows() if row[0] == "acrylic-panel")
     assert control[2:4] == ("-", "no claim")
