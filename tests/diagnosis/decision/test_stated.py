@@ -17,7 +17,7 @@ from bayesplate.diagnosis.evidence.combinations import stated_effects
 from bayesplate.diagnosis.evidence.known import known_fit
 from bayesplate.diagnosis.evidence.scores import scores_given
 from bayesplate.diagnosis.wording.stated import stated_sentences
-from bayesplate.plate.setup import DeclaredAir
+from bayesplate.plate.setup import DeclaredFluid
 from bayesplate.posterior.inference import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.problem import Problem
@@ -160,7 +160,7 @@ def test_a_steel_plate_in_water_is_predicted_from_air_by_the_fluid_that_its_card
             edges="free",
             name=name,
             resolution=1,
-            air=DeclaredAir(density, "none"),
+            fluid=DeclaredFluid(density, "none"),
         )
         for name, hertz, density in (("in air", AIR, 1.2), ("in water", WATER, 997.0))
     ]
