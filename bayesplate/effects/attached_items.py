@@ -18,7 +18,6 @@ Places = tuple[tuple[float, float], ...]
 
 _PRIORS = {
     "accelerometer": (Quantity.from_median(1.4e-3, 2.7), "log-normal: accelerometers for light boards weigh 0.2-10 g"),
-    "exciter": (Quantity.from_median(50e-3, 1.6), "log-normal: voice-coil exciters weigh 20-120 g"),
     "shaker": (Quantity.from_median(10e-3, 2.0), "log-normal: force sensor, stinger and armature move 3-40 g"),
     "weight": (Quantity.from_median(5e-3, 3.0), "log-normal: a weight of 0.5-50 g"),
 }

@@ -69,7 +69,6 @@ RISES = {
 
 MASSES = {
     "accelerometer": (1.4e-3, 2.7),
-    "exciter": (50e-3, 1.6),
     "shaker": (10e-3, 2.0),
     "weight": (5e-3, 3.0),
 }
@@ -130,7 +129,11 @@ def test_mass_of_a_thing_that_the_card_does_not_weigh(kind):
 
     assert same(item.mass, "log-normal", median, log(factor), ANY), told(item.mass)
     found = EFFECTS["attached_mass"].of(declared, setup).parameters()
-    assert [(one.unit, one.prior) for one in found] == ([] if kind == "exciter" else [("kg", item.mass)])
+    assert [(one.unit, one.prior) for one in found] == [("kg", item.mass)]
+
+
+def test_an_exciter_is_no_mass_that_moves_with_the_board():
+    assert EFFECTS["attached_mass"].of(DRIVEN, DRIVEN.setups[0]).parameters() == ()
 
 
 def test_mass_of_a_thing_that_nobody_mentioned():
