@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,8 +24,7 @@ from bayesplate.effects.attached_items import (
     rotary_inertia,
 )
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Mass, Scope
-from bayesplate.modes.line import Line
-from bayesplate.modes.plate import KronSum
+from bayesplate.modes.terms import Amount, AtPlaces
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import AttachedItem, Setup
@@ -180,10 +179,10 @@ class AttachedMass(Effect):
             total, sides = vibrating(values, setup)
             return rotary_inertia(self.value(values, key)) / (total * sides[axis] ** 2)
 
-        yield Mass(partial(_mean_squares, item=item), mass)
+        yield Mass(_mean_squares([Amount(((1.0, x, y),)) for x, y in item.places]), mass)
         if any(item.radius):
             for axis in (0, 1):
-                yield Mass(partial(_mean_squares, item=item, tilt=axis), partial(inertia, axis=axis))
+                yield Mass(_mean_squares(_tilts(item, axis)), partial(inertia, axis=axis))
 
 
 def _masses(setup: Setup) -> tuple[AttachedItem, ...]:
@@ -221,18 +220,18 @@ def _mirrors(places: Fractions, axis: int) -> bool:
     return there == Counter((round(x, 6), round(y, 6)) for x, y in mirrored)
 
 
-def _tilts(along: Line, at: Floats, radius: float, reach: tuple[Floats, Floats] | tuple[float, float]) -> Any:
-    """Tilt of a base that touches the board at its rim: (n_places, n_dof) sparse array."""
-    low, high = np.maximum(at - radius, reach[0]), np.minimum(at + radius, reach[1])
-    return (along.shapes(high) - along.shapes(low)).multiply(1.0 / (high - low)[:, None]).tocsr()
+def _tilts(item: Item, axis: int) -> list[Amount]:
+    """Tilt along x (0) or y (1) of a base that touches the board at its rim, at each place."""
+    found = []
+    for k, place in enumerate(item.places):
+        first, last = item.reach[k] if axis == 1 and item.reach else (0.0, 1.0)
+        ends = max(place[axis] - item.radius[axis], first), min(place[axis] + item.radius[axis], last)
+        slope = 1.0 / (ends[1] - ends[0])
+        low, high = ((end, place[1]) if axis == 0 else (place[0], end) for end in ends)
+        found.append(Amount(((-slope, *low), (slope, *high))))
+    return found
 
 
-def _mean_squares(x: Line, y: Line, item: Item, tilt: int | None = None) -> KronSum:
-    """The mean over an item's places of the square of the deflection, or of the tilt along x (0) or y (1)."""
-    rows = []
-    for axis, (line, at) in enumerate(zip((x, y), np.array(item.places).T, strict=True)):
-        reach = tuple(np.array(item.reach).T) if axis == 1 and item.reach else (0.0, 1.0)
-        rows.append(_tilts(line, at, item.radius[axis], reach) if axis == tilt else line.shapes(at))
-    n = len(item.places)
-    by_place = [(rows[0][[i]], rows[1][[i]]) for i in range(n)]
-    return tuple((row_x.T @ row_x / n, row_y.T @ row_y) for row_x, row_y in by_place)
+def _mean_squares(amounts: Sequence[Amount]) -> AtPlaces:
+    """The mean of the squares of some amounts."""
+    return AtPlaces(tuple((1.0 / len(amounts), one, one) for one in amounts))

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.fields import EdgeStrip, Field, Group, Outline
-from bayesplate.modes.line import Line
-from bayesplate.modes.plate import Beside, KronSum, Projection, Term, Weights
+from bayesplate.modes.terms import Term, Weights
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.parameter import BOARD, Owner, Parameter, shown_name
 from bayesplate.plate.setup import Setup
@@ -35,71 +34,43 @@ Weight = Callable[[Values, Setup], Floats]
 """What a term weighs at values in a setup: a number or an (n_draws,) array; of several terms one more axis for them."""
 
 
-@dataclass(frozen=True)
-class Stiffness:
-    """A stiffness term: its matrix from the lines of the plate, and its weight in s^-2."""
-
-    matrix: Callable[[Line, Line], Term]
-    weight: Weight
-
-    def matrices(self, x: Line, y: Line) -> tuple[Term, ...]:
-        """The one matrix."""
-        return (self.matrix(x, y),)
+Terms = Term | tuple[Term, ...] | Callable[[Values, Field | None], tuple[Term, ...]]
+"""A term; several whose weights are worked out together; or what makes these from the values at which the plate is
+solved and the field that its in-plane stiffness follows (None: uniform)."""
 
 
 @dataclass(frozen=True)
-class Stiffnesses:
-    """Several stiffness terms whose weights are worked out together."""
-
-    matrices: Callable[[Line, Line], tuple[Term, ...]]
-    weight: Weight
-
-
-@dataclass(frozen=True)
-class Mass:
-    """A mass term on the deflection: its matrix from the lines, and its weight as a fraction of the vibrating mass."""
-
-    matrix: Callable[[Line, Line], KronSum]
-    weight: Weight
-
-    def matrices(self, x: Line, y: Line) -> tuple[KronSum, ...]:
-        """The one matrix."""
-        return (self.matrix(x, y),)
-
-
-@dataclass(frozen=True)
-class Masses:
-    """Several mass terms whose weights are worked out together."""
-
-    matrices: Callable[[Line, Line], tuple[KronSum | Beside, ...]]
-    weight: Weight
-
-
-@dataclass(frozen=True)
-class ProjectedMass:
-    """A mass term without a sparse matrix: its projection on given deflections, and its weight like that of `Mass`."""
-
-    projection: Projection
-    weight: Weight
-
-
-@dataclass(frozen=True)
-class ProjectedStiffnesses:
-    """Stiffness terms without sparse matrices: their projection on given deflections, and their weights.
+class Contribution:
+    """Terms that an effect adds to the budget of energies, each with its weight.
 
     Attributes
     ----------
-    projection : callable
-        From the values at which the plate is made, and the field that its in-plane stiffness follows (None: uniform).
-    weight : callable
+    terms : Terms
+    weight : Weight
+        s^-2 of a stiffness, of a mass a fraction of the vibrating mass.
     """
 
-    projection: Callable[[Values, Field | None], Projection]
+    terms: Terms
     weight: Weight
 
+    def terms_at(self, values: Values, in_plane: Field | None) -> tuple[Term, ...]:
+        """The terms of a plate that is solved at some values."""
+        if callable(self.terms):
+            return self.terms(values, in_plane)
+        return self.terms if isinstance(self.terms, tuple) else (self.terms,)
 
-Contribution = Stiffness | Stiffnesses | Mass | Masses | ProjectedMass | ProjectedStiffnesses
-"""A term, or several together, that an effect adds to the budget of energies."""
+    def columns(self, values: Values, setup: Setup) -> Floats:
+        """Weights: (n_draws, n_terms) array, of one draw where they are the same in all."""
+        weight = np.asarray(self.weight(values, setup))
+        return np.atleast_2d(weight if callable(self.terms) or isinstance(self.terms, tuple) else weight[..., None])
+
+
+class Stiffness(Contribution):
+    """Stiffness terms."""
+
+
+class Mass(Contribution):
+    """Mass terms."""
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,6 @@ from typing import ClassVar
 
 from bayesplate.effects.base import Contribution, Release
 from bayesplate.effects.clamps import CompliantClamp
-from bayesplate.modes.line import Line
-from bayesplate.modes.plate import EdgeTurn, Term
 from bayesplate.plate.parameter import Parameter
 from bayesplate.quantities import Quantity
 
@@ -40,8 +38,4 @@ class ClampRotation(CompliantClamp):
 
     def contributions(self) -> tuple[Contribution, ...]:
         """The squared turning along the clamped edges of each side, with k_R over rho h and the cube of the side."""
-
-        def turning(x: Line, y: Line, side: int) -> Term:
-            return EdgeTurn(side, self.clamped[side])
-
-        return self.springs(turning, STIFFEST, power=3)
+        return self.springs(("turn_x", "turn_y"), STIFFEST, power=3)

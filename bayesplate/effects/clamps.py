@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar, Self
@@ -10,8 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
-from bayesplate.modes.line import Line
-from bayesplate.modes.plate import Term
+from bayesplate.modes.terms import AlongEdges
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.setup import Setup
 
@@ -53,15 +51,13 @@ class CompliantClamp(Effect):
         """The same springs on the clamped edges of another setup."""
         return None if self.refusal(board, setup) else replace(self, owner=setup.owner, clamped=clamped_ends(setup))
 
-    def springs(
-        self, matrix: Callable[[Line, Line, int], Term], stiffest: float, power: int
-    ) -> tuple[Contribution, ...]:
+    def springs(self, strains: tuple[str, str], stiffest: float, power: int) -> tuple[Contribution, ...]:
         """Springs along the clamped edges of each side that has any.
 
         Parameters
         ----------
-        matrix : callable
-            From the lines and a side, 0 for the edges x0 and x1, 1 for y0 and y1, to what the springs hold there.
+        strains : (str, str)
+            What the springs hold along the edges x0 and x1, and along y0 and y1.
         stiffest : float
             Added to the compliance: with too stiff a spring the reduced-order model loses digits.
         power : int
@@ -78,11 +74,7 @@ class CompliantClamp(Effect):
             return stiffness / (density(values) * values["thickness"] * sides[side] ** power)
 
         return tuple(
-            Stiffness(partial(_on_side, matrix=matrix, side=side), partial(weight, side=side))
-            for side, at in enumerate(self.clamped)
+            Stiffness(AlongEdges(side, at, strain), partial(weight, side=side))
+            for side, (at, strain) in enumerate(zip(self.clamped, strains, strict=True))
             if any(at)
         )
-
-
-def _on_side(x: Line, y: Line, matrix: Callable[[Line, Line, int], Term], side: int) -> Term:
-    return matrix(x, y, side)

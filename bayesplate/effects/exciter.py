@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesplate.effects.attached_items import fractions_on, places_on
-from bayesplate.effects.base import Contribution, Effect, Floats, Masses, Scope, Stiffnesses
+from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope, Stiffness
 from bayesplate.effects.drives import (
     Drive,
     Spot,
@@ -21,8 +21,7 @@ from bayesplate.effects.drives import (
     range_of,
     with_known_coil,
 )
-from bayesplate.modes.line import Line
-from bayesplate.modes.plate import Beside, KronSum, Term
+from bayesplate.modes.terms import Amount, AtPlaces
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Ends, Setup
@@ -218,17 +217,13 @@ class Exciter(Effect):
         drive = self.drives[i]
         spots = self._spots(drive)
 
-        def squares(x: Line, y: Line) -> tuple[KronSum, ...]:
-            return tuple(((on_x.T @ on_x, on_y.T @ on_y),) for on_x, on_y in _rows(x, y, spots))
-
-        def springs(x: Line, y: Line) -> tuple[Term, ...]:
-            if drive.is_held:
-                return squares(x, y)
-            between = tuple(Beside(coordinate, (row,)) for row in _rows(x, y, spots))
-            return (*squares(x, y), *between, Beside(coordinate))
-
-        def inertias(x: Line, y: Line) -> tuple[KronSum | Beside, ...]:
-            return squares(x, y) if drive.is_held else (*squares(x, y), Beside(coordinate))
+        at_nodes = [Amount(((1.0, x, y),)) for x in spots[0].nodes.tolist() for y in spots[1].nodes.tolist()]
+        magnet_rises = Amount(beside=coordinate)
+        squares = tuple(AtPlaces(((1.0, one, one),)) for one in at_nodes)
+        between = tuple(AtPlaces(((2.0, magnet_rises, one),)) for one in at_nodes)
+        of_magnet = AtPlaces(((1.0, magnet_rises, magnet_rises),))
+        springs = squares if drive.is_held else (*squares, *between, of_magnet)
+        inertias = squares if drive.is_held else (*squares, of_magnet)
 
         def stiffness(values: Values, setup: Setup) -> Floats:
             whole, shares = _vibrating_mass(values, setup), self._shares(i, spots, values)
@@ -245,7 +240,7 @@ class Exciter(Effect):
             coil = (self.value(values, self._key(i, "coil")) / whole)[..., None] * shares
             return coil if drive.is_held else _joined(coil, np.ones(1))
 
-        return Stiffnesses(springs, stiffness), Masses(inertias, inertia)
+        return Stiffness(springs, stiffness), Mass(inertias, inertia)
 
     def _magnet(self, i: int, values: Values) -> Floats:
         """Mass of the magnet, kg."""
@@ -276,12 +271,6 @@ def _orders(setup: Setup) -> tuple[int, int]:
     beams = [reading.beams for reading in setup.readings]
     highest = [max((one[axis] for one in beams), default=0) for axis in (0, 1)]
     return max(highest[0], _FEWEST_ORDER), max(highest[1], _FEWEST_ORDER)
-
-
-def _rows(x: Line, y: Line, spots: Sequence[Spot]) -> list[tuple[Floats, Floats]]:
-    """Values of the functions along x and along y at every pair of nodes: (1, n_dof) arrays."""
-    along_x, along_y = (line.shapes(spot.nodes).toarray() for line, spot in zip((x, y), spots, strict=True))
-    return [(on_x[None], on_y[None]) for on_x in along_x for on_y in along_y]
 
 
 def _vibrating_mass(values: Values, setup: Setup) -> Floats:

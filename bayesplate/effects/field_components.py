@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from bayesplate.effects.base import Effect
 from bayesplate.effects.field_looks import look
 from bayesplate.effects.part import Part, vibrating_part
-from bayesplate.modes.element import assembled, element_products, gauss_points
-from bayesplate.modes.line import line
+from bayesplate.modes.beams import beam_functions
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.random_field import ConditionedField, Degrees, Surface, legendre
@@ -33,8 +32,6 @@ MOST = 3
 SMALLEST = 5e-4
 """Root mean square over the board below which a surface is nothing."""
 _N_BEAMS = 4
-_N_ELEMENTS = 12
-_POINTS = 6
 _HELD = 1e-6
 
 
@@ -152,16 +149,14 @@ def _weighted_energies(ends: Ends, part: Part, highest: int) -> tuple[Floats, Fl
 
     Not a number where a rigid motion has no such energy.
     """
-    side = line(ends, _N_ELEMENTS)
-    at, weights = gauss_points(side.nodes[:-1], np.diff(side.nodes), _POINTS)
-    beams = side.beams[:, :_N_BEAMS]
-    found = np.empty((3, highest + 1, beams.shape[1]))
-    for degree in range(highest + 1):
-        factor = legendre(degree, part.on_whole(at))
-        integrals = assembled(element_products(side.nodes, at, weights * factor))
-        for order in range(3):
-            matrix = integrals[order, order][np.ix_(side.kept, side.kept)]
-            found[order, degree] = np.einsum("ib,ib->b", beams, matrix @ beams)
+    beams = beam_functions(ends)
+    at = part.on_whole(beams.side.points)
+    found = np.array(
+        [
+            [beams.integrals(order, order, legendre(degree, at))[:_N_BEAMS] for degree in range(highest + 1)]
+            for order in range(3)
+        ]
+    )
     whole = found[:, 0].copy()
     whole[whole < _HELD] = np.nan
     zero, one, two = found / whole[:, None]

@@ -8,9 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Contribution, Effect, Floats, ProjectedMass, Scope
+from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
 from bayesplate.modes.air import air_mass
 from bayesplate.modes.fields import Outline
+from bayesplate.modes.terms import OnDeflections
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -122,8 +123,10 @@ class FluidLoading(Effect):
         known = self.baffle.is_exact and self.baffle.mean in (0.0, 1.0)
         cases = (bool(self.baffle.mean),) if known else (False, True)
         return tuple(
-            ProjectedMass(
-                partial(air_mass, aspect_ratio=self.aspect_ratio, is_baffled=is_baffled, outline=self.edge),
+            Mass(
+                OnDeflections(
+                    partial(air_mass, aspect_ratio=self.aspect_ratio, is_baffled=is_baffled, outline=self.edge)
+                ),
                 partial(weight, is_baffled=is_baffled),
             )
             for is_baffled in cases

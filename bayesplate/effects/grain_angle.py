@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.base import Effect, Scope
-from bayesplate.modes.plate import Weights
+from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import THIN_TERMS
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.parameter import Parameter

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, get_args
 
 from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
 from bayesplate.modes.fields import Outline
-from bayesplate.modes.thin import within_outline
+from bayesplate.modes.terms import OverPlate
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Ends, Setup
@@ -94,12 +94,9 @@ class MembraneTension(Effect):
             return self.value(values, "N") / (areal * vibrating_lengths(values, setup)[side] ** 2)
 
         sides = {"x": (0,), "y": (1,), "both": (0, 1)}[self.axis]
-        slopes = ((1, 0), (0, 1))
+        slopes = "slope_x", "slope_y"
         return tuple(
-            Stiffness(
-                partial(within_outline, a=slopes[side], b=slopes[side], outline=self.edge), partial(weight, side=side)
-            )
-            for side in sides
+            Stiffness(OverPlate((slopes[side], slopes[side]), self.edge), partial(weight, side=side)) for side in sides
         )
 
 

@@ -8,10 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Contribution, Effect, Floats, ProjectedMass, Scope
+from bayesplate.effects.base import Contribution, Effect, Floats, Mass, Scope
 from bayesplate.modes.fields import Outline
-from bayesplate.modes.line import Line
-from bayesplate.modes.thin import mean_deflections
+from bayesplate.modes.terms import Deflections, OnDeflections
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -76,9 +75,9 @@ class SupportMass(Effect):
             vibrating = density(values) * values["thickness"] * length_x * length_y
             return vibrating / (self.value(values, "mass") + self.share * vibrating)
 
-        return (ProjectedMass(partial(_mean_products, outline=self.edge), weight),)
+        return (Mass(OnDeflections(partial(_mean_products, outline=self.edge)), weight),)
 
 
-def _mean_products(x: Line, y: Line, deflections: Floats, outline: Outline | None) -> Floats:
-    means = mean_deflections(x, y, deflections, outline)
+def _mean_products(deflections: Deflections, outline: Outline | None) -> Floats:
+    means = deflections.integrals(outline)
     return -np.outer(means, means)

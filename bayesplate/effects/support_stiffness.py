@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from bayesplate.effects.base import Contribution, Effect, Floats, Scope, Stiffness
 from bayesplate.modes.fields import Outline
-from bayesplate.modes.thin import within_outline
+from bayesplate.modes.terms import OverPlate
 from bayesplate.plate.board import Board, Values, density
 from bayesplate.plate.parameter import Parameter
 from bayesplate.plate.setup import Setup
@@ -82,7 +81,7 @@ class SupportStiffness(Effect):
         def weight(values: Values, setup: Setup) -> Floats:
             return self.value(values, "stiffness") / (density(values) * values["thickness"])
 
-        return (Stiffness(partial(within_outline, a=(0, 0), b=(0, 0), outline=self.edge), weight),)
+        return (Stiffness(OverPlate(("w", "w"), self.edge), weight),)
 
 
 def stiffness_of(board: Board, bounce: Quantity) -> Quantity:

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, ProjectedStiffnesses, Scope
+from bayesplate.effects.base import Contribution, Effect, EffectForm, Floats, Scope, Stiffness
 from bayesplate.modes.fields import Field
-from bayesplate.modes.membrane import Curvature, curvature_pairs, membrane_terms
-from bayesplate.modes.plate import Projection
+from bayesplate.modes.membrane import MODULI, Curvature, curvature_pairs, membrane_terms
+from bayesplate.modes.terms import OnDeflections, Term
 from bayesplate.plate.board import Board, Values, density, vibrating_lengths
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.plate.setup import Setup
@@ -120,24 +120,26 @@ class Warp(Effect):
         if not curvatures:
             return ()
 
-        def projection(values: Values, field: Field | None) -> Projection:
+        pairs = curvature_pairs(curvatures)
+
+        def terms(values: Values, field: Field | None) -> tuple[Term, ...]:
             moduli = tuple(float(one) for one in np.ravel(_moduli(values)[..., :4]))
-            return partial(
+            membrane = partial(
                 membrane_terms,
                 aspect_ratio=self.aspect_ratio,
                 moduli=tuple(round(one / max(moduli), 6) for one in moduli),
                 curvatures=curvatures,
                 thickness=field,
             )
+            return (OnDeflections(membrane, len(pairs) * len(MODULI)),)
 
         def weight(values: Values, setup: Setup) -> Floats:
             moduli = _moduli(values) / np.asarray(density(values))[..., None]
             bent = self._curvatures(values)
-            pairs = [np.asarray(bent[one] * bent[other])[..., None] for one, other in curvature_pairs(curvatures)]
-            columns = [pair * moduli for pair in pairs]
+            columns = [np.asarray(bent[one] * bent[other])[..., None] * moduli for one, other in pairs]
             return np.concatenate(np.broadcast_arrays(*columns), axis=-1)
 
-        return (ProjectedStiffnesses(projection, weight),)
+        return (Stiffness(terms, weight),)
 
     def _curvatures(self, values: Values) -> Mapping[Curvature, Floats]:
         """Curvatures of the board by the name of the rise, 1/m."""

@@ -15,10 +15,10 @@ from bayesplate.effects.words import effect_names
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.frequencies.columns import columns
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.frequencies.shear_terms import shear_moduli
+from bayesplate.frequencies.terms import shear_moduli
 from bayesplate.labels import Label
+from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import Beams
 from bayesplate.modes.training import FACTORS, Theory, TrainingConstants, train, training_matrices, training_weights
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.material import RIGIDITIES, moduli

@@ -15,7 +15,7 @@ from bayesplate.estimates.least_squares import log_measured, starting_rigidities
 from bayesplate.frequencies.prior_bands import prior_draws, with_rigidities
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
-from bayesplate.modes.line import N_BEAMS
+from bayesplate.modes.beams import N_BEAMS
 from bayesplate.plate.board import Board, density
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.measured import NO_OFFSET, Reading

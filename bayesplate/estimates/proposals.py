@@ -22,7 +22,7 @@ from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import HIGHEST_INDEX, Label
-from bayesplate.modes.plate import is_rigid
+from bayesplate.modes.beams import is_rigid
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import moduli
 from bayesplate.plate.readings import reading_sd

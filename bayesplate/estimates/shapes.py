@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.sheet import points, sampled
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.modes.plate import Parity
 from bayesplate.modes.solve import collect, solve_classes
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Values
 
 N_POINTS = 61

@@ -29,9 +29,8 @@ from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.system import System, system_of
 from bayesplate.modes.naming import Place
-from bayesplate.modes.plate import Parity
-from bayesplate.modes.reduced import ReducedOrderModel
-from bayesplate.modes.reduction import reduced_order_model
+from bayesplate.modes.reduced import ReducedOrderModel, reduced_order_model
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.measured import Peak
@@ -56,6 +55,8 @@ _NARROWER = 0.5
 """Range of the population, beside that for which modes were found, from which on they are found again."""
 _RANGE = 0.005
 """Of the prior draws, on either side, that the tables leave out."""
+_TOLERANCE = 3.0
+"""Error of the law, cents: far below the distance at which peaks are told apart."""
 _SPARE = 8
 _MODES_PER_PEAK = 2.2
 _JUMP, _JITTER = 0.7, 1e-3
@@ -212,7 +213,7 @@ class _Modes:
         model = setup_model(system, {**nominal, **constants})
         places = _places(model, max(len(one.peaks) for one in bare))
         around = [every.at(i) for i in range(len(trained))]
-        reduced = reduced_order_model(model.plate, places, centre, around, around[:1])
+        reduced = reduced_order_model(model.plate, places, centre, [], around, _TOLERANCE)
         others = tuple(OtherMode(place, None) for place in places)
         peaks = []
         for setup, one in zip(setups, bare, strict=True):
@@ -323,8 +324,8 @@ def _as_peaks(setup: Setup) -> tuple[Peak, ...]:
 
 def _places(model: SetupModel, n_peaks: int) -> tuple[Place, ...]:
     """So many modes of each symmetry class that the peaks are among them."""
-    n_each = -(-int(_MODES_PER_PEAK * n_peaks + _SPARE) // len(model.plate.blocks))
-    return tuple(Place(block.parity, rank, 1.0) for block in model.plate.blocks for rank in range(n_each))
+    n_each = -(-int(_MODES_PER_PEAK * n_peaks + _SPARE) // len(model.plate.classes))
+    return tuple(Place(one.parity, rank, 1.0) for one in model.plate.classes for rank in range(n_each))
 
 
 def _by_class(peaks: PeakLikelihood, setup: Setup, model: SetupModel, places: Sequence[Place]) -> PeakLikelihood:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from bayesplate.effects.base import Effect, Theory, Variation
 from bayesplate.frequencies.terms import along_grain
 from bayesplate.modes.fields import EdgeStrip, Fabric, Field, Group, layout
-from bayesplate.modes.plate import Weights
 from bayesplate.modes.shear import SHEAR_FLEXIBLE
+from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import THIN
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import log_frequency, mean_log_frequency
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.modes.plate import Parity
 from bayesplate.modes.solve import solve_classes
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Values
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bayesplate.errors import Fault
 from bayesplate.labels import HIGHEST_ORDER, Label
-from bayesplate.modes.plate import is_rigid
+from bayesplate.modes.beams import is_rigid
 from bayesplate.plate.board import Board
 from bayesplate.plate.setup import NO_OFFSET, Ends, Setup
 

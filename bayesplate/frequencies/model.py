@@ -13,15 +13,15 @@ from bayesplate.frequencies.laws import ExactLaw, Law, LawName, LinearLaw, log_f
 from bayesplate.frequencies.residues import residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
+from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
-from bayesplate.modes.plate import Beams, PlateMatrices
-from bayesplate.modes.reduction import ACCEPTED_CENTS, reduced_order_model
+from bayesplate.modes.plate import Plate
+from bayesplate.modes.reduced import reduced_order_model
 from bayesplate.modes.solve import Modes, solve_up_to
 from bayesplate.plate.board import Values
 from bayesplate.plate.sessions import discrepancy_names
 from bayesplate.plate.setup import Setup
 
-_SLACK = 0.01
 _ABOVE = 1.15
 """Frequency up to which modes are looked for, over the highest peak: what lies higher will not come down to it."""
 
@@ -55,7 +55,7 @@ class SetupModel:
     ----------
     system : System
         The setup and its effects.
-    plate : PlateMatrices
+    plate : Plate
     places : tuple of Place
         Where each labelled mode stands at the estimate; from there on a label means this rank of this class.
     linear : LinearLaw
@@ -71,7 +71,7 @@ class SetupModel:
     """
 
     system: System
-    plate: PlateMatrices
+    plate: Plate
     places: tuple[Place, ...]
     linear: LinearLaw
     exact: ExactLaw | None = None
@@ -199,7 +199,7 @@ class SetupModel:
         return np.column_stack(columns)
 
 
-def setup_model(system: System, values: Values, plate: PlateMatrices | None = None) -> SetupModel:
+def setup_model(system: System, values: Values, plate: Plate | None = None) -> SetupModel:
     """Solve a setup at given constants and sizes, and find its labelled modes.
 
     Parameters
@@ -207,7 +207,7 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
     system : System
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
-    plate : PlateMatrices, optional
+    plate : Plate, optional
         Matrices to use again; by default those of the production mesh for these values.
 
     Returns
@@ -225,7 +225,7 @@ def setup_model(system: System, values: Values, plate: PlateMatrices | None = No
     return replace(model, roved=tuple(_setup_model(one, values, one.plate(values)) for one in further))
 
 
-def _setup_model(system: System, values: Values, plate: PlateMatrices) -> SetupModel:
+def _setup_model(system: System, values: Values, plate: Plate) -> SetupModel:
     beams = [reading.beams for reading in system.setup.readings]
     weights = system.weights(values).at(0)
     found = find(plate, weights, beams)
@@ -300,28 +300,11 @@ def _with_others(model: SetupModel, values: Values, n_least: int = 0) -> tuple[S
 def log_frequencies_of_board(models: Sequence[SetupModel], values: Values, law: LawName) -> list[NDArray[np.float64]]:
     """ln f of all modes of each setup, with the discrepancies of the board from its plate that sessions share.
 
-    Setups that are one plate at these values, as most sessions are, are solved once.
-
     Returns
     -------
     list of (n_draws, n_every) array
     """
-    plates: list[NDArray[np.float64]] = []
-    for i, model in enumerate(models):
-        twin = next((j for j in range(i) if law == "exact" and _are_solved_alike(models[j], model, values)), None)
-        plates.append(model.every_log_frequency(values, law) if twin is None else plates[twin])
-    return [plate + model.discrepancies(values) for plate, model in zip(plates, models, strict=True)]
-
-
-def _are_solved_alike(one: SetupModel, other: SetupModel, values: Values) -> bool:
-    """Whether two setups have the same exact law, for the same modes, and weigh its terms alike."""
-    if not (isinstance(one.exact, ExactLaw) and isinstance(other.exact, ExactLaw)) or one.roved or other.roved:
-        return False
-    blocks = zip(one.exact.reduced.blocks, other.exact.reduced.blocks, strict=False)
-    if one.exact.reduced.places != other.exact.reduced.places or not all(a is b for a, b in blocks):
-        return False
-    weights = zip(one.system.weights(values), other.system.weights(values), strict=True)
-    return all(np.array_equal(a, b) for a, b in weights)
+    return [model.every_log_frequency(values, law) + model.discrepancies(values) for model in models]
 
 
 def with_exact(
@@ -329,63 +312,16 @@ def with_exact(
     centre: Values,
     around: Sequence[Values],
     held_out: Sequence[Values],
-    accepted_cents: float = ACCEPTED_CENTS,
+    tolerance: float,
 ) -> SetupModel:
-    """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`."""
+    """Add the exact law, trained at `centre` and `around` it and checked at the points `held_out`, in cents."""
     reduced = reduced_order_model(
         model.plate,
         model.every_place,
         model.system.weights(centre).at(0),
         [model.system.weights(values).at(0) for values in around],
         [model.system.weights(values).at(0) for values in held_out],
-        accepted_cents,
+        tolerance,
     )
-    roved = tuple(with_exact(one, centre, around, held_out, accepted_cents) for one in model.roved)
+    roved = tuple(with_exact(one, centre, around, held_out, tolerance) for one in model.roved)
     return replace(model, exact=ExactLaw(reduced), roved=roved)
-
-
-def with_exact_of(model: SetupModel, twin: SetupModel) -> SetupModel:
-    """Add the exact law of another setup of which this one is a twin (`are_twins`)."""
-    assert isinstance(twin.exact, ExactLaw)
-    return replace(model, exact=ExactLaw(replace(twin.exact.reduced, places=model.every_place)))
-
-
-def are_twins(one: SetupModel, other: SetupModel, points: Sequence[Values]) -> bool:
-    """Whether two setups are one plate at some points: the same matrices with the same weights, and the same modes.
-
-    Each may have a size of its own of the same effect, if the points of the first one's reach as far as the other's.
-    """
-    names = None if one.roved or other.roved else _names_in_twin(one.system, other.system)
-    if names is None or not all(_reaches(points, *pair) for pair in names.items()):
-        return False
-    blocks = zip(one.plate.blocks, other.plate.blocks, strict=False)
-    if len(one.plate.blocks) != len(other.plate.blocks):
-        return False
-    projected = (each.projected or each.projected_terms for each in (*one.plate.blocks, *other.plate.blocks))
-    if any(projected) or any(a.terms is not b.terms or a.masses is not b.masses for a, b in blocks):
-        return False
-    modes = ({(place.parity, place.rank) for place in each.every_place} for each in (one, other))
-    if next(modes) != next(modes):
-        return False
-    for values in points:
-        of_other = {**values, **{name: values[its_own] for its_own, name in names.items()}}
-        weights = one.system.weights(values), other.system.weights(of_other)
-        if not all(np.array_equal(a, b) for a, b in zip(*weights, strict=True)):
-            return False
-    return True
-
-
-def _reaches(points: Sequence[Values], one: str, other: str) -> bool:
-    """Whether all values of one parameter lie between the least and the greatest of another, but for a hundredth."""
-    first, second = (np.array([values[name] for values in points]) for name in (one, other))
-    slack = _SLACK * np.ptp(first)
-    return bool(first.min() - slack <= second.min() and second.max() <= first.max() + slack)
-
-
-def _names_in_twin(one: System, other: System) -> dict[str, str] | None:
-    """Names of one system's parameters -> those of another's that stand for the same; None if they have others."""
-    first, second = (
-        {(effect.name, size.key): size.name for effect in system.effects for size in effect.parameters()}
-        for system in (one, other)
-    )
-    return {name: second[key] for key, name in first.items()} if first.keys() == second.keys() else None

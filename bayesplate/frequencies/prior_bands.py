@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bayesplate.cards import PriorCard
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import Label
-from bayesplate.modes.line import N_BEAMS
+from bayesplate.modes.beams import N_BEAMS
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI, RIGIDITIES, isotropic_moduli, rigidities
 from bayesplate.plate.setup import Setup

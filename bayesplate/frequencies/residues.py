@@ -67,9 +67,7 @@ def _largest(modes: Modes, shaped: Effect | None) -> NDArray[np.float64]:
         return np.asarray(np.max(np.abs(modes.displacement(_GRID, _GRID)), axis=(1, 2)))
     low, high = (limit[:, None] for limit in outline(_GRID))
     places = low + (high - low) * _GRID
-    along = modes.plate.line_x.shapes(_GRID).toarray() @ modes.shapes
-    across = modes.plate.line_y.shapes(places.ravel()).toarray().reshape(*places.shape, -1)
-    return np.asarray(np.max(np.abs(np.einsum("min,ijn->mij", along, across)), axis=(1, 2)))
+    return np.asarray(np.max(np.abs(modes.displacement_across(_GRID, places)), axis=(1, 2)))
 
 
 def share_seen(residues: NDArray[np.float64]) -> NDArray[np.float64]:

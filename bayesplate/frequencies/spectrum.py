@@ -13,7 +13,7 @@ from bayesplate.frequencies.residues import NODAL_LINE, residues_of
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import CERTAIN, name_modes
-from bayesplate.modes.plate import PlateMatrices
+from bayesplate.modes.plate import Plate
 from bayesplate.modes.solve import Modes, solve
 from bayesplate.plate.board import Values
 from bayesplate.plate.setup import Setup
@@ -45,7 +45,7 @@ class NamedMode:
 
 
 def spectrum(
-    system: System, values: Values, n_modes: int, plate: PlateMatrices | None = None
+    system: System, values: Values, n_modes: int, plate: Plate | None = None
 ) -> tuple[Modes, tuple[NamedMode, ...]]:
     """Lowest modes of a setup at given constants and sizes.
 
@@ -55,7 +55,7 @@ def spectrum(
     values : dict of float
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
     n_modes : int
-    plate : PlateMatrices, optional
+    plate : Plate, optional
         Matrices to use again; by default those of the production mesh for these values.
 
     Returns

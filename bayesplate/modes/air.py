@@ -16,13 +16,12 @@ the width there over the mean: right for a long strip, of which each length carr
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.fields import Outline
-from bayesplate.modes.line import Line
+from bayesplate.modes.terms import Deflections
 
 Floats = NDArray[np.float64]
 
@@ -33,17 +32,14 @@ _MOST_ELONGATED = 4.0
 _EDGE_SHARE = 0.25
 
 
-def air_mass(
-    x: Line, y: Line, deflections: Floats, aspect_ratio: float, is_baffled: bool, outline: Outline | None = None
-) -> Floats:
+def air_mass(deflections: Deflections, aspect_ratio: float, is_baffled: bool, outline: Outline | None = None) -> Floats:
     """Mass of the air on given deflections, both faces wet.
 
     Both methods are of second order in the panels, so two lattices are extrapolated to none.
 
     Parameters
     ----------
-    x, y : Line
-    deflections : (n_vectors, n_dof_x, n_dof_y) array
+    deflections : Deflections
     aspect_ratio : float
         L_x / L_y, of the mean width.
     is_baffled : bool
@@ -61,15 +57,13 @@ def air_mass(
     Korotkin, Added Masses of Ship Structures, 6.3, for the kernel 1/R; the limit of a strip of width b in the open is
     pi rho b^2 / 4 per length.
     """
-    coarse, fine = (_on_lattice(x, y, deflections, aspect_ratio, is_baffled, outline, n) for n in (1.0, _REFINED))
+    coarse, fine = (_on_lattice(deflections, aspect_ratio, is_baffled, outline, n) for n in (1.0, _REFINED))
     mass = fine + (fine - coarse) / (_REFINED**2 - 1.0)
     return 0.5 * (mass + mass.T)
 
 
 def _on_lattice(
-    x: Line,
-    y: Line,
-    deflections: Floats,
+    deflections: Deflections,
     aspect_ratio: float,
     is_baffled: bool,
     outline: Outline | None,
@@ -81,10 +75,9 @@ def _on_lattice(
     margin = 0.0 if is_baffled else _EDGE_SHARE
     steps = tuple(side / (n + 2.0 * margin) for side, n in zip(sides, shape, strict=True))
     if outline is None:
-        along_x, along_y = (_at_middles(side, n, margin) for side, n in zip((x, y), shape, strict=True))
-        moved = np.stack([(along_y @ (along_x @ w).T).T.ravel() for w in deflections], axis=1)
+        moved = deflections.on(*(_middles(n, margin) for n in shape)).reshape(-1, shape[0] * shape[1]).T
     else:
-        moved = _following(x, y, deflections, shape, margin, outline)
+        moved = _following(deflections, shape, margin, outline)
     if is_baffled:
         return moved.T @ (_sources(shape, steps) @ moved) / np.pi
     # Whitened by the triangular factor of the induced velocities: w' H^-1 w.
@@ -94,29 +87,19 @@ def _on_lattice(
     return steps[0] * steps[1] * white.T @ white
 
 
-@lru_cache(maxsize=32)
-def _at_middles(side: Line, n: int, margin: float) -> Any:
-    """Values of a line's functions at the middles of n panels that end so many panels short of both ends."""
-    return side.shapes(_middles(n, margin))
-
-
 def _middles(n: int, margin: float) -> Floats:
     return np.asarray((np.arange(n) + 0.5 + margin) / (n + 2.0 * margin), dtype=np.float64)
 
 
-def _following(
-    x: Line, y: Line, deflections: Floats, shape: tuple[int, int], margin: float, outline: Outline
-) -> Floats:
+def _following(deflections: Deflections, shape: tuple[int, int], margin: float, outline: Outline) -> Floats:
     """Deflections at the middles of panels that follow an outline, for the rectangle of its mean width."""
     at_x, share = (_middles(n, margin) for n in shape)
     low, high = outline(at_x)
-    width = high - low
+    width = (high - low)[:, None]
     mean = float(width.mean())
-    across = y.shapes((low[:, None] + width[:, None] * share).ravel()).toarray().reshape(*shape, -1)
-    along_x = x.shapes(at_x)
-    moved = np.stack([np.einsum("xyj,xj->xy", across, along_x @ w) * (width / mean)[:, None] for w in deflections])
+    moved = deflections.across(at_x, low[:, None] + width * share) * (width / mean)
     # Of the unit area of the whole rectangle the mean width leaves its share, and air goes with the area to 3/2.
-    return np.asarray(mean**0.75 * moved.reshape(len(deflections), -1).T)
+    return np.asarray(mean**0.75 * moved.reshape(len(moved), -1).T)
 
 
 def _lattice(aspect_ratio: float, refinement: float) -> tuple[int, int]:

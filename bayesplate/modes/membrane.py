@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.fields import Field
-from bayesplate.modes.line import Line
+from bayesplate.modes.terms import Deflections
 from bayesplate.plate.setup import Ends
 
 Floats = NDArray[np.float64]
@@ -69,9 +69,7 @@ class _Matrices:
 
 
 def membrane_terms(
-    x: Line,
-    y: Line,
-    deflections: Floats,
+    deflections: Deflections,
     aspect_ratio: float,
     moduli: tuple[float, ...],
     curvatures: tuple[Curvature, ...] = CURVATURES,
@@ -81,8 +79,7 @@ def membrane_terms(
 
     Parameters
     ----------
-    x, y : Line
-    deflections : (n_vectors, n_dof_x, n_dof_y) array
+    deflections : Deflections
     aspect_ratio : float
         L_x / L_y.
     moduli : tuple of 4 floats
@@ -98,9 +95,9 @@ def membrane_terms(
         For a plate of unit area: what a unit of the product of the two curvatures (each pair once, a cross term both
         ways; `curvature_pairs`) and of the modulus gives to the stiffness.
     """
-    held = x.ends, y.ends, aspect_ratio, thickness
+    held = deflections.x.ends, deflections.y.ends, aspect_ratio, thickness
     made = _matrices(*held)
-    at_nodes = _at(x, y, deflections, made.places)
+    at_nodes = _at(deflections, made.places)
     loads = [load @ at_nodes for load in made.loads]
     squares = at_nodes.T @ (made.mass @ at_nodes)
     fields = {one: _solved(held, moduli, CURVATURES.index(one), loads) for one in curvatures}
@@ -117,11 +114,10 @@ def curvature_pairs(curvatures: Sequence[Curvature]) -> tuple[tuple[Curvature, C
     return tuple(combinations_with_replacement(curvatures, 2))
 
 
-def _at(x: Line, y: Line, deflections: Floats, places: Floats) -> Floats:
+def _at(deflections: Deflections, places: Floats) -> Floats:
     """Deflections at places, which are those of a lattice: (n_places, n_vectors) array."""
     sides, at = zip(*(np.unique(np.round(one, 9), return_inverse=True) for one in places), strict=True)
-    along_x, along_y = (line.shapes(side).toarray() for line, side in zip((x, y), sides, strict=True))
-    return np.asarray((along_x @ deflections @ along_y.T)[:, at[0], at[1]].T)
+    return np.asarray(deflections.on(*sides)[:, at[0], at[1]].T)
 
 
 def _coupling(moduli: tuple[float, ...]) -> Floats:

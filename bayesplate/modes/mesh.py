@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesplate.modes.plate import Weights
+from bayesplate.modes.terms import Weights
 
 ELEMENTS_PER_SIDE = 22
 """Elements per side of a plate that bends alike both ways: twelve modes within 0.02 %, in about 30 ms."""

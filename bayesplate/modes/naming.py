@@ -8,8 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.plate import Beams, Parity, PlateMatrices, Weights
+from bayesplate.modes.beams import Beams, beam_functions, product_coefficients
+from bayesplate.modes.plate import Plate, SymmetryClass
 from bayesplate.modes.solve import ClassModes, Modes, solve_classes
+from bayesplate.modes.terms import Parity, Weights
+
+Floats = NDArray[np.float64]
 
 CERTAIN = 0.75
 """Correlation with its product of beam functions below which a mode's name is "cannot tell"."""
@@ -52,21 +56,18 @@ class Found:
 
     place: Place
     eigenvalue: float
-    stiffness: NDArray[np.float64]
-    mass: NDArray[np.float64]
+    stiffness: Floats
+    mass: Floats
 
 
-def name_shapes(
-    plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity, on_plate: NDArray[np.float64]
-) -> list[tuple[Beams, float]]:
+def name_shapes(own: SymmetryClass, vectors: Floats, on_plate: Floats) -> list[tuple[Beams, float]]:
     """Beam product and correlation of each mode of a class, each product given to one mode only.
 
     Parameters
     ----------
-    plate : PlateMatrices
-    shapes : (n_modes, n_dof_x, n_dof_y) array
-        Deflections of the lowest modes of the class, of any size.
-    parity : Parity
+    own : SymmetryClass
+    vectors : (n_dof, n_modes) array
+        The lowest modes of the class, of any size.
     on_plate : (n_modes,) array
         Share of the kinetic energy of each that is the plate's, with all that it carries along.
 
@@ -75,30 +76,34 @@ def name_shapes(
     list of (tuple of int, float)
         In the order of the modes.
     """
-    parts = beam_parts(plate, shapes, parity)
-    squares = np.einsum("nij,nij->n", shapes, plate.line_x.mass @ shapes @ plate.line_y.mass)
-    products, named = list(parts), name_parts(fits(np.stack(list(parts.values()), axis=1), squares, on_plate))
+    parts, squares = beam_parts(own, vectors)
+    products, named = own.plate.elastic_products[own.parity], name_parts(fits(parts, np.diagonal(squares), on_plate))
     return [(products[column], correlation) for column, correlation in named]
 
 
-def beam_parts(plate: PlateMatrices, shapes: NDArray[np.float64], parity: Parity) -> dict[Beams, NDArray[np.float64]]:
-    """What deflections of a class have of each product of beam functions: (n_shapes,) arrays, of its elastic products.
+def beam_parts(own: SymmetryClass, vectors: Floats) -> tuple[Floats, Floats]:
+    """What deflections of a class have of each product of beam functions that bends, and their mean products.
 
     Parameters
     ----------
-    plate : PlateMatrices
-    shapes : (n_shapes, n_dof_x, n_dof_y) array
-    parity : Parity
+    own : SymmetryClass
+    vectors : (n_dof, n_vectors) array
+
+    Returns
+    -------
+    (n_vectors, n_products) and (n_vectors, n_vectors) arrays
+        In the order of `Plate.elastic_products`.
     """
-    beams_x = plate.line_x.beams.T @ plate.line_x.mass
-    beams_y = plate.line_y.beams.T @ plate.line_y.mass
-    correlations = beams_x @ shapes @ beams_y.T
-    return {(i, j): correlations[:, i, j] for i, j in plate.elastic_products[parity]}
+    x, y = own.plate.x, own.plate.y
+    deflections = own.strains(["w"], vectors)["w"].reshape(-1, x.points.size, y.points.size)
+    along_x, along_y = (side.weights * beam_functions(side.ends).at(side.points).T for side in (x, y))
+    parts = along_x @ deflections @ along_y.T
+    orders = np.array(own.plate.elastic_products[own.parity]).T
+    weighed = (np.outer(x.weights, y.weights) * deflections).reshape(len(deflections), -1)
+    return parts[:, orders[0], orders[1]], weighed @ deflections.reshape(len(deflections), -1).T
 
 
-def fits(
-    parts: NDArray[np.float64], squares: NDArray[np.float64], on_plate: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def fits(parts: Floats, squares: Floats, on_plate: Floats) -> Floats:
     """How well each shape fits each product: its correlation by the root of the plate's share of the motion.
 
     A shape is measured by itself, for the water that a plate carries along may weigh ten times what it weighs, and
@@ -115,7 +120,7 @@ def fits(
     return np.asarray(parts * np.sqrt(np.maximum(on_plate, 0.0) / squares)[:, None])
 
 
-def name_parts(parts: NDArray[np.float64]) -> list[tuple[int, float]]:
+def name_parts(parts: Floats) -> list[tuple[int, float]]:
     """Product and correlation of each mode, each product given to one mode only.
 
     Parameters
@@ -136,32 +141,15 @@ def name_parts(parts: NDArray[np.float64]) -> list[tuple[int, float]]:
 
 def name_modes(modes: Modes) -> list[tuple[Beams, float]]:
     """Beam product and correlation of each of the lowest modes of a plate, in their order."""
-    names: dict[int, tuple[Beams, float]] = {}
-    for parity in set(modes.parities):
-        members = [i for i, p in enumerate(modes.parities) if p == parity]
-        on_plate = modes.classes[parity].on_plate[modes.ranks[members]]
-        names |= zip(members, name_shapes(modes.plate, modes.shapes[members], parity, on_plate), strict=True)
+    named = {
+        parity: list(zip(modes.rows(parity), name_shapes(one.own, one.vectors, one.on_plate), strict=True))
+        for parity, one in modes.by_class.items()
+    }
+    names = dict(pair for of_class in named.values() for pair in of_class)
     return [names[i] for i in range(len(names))]
 
 
-def product_coefficients(plate: PlateMatrices) -> NDArray[np.float64]:
-    """Rayleigh quotients of all products of beam functions: (4, n_beams_x, n_beams_y) array.
-
-    Rough, but they need no stiffness to be known: the start of every estimate.
-    """
-    bending_x, slope_x, mixed_x = plate.line_x.beam_energies
-    bending_y, slope_y, mixed_y = plate.line_y.beam_energies
-    return np.stack(
-        [
-            np.add.outer(bending_x, np.zeros_like(bending_y)),
-            np.add.outer(np.zeros_like(bending_x), bending_y),
-            2.0 * np.outer(mixed_x, mixed_y),
-            np.outer(slope_x, slope_y),
-        ]
-    )
-
-
-def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams, Found]:
+def find(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams, Found]:
     """Find each wanted name among the modes of a plate.
 
     Parameters
@@ -193,13 +181,13 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
         solved |= solve_classes(plate, weights, {p: min(n + _AHEAD * (p in solved), most[p]) for p, n in short.items()})
         places = {name: place for name, place in places.items() if place.parity not in counts}
         for parity, n in counts.items():
-            places |= _places(plate, solved[parity].of(range(n)), names)
+            places |= _places(solved[parity].of(range(n)), names)
         lost = {plate.parity(n) for n in names if n not in places or places[n].correlation < _STRAY}
         unsure = {plate.parity(n) for n in names if n in places and not places[n].is_certain}
         counts = {
             p: min(n + 2 * _SPARE, most[p])
             for p, n in counts.items()
-            if n < most[p] and (p in lost or (p in unsure and n < _MOST_MODES // len(plate.blocks)))
+            if n < most[p] and (p in lost or (p in unsure and n < _MOST_MODES // len(plate.classes)))
         }
     missing = [name for name in names if name not in places]
     if missing:
@@ -208,9 +196,9 @@ def find(plate: PlateMatrices, weights: Weights, wanted: Iterable[Beams]) -> dic
     return {name: found[name] for name in names}
 
 
-def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) -> dict[Parity, int]:
+def _expected_ranks(plate: Plate, weights: Weights, names: list[Beams]) -> dict[Parity, int]:
     """How many products of each class lie at or below the highest wanted one, by their Rayleigh quotients."""
-    values = np.tensordot(weights.stiffness[:4], product_coefficients(plate), axes=1)
+    values = np.tensordot(weights.stiffness[:4], product_coefficients(plate.x.ends, plate.y.ends), axes=1)
     unknown = [name for name in names if name not in plate.elastic_products[plate.parity(name)]]
     if unknown:
         raise KeyError(unknown)
@@ -221,10 +209,10 @@ def _expected_ranks(plate: PlateMatrices, weights: Weights, names: list[Beams]) 
     return {p: sum(bool(values[b] <= top) for b in plate.elastic_products[p]) for p, top in highest.items()}
 
 
-def _places(plate: PlateMatrices, modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
+def _places(modes: ClassModes, names: Sequence[Beams]) -> dict[Beams, Place]:
     """Those of the wanted names that some of the lowest modes of a class have."""
-    parity = modes.block.parity
-    of_each = name_shapes(plate, modes.block.spread(modes.vectors), parity, modes.on_plate)
+    of_each = name_shapes(modes.own, modes.vectors, modes.on_plate)
+    parity = modes.own.parity
     return {name: Place(parity, rank, fit) for rank, (name, fit) in enumerate(of_each) if name in names}
 
 

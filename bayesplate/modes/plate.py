@@ -2,355 +2,418 @@
 
     omega^2 = phi' (sum_i theta_i K_i) phi / phi' (sum_j mu_j M_j) phi
 
-The side lengths appear in the weights theta and mu only (`bayesplate.frequencies.terms`), so that boards that share
-their edges share these matrices whatever their size. Where opposite edges are alike the matrices split into classes of
-even and odd functions: no two modes of one class cross, and none of different classes mix.
+On products of the two sides' functions every strain is known at every Gauss point from one matrix along x and one along
+y. The side lengths appear in the weights theta and mu only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.banded import Band
-from bayesplate.modes.line import Line, rigid_degrees
-from bayesplate.modes.sparse import mirrored
-from bayesplate.modes.threads import in_threads
-from bayesplate.plate.setup import Ends
+from bayesplate.modes.beams import N_BEAMS, Beams, is_rigid
+from bayesplate.modes.fields import UNIFORM, Fabric, Group, layout, weights_within
+from bayesplate.modes.line import Line
+from bayesplate.modes.terms import (
+    AlongEdges,
+    Amount,
+    AtPlaces,
+    Deflections,
+    Derivative,
+    Kinematics,
+    OnDeflections,
+    OverPlate,
+    Pair,
+    Parity,
+    Term,
+    Weights,
+)
 
-KronSum = tuple[tuple[Any, Any], ...]
-"""A term of the plate as a sum of products of one matrix along x and one along y, on the unknowns of the two lines."""
-
-
-class EdgeTurn(NamedTuple):
-    """A stiffness term: the squared turning of the cross-sections, integrated along edges.
-
-    The thin plate's cross-sections turn with its slope, those of the shear-flexible plate by the shear strain less.
-
-    Attributes
-    ----------
-    axis : int
-        0: the edges x0 and x1, 1: the edges y0 and y1.
-    at : tuple of bool
-        Which of the two.
-    """
-
-    axis: int
-    at: tuple[bool, bool]
-
-
-class Beside(NamedTuple):
-    """A term of a coordinate beside the plate, such as the rise of a magnet that hangs on it.
-
-    Attributes
-    ----------
-    coordinate : int
-        Which one, from 0.
-    rows : tuple of pairs of (1, n_dof_x) and (1, n_dof_y) arrays
-        The term is twice the product of the coordinate with the deflection that these rows give, summed over the pairs;
-        without rows it is the square of the coordinate.
-    """
-
-    coordinate: int
-    rows: KronSum = ()
-
-
-Term = KronSum | EdgeTurn | Beside
-"""A stiffness term: on the deflection, on the turning of cross-sections along edges, or of a coordinate beside."""
-
-Projection = Callable[[Line, Line, NDArray[np.float64]], NDArray[np.float64]]
-"""Terms without sparse matrices: from the lines and (n_vectors, n_dof_x, n_dof_y) deflections to their
-(n_terms, n_vectors, n_vectors) matrices; a term alone may be an (n_vectors, n_vectors) one."""
-
-Beams = tuple[int, int]
-"""Order of the beam functions along x and y whose product a mode resembles; (0, 0) is the lowest."""
-
-
-_TERMS_AT_ONCE = 8
-"""Whose products with a basis are held at once."""
-
-
-class Weights(NamedTuple):
-    """Weights of the stiffness terms, s^-2, and of the mass terms, as fractions of the board's mass.
-
-    Arrays of (n_terms,) and (n_masses,), or of (n_draws, n_terms) and (n_draws, n_masses).
-    """
-
-    stiffness: NDArray[np.float64]
-    mass: NDArray[np.float64]
-
-    def at(self, draw: int) -> Weights:
-        """The weights of one draw."""
-        return Weights(self.stiffness[draw], self.mass[draw])
-
-
-class Parity(NamedTuple):
-    """Class of functions: 0 even, 1 odd along each side; 0 where the two ends differ and there is no such class."""
-
-    x: int
-    y: int
-
-
-class Panel(NamedTuple):
-    """Rows of a symmetric matrix that hold the same columns: a dense part of it.
-
-    Attributes
-    ----------
-    rows : (n_rows,) array of int
-    columns : (n_columns,) array of int
-    places : (n_rows, n_columns) array of int
-        Where the values stand among those of the lower triangle.
-    """
-
-    rows: NDArray[np.intp]
-    columns: NDArray[np.int32]
-    places: NDArray[np.intp]
-
-
-OnDeflections = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""A `Projection` on the lines of its plate."""
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
-    """One symmetry class: the lower triangles of its stiffness and mass terms, which are symmetric, on one pattern.
+class Elements:
+    """A weighted sum of terms, element by element: by two fields, (n_elements, 16, 16) arrays; and terms at places."""
 
-    Attributes
-    ----------
-    parity : Parity
-    terms : (n_terms, n_stored) array
-        Stored values of each stiffness term, non-dimensional.
-    masses : (n_masses, n_stored) array
-        Stored values of each mass term; the first is the board's own.
-    indices, indptr : arrays
-        The pattern they share (compressed columns).
-    spread_x, spread_y : sparse arrays
-        From the class's functions along x and y to all functions of the line; the deflection's unknowns come first.
-    n_rigid : int
-        Number of rigid motions of the whole plate in this class.
-    n_beside : int
-        Number of coordinates beside the plate, the last unknowns.
-    projected_terms, projected : tuple of callable
-        Stiffness and mass terms beyond `terms` and `masses` that exist on given deflections only.
-    """
-
-    parity: Parity
-    terms: NDArray[np.float64]
-    masses: NDArray[np.float64]
-    indices: NDArray[np.int32]
-    indptr: NDArray[np.int32]
-    spread_x: Any
-    spread_y: Any
-    n_rigid: int
-    n_beside: int = 0
-    projected_terms: tuple[OnDeflections, ...] = ()
-    projected: tuple[OnDeflections, ...] = ()
-
-    @property
-    def n_dof(self) -> int:
-        """Number of unknowns of the class."""
-        return self.indptr.size - 1
-
-    @property
-    def n_masses(self) -> int:
-        """Number of mass terms; each of the projected ones is one."""
-        return len(self.masses) + len(self.projected)
-
-    def matrix(self, stored: NDArray[np.float64]) -> Any:
-        """Sparse (n_dof, n_dof) array with the given stored values, whole."""
-        from scipy.sparse import csc_array
-
-        places, indices, indptr = self._whole
-        return csc_array((stored[places], indices, indptr), shape=(self.n_dof, self.n_dof))
-
-    @cached_property
-    def _whole(self) -> tuple[NDArray[np.intp], NDArray[np.int32], NDArray[np.int32]]:
-        return mirrored(self.indices, self.indptr)
-
-    def stored_stiffness(self, weights: Weights) -> NDArray[np.float64]:
-        """Stored values of the weighted sum of the stiffness terms, save the projected ones."""
-        return np.asarray(weights.stiffness[..., : len(self.terms)] @ self.terms)
-
-    def stiffness(self, weights: Weights) -> Any:
-        """Weighted sum of the stiffness terms, save the projected ones, as a sparse (n_dof, n_dof) array."""
-        return self.matrix(self.stored_stiffness(weights))
-
-    def mass(self, weights: Weights) -> Any:
-        """Weighted sum of the mass terms, save the projected ones, as a sparse (n_dof, n_dof) array."""
-        return self.matrix(weights.mass[: len(self.masses)] @ self.masses)
-
-    @cached_property
-    def panels(self) -> tuple[Panel, ...]:
-        """The unknowns of each node of the mesh, in the order of the first one: their rows hold the same columns."""
-        places, columns, starts = self._whole
-        alike: dict[bytes, list[int]] = {}
-        for row in range(self.n_dof):
-            alike.setdefault(columns[starts[row] : starts[row + 1]].tobytes(), []).append(row)
-        return tuple(
-            Panel(
-                np.array(rows, dtype=np.intp),
-                columns[starts[rows[0]] : starts[rows[0] + 1]],
-                np.stack([places[starts[row] : starts[row + 1]] for row in rows]),
-            )
-            for rows in alike.values()
-        )
-
-    @cached_property
-    def band(self) -> Band:
-        """Where the stored values stand in a band, node by node."""
-        return Band.of(self.indices, self.indptr, np.concatenate([panel.rows for panel in self.panels]))
-
-    @cached_property
-    def diagonal(self) -> NDArray[np.intp]:
-        """Where the diagonal stands among the stored values: each column's first, for all of it is stored."""
-        return self.indptr[:-1].astype(np.intp)
-
-    def times(self, terms: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Terms times (n_dof, n_vectors) vectors: (n_terms, n_dof, n_vectors) array.
-
-        Panel by panel, for a product of dense matrices is several times faster than one of a sparse matrix.
-        """
-        found = np.empty((len(terms), *vectors.shape))
-        for rows, columns, places in self.panels:
-            found[:, rows] = terms[:, places] @ vectors[columns]
-        return found
-
-    def project(self, terms: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Terms on the span of (n_dof, n_vectors) vectors: (n_terms, n_vectors, n_vectors) array."""
-        parts = [terms[start : start + _TERMS_AT_ONCE] for start in range(0, len(terms), _TERMS_AT_ONCE)]
-        found = in_threads(lambda some: vectors.T @ self.times(some, vectors), parts)
-        small = np.concatenate(found) if found else np.empty((0, vectors.shape[1], vectors.shape[1]))
-        return (small + np.swapaxes(small, -1, -2)) / 2.0
-
-    def energies(self, terms: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Each term's phi' K phi of (n_dof, n_vectors) vectors: (n_terms, n_vectors) array, the diagonal of `project`.
-
-        Row by row of whole terms, of which each nearly cancels; triangles alone would lose a digit.
-        """
-
-        def of(panels: Sequence[Panel]) -> NDArray[np.float64]:
-            found = np.zeros((len(terms), vectors.shape[1]))
-            for rows, columns, places in panels:
-                found += np.einsum("trv,rv->tv", terms[:, places] @ vectors[columns], vectors[rows])
-            return found
-
-        return np.asarray(sum(in_threads(of, [self.panels[::2], self.panels[1::2]])))
-
-    def project_stiffness(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All stiffness terms on the span of vectors, the projected ones last."""
-        return np.concatenate([self.project(self.terms, vectors), self._on_span(self.projected_terms, vectors)])
-
-    def project_masses(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All mass terms on the span of vectors, the projected ones last."""
-        return np.concatenate([self.project(self.masses, vectors), self._on_span(self.projected, vectors)])
-
-    def stiffness_energies(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """phi' K phi of all stiffness terms, the projected ones last: (n_terms, n_vectors) array."""
-        further = np.diagonal(self._on_span(self.projected_terms, vectors), axis1=1, axis2=2)
-        return np.concatenate([self.energies(self.terms, vectors), further])
-
-    def mass_energies(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same of all mass terms, the projected ones last: (n_masses, n_vectors) array."""
-        further = np.diagonal(self._on_span(self.projected, vectors), axis1=1, axis2=2)
-        return np.concatenate([self.energies(self.masses, vectors), further])
-
-    def further_stiffness(self, weights: Weights, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weighted sums of the projected stiffness terms on the span of vectors.
-
-        Returns
-        -------
-        (n_vectors, n_vectors) array
-            Of one draw, or (n_draws, n_vectors, n_vectors); zeros where there are no such terms.
-        """
-        further = self._on_span(self.projected_terms, vectors)
-        return np.tensordot(weights.stiffness[..., len(self.terms) :], further, axes=1)
-
-    def beside(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The coordinates beside the plate in (n_dof, n_vectors) vectors: (n_beside, n_vectors) array."""
-        return vectors[self.n_dof - self.n_beside :]
-
-    @cached_property
-    def masses_beside(self) -> NDArray[np.float64]:
-        """What each stored mass term gives to the coordinates beside the plate: (n_masses, n_beside) array."""
-        return self.masses[:, self.diagonal[self.n_dof - self.n_beside :]]
-
-    def share_on_plate(self, weights: Weights, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Share of the kinetic energy that is no magnet's: (n_vectors,) array.
-
-        Parameters
-        ----------
-        weights : Weights
-        vectors : (n_dof, n_vectors) array
-            Normalised in the mass of these weights.
-        """
-        return np.asarray(1.0 - (weights.mass[: len(self.masses)] @ self.masses_beside) @ self.beside(vectors) ** 2)
-
-    def _on_span(self, terms: Sequence[OnDeflections], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        if not terms:
-            return np.empty((0, vectors.shape[1], vectors.shape[1]))
-        deflections = self.spread(vectors)
-        n = vectors.shape[1]
-        return np.concatenate([np.reshape(term(deflections), (-1, n, n)) for term in terms])
-
-    def spread(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Deflection of (n_dof, n_vectors) of the class as (n_vectors, n_dof_x, n_dof_y) of the two lines."""
-        n_x, n_y = self.spread_x.shape[1], self.spread_y.shape[1]
-        grids = vectors[: n_x * n_y].T.reshape(-1, n_x, n_y)
-        return np.stack([(self.spread_y @ (self.spread_x @ grid).T).T for grid in grids])
+    over_plate: Mapping[tuple[str, str], Floats]
+    elsewhere: tuple[tuple[AlongEdges | AtPlaces, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class PlateMatrices:
-    """A plate's two lines and the matrices of its symmetry classes; see `bayesplate.modes.thin`."""
+class Plate:
+    """A plate on two sides.
 
-    line_x: Line
-    line_y: Line
-    blocks: tuple[Block, ...]
+    Attributes
+    ----------
+    kinematics : Kinematics
+    x, y : Line
+    stiffness, masses : tuple of (Term, (n_x, n_y) array or None)
+        The plate's own terms first; the array weighs the Gauss points of a term over the plate.
+    """
+
+    kinematics: Kinematics
+    x: Line
+    y: Line
+    stiffness: tuple[tuple[Term, Floats | None], ...]
+    masses: tuple[tuple[Term, Floats | None], ...]
+
+    @cached_property
+    def classes(self) -> tuple[SymmetryClass, ...]:
+        """The symmetry classes, the even one first."""
+        along = ((0, 1) if side.is_split else (0,) for side in (self.x, self.y))
+        both_x, both_y = along
+        return tuple(SymmetryClass(self, Parity(i, j)) for i in both_x for j in both_y)
+
+    @property
+    def n_beside(self) -> int:
+        """Number of coordinates beside the plate."""
+        places = (term.n_beside for term, _ in (*self.stiffness, *self.masses) if isinstance(term, AtPlaces))
+        return max(places, default=0)
+
+    @property
+    def is_projected(self) -> bool:
+        """Whether some terms exist on given deflections only."""
+        return any(isinstance(term, OnDeflections) for term, _ in (*self.stiffness, *self.masses))
 
     def parity(self, beams: Beams) -> Parity:
         """Symmetry class to which a product of beam functions belongs."""
-        return Parity(beams[0] % 2 if self.line_x.is_symmetric else 0, beams[1] % 2 if self.line_y.is_symmetric else 0)
+        return Parity(beams[0] % 2 if self.x.is_split else 0, beams[1] % 2 if self.y.is_split else 0)
+
+    def symmetry_class(self, parity: Parity) -> SymmetryClass:
+        """The class of that parity."""
+        return next(one for one in self.classes if one.parity == parity)
 
     @cached_property
     def elastic_products(self) -> dict[Parity, list[Beams]]:
         """Orders of those products of beam functions that bend, by symmetry class."""
-        shape = self.line_x.beams.shape[1], self.line_y.beams.shape[1]
-        found: dict[Parity, list[Beams]] = {block.parity: [] for block in self.blocks}
-        for beams in np.ndindex(shape):
-            if not is_rigid(beams, self.line_x.ends, self.line_y.ends):
+        found: dict[Parity, list[Beams]] = {one.parity: [] for one in self.classes}
+        for beams in np.ndindex(N_BEAMS, N_BEAMS):
+            if not is_rigid(beams, self.x.ends, self.y.ends):
                 found[self.parity(beams)].append(beams)
         return found
 
-    def block(self, parity: Parity) -> Block:
-        """The block of a class."""
-        return next(block for block in self.blocks if block.parity == parity)
+    def elements(self, weights: Weights) -> tuple[Elements, Elements]:
+        """Stiffness and mass of one draw, without the terms that exist on given deflections only."""
+        return self._elements(self.stiffness, weights.stiffness), self._elements(self.masses, weights.mass)
 
-    def with_projected(self, masses: Sequence[Projection], terms: Sequence[Projection] = ()) -> PlateMatrices:
-        """The same plate with these as all of its terms without a matrix; its own matrices are shared."""
-        stiff, inert = (tuple(partial(one, self.line_x, self.line_y) for one in each) for each in (terms, masses))
-        return replace(
-            self, blocks=tuple(replace(block, projected_terms=stiff, projected=inert) for block in self.blocks)
+    def _elements(self, terms: Sequence[tuple[Term, Floats | None]], weights: Floats) -> Elements:
+        grids: dict[Pair, Floats] = {}
+        elsewhere = []
+        for (term, grid), weight in zip(_each(terms), weights, strict=True):
+            if isinstance(term, OverPlate):
+                grids[term.strains] = grids.get(term.strains, 0.0) + weight * np.asarray(grid)
+            elif not isinstance(term, OnDeflections):
+                elsewhere.append((term, float(weight)))
+        found: dict[tuple[str, str], Floats] = {}
+        order = self.kinematics.fields.index
+        for strains, grid in grids.items():
+            for s, t in dict.fromkeys((strains, strains[::-1])):
+                for a in self.kinematics.strains[s]:
+                    for b in self.kinematics.strains[t]:
+                        if order(a.field) <= order(b.field):
+                            both = a.field, b.field
+                            found[both] = found.get(both, 0.0) + self._local(grid, a, b)
+        return Elements(found, tuple(elsewhere))
+
+    def _local(self, grid: Floats, a: Derivative, b: Derivative) -> Floats:
+        """Integrals of the product of two derivatives on each element's own functions: (n_elements, 16, 16) array."""
+        along_x = self.x.local[a.along_x][..., :, None] * self.x.local[b.along_x][..., None, :]
+        along_y = self.y.local[a.along_y][..., :, None] * self.y.local[b.along_y][..., None, :]
+        (n_x, q_x), (n_y, q_y) = along_x.shape[:2], along_y.shape[:2]
+        by_row = grid.reshape(n_x * q_x, n_y, q_y).swapaxes(0, 1) @ along_y.reshape(n_y, q_y, 16)
+        both = along_x.reshape(n_x, q_x, 16).swapaxes(1, 2) @ by_row.reshape(n_y, n_x, q_x, 16)
+        local = both.reshape(n_y, n_x, 4, 4, 4, 4).transpose(0, 1, 2, 4, 3, 5)
+        return np.asarray(a.factor * b.factor * local.reshape(n_y * n_x, 16, 16))
+
+
+def plate_of(
+    kinematics: Kinematics,
+    x: Line,
+    y: Line,
+    stiffness: Sequence[Term] = (),
+    masses: Sequence[Term] = (),
+    fabric: Fabric = UNIFORM,
+) -> Plate:
+    """A plate on two sides.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    x, y : Line
+        Whole along a side on which a further term is not symmetric.
+    stiffness, masses : sequence of Term
+        Further terms; they come after the plate's own.
+    fabric : Fabric
+        Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`.
+
+    Returns
+    -------
+    Plate
+    """
+    groups = kinematics.groups(fabric.is_turned)
+    weights = fabric.weights({*groups[0], *groups[1]}, x, y)
+    counts = {group: len(made) for group, made in weights.items()}
+
+    def own(pairs: Sequence[Pair], group: Sequence[Group]) -> list[tuple[Term, Floats | None]]:
+        return [(OverPlate(pairs[term]), weights[group[term]][k]) for term, k in layout(group, counts)]
+
+    def further(terms: Sequence[Term]) -> list[tuple[Term, Floats | None]]:
+        return [(one, weights_within(x, y, one.outline) if isinstance(one, OverPlate) else None) for one in terms]
+
+    stiff = (*own(kinematics.stiffnesses, groups[0]), *further(stiffness))
+    return Plate(kinematics, x, y, stiff, (*own(kinematics.masses, groups[1]), *further(masses)))
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetryClass:
+    """One symmetry class of a plate: its unknowns, and the plate's terms on them."""
+
+    plate: Plate
+    parity: Parity
+
+    @cached_property
+    def _numbering(self) -> tuple[dict[str, NDArray[np.intp]], int]:
+        """Number of each field's unknown by its functions along x and along y, -1 where there is none; how many."""
+        x, y = self.plate.x, self.plate.y
+        is_sheared = len(self.plate.kinematics.fields) > 1
+        along_x, along_y = x.kept(self.parity.x, is_sheared), y.kept(self.parity.y, is_sheared)
+        kept = {"w": np.outer(along_x, along_y)}
+        if is_sheared:
+            kept["g_x"] = np.outer(x.kept_strain(self.parity.x), along_y)
+            kept["g_y"] = np.outer(along_x, y.kept_strain(self.parity.y))
+        numbers, n = {}, 0
+        for name, own in kept.items():
+            numbers[name] = np.where(own, n - 1 + np.cumsum(own).reshape(own.shape), -1)
+            n += int(own.sum())
+        if is_sheared:  # at a clamp the cross-section does not turn: the strain there is the slope of the deflection
+            for value, slope in x.ties():
+                numbers["g_x"][value] = numbers["w"][slope]
+            for value, slope in y.ties():
+                numbers["g_y"][:, value] = numbers["w"][:, slope]
+        return numbers, n
+
+    @property
+    def n_on_plate(self) -> int:
+        """Number of unknowns of the plate itself; the coordinates beside it come after them."""
+        return self._numbering[1]
+
+    @property
+    def n_dof(self) -> int:
+        """Number of unknowns."""
+        return self.n_on_plate + self.plate.n_beside
+
+    @cached_property
+    def n_rigid(self) -> int:
+        """Number of rigid motions of the whole plate in this class."""
+        ends = self.plate.x.ends, self.plate.y.ends
+        return sum(is_rigid(one, *ends) and self.plate.parity(one) == self.parity for one in np.ndindex(2, 2))
+
+    def pencil(self, elements: tuple[Elements, Elements]) -> tuple[Any, Any]:
+        """Sparse (n_dof, n_dof) stiffness and mass from the plate's elements."""
+        stiffness, mass = (self._assembled(one) for one in elements)
+        return stiffness, mass
+
+    def _assembled(self, elements: Elements) -> Any:
+        from scipy.sparse import csc_array
+
+        kept, stored_at, indices, indptr = self._pattern
+        values = np.concatenate([self._values(elements, both) for both in self._field_pairs])
+        stored = np.bincount(stored_at, values[kept], indices.size)
+        matrix = csc_array((stored, indices, indptr), shape=(self.n_dof, self.n_dof))
+        for term, weight in elements.elsewhere:
+            left, right, shares = self._rows[term]
+            form = csc_array(left.T) @ csc_array((weight * shares)[:, None] * right)
+            matrix = matrix + 0.5 * (form + form.T)
+        return matrix
+
+    @property
+    def _field_pairs(self) -> list[tuple[str, str]]:
+        return list(combinations_with_replacement(self.plate.kinematics.fields, 2))
+
+    def _values(self, elements: Elements, both: tuple[str, str]) -> Floats:
+        """Entries of a block of two fields, and of the mirrored one where they differ."""
+        local = elements.over_plate.get(both)
+        if local is None:
+            n_elements = len(self.plate.x.unknowns) * len(self.plate.y.unknowns)
+            local = np.zeros((n_elements, 16, 16))
+        return local.ravel() if both[0] == both[1] else np.concatenate([local.ravel(), local.swapaxes(1, 2).ravel()])
+
+    @cached_property
+    def _pattern(self) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.int32], NDArray[np.int32]]:
+        """Which entries of the elements count, where each is stored, and the rows and column starts of these places."""
+        own = {name: self._of_elements(name) for name in self.plate.kinematics.fields}
+        rows, columns = [], []
+        for first, second in self._field_pairs:
+            for a, b in dict.fromkeys(((first, second), (second, first))):
+                pair = np.broadcast_arrays(own[a][:, :, None], own[b][:, None, :])
+                rows.append(pair[0].ravel())
+                columns.append(pair[1].ravel())
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        kept = (row >= 0) & (column >= 0)
+        places, stored_at = np.unique(column[kept] * self.n_dof + row[kept], return_inverse=True)
+        indptr = np.searchsorted(places, np.arange(self.n_dof + 1) * self.n_dof)
+        return kept, stored_at, (places % self.n_dof).astype(np.int32), indptr.astype(np.int32)
+
+    def _of_elements(self, name: str) -> NDArray[np.intp]:
+        """Number of each element's unknowns of a field, in the order of `Plate.elements`: (n_elements, 16) array."""
+        x, y = self.plate.x.unknowns, self.plate.y.unknowns
+        found = self._numbering[0][name][x[None, :, :, None], y[:, None, None, :]]
+        return found.reshape(len(x) * len(y), 16)
+
+    @cached_property
+    def _rows(self) -> dict[Term, tuple[Floats, Floats, Floats]]:
+        """For each term along edges or at places what is multiplied: (n, n_dof) arrays and their (n,) shares."""
+        terms = (term for term, _ in (*self.plate.stiffness, *self.plate.masses))
+        return {
+            term: self._along_edges(term) if isinstance(term, AlongEdges) else self._at_places(term)
+            for term in terms
+            if isinstance(term, AlongEdges | AtPlaces)
+        }
+
+    def _along_edges(self, term: AlongEdges) -> tuple[Floats, Floats, Floats]:
+        x, y = self.plate.x, self.plate.y
+        total: Floats | float = 0.0
+        shares = np.empty(0)
+        for one in self.plate.kinematics.strains[term.strain]:
+            if term.axis == 0:
+                (along_x, in_x), along_y, in_y = x.at_ends(term.at, one.along_x), y.derivatives[one.along_y], y.weights
+            else:
+                along_x, in_x, (along_y, in_y) = x.derivatives[one.along_x], x.weights, y.at_ends(term.at, one.along_y)
+            total = total + one.factor * self._on_unknowns(one.field, np.einsum("ai,bj->abij", along_x, along_y))
+            shares = np.outer(in_x, in_y).ravel()
+        rows = np.reshape(total, (-1, self.n_dof))
+        return rows, rows, shares
+
+    def _at_places(self, term: AtPlaces) -> tuple[Floats, Floats, Floats]:
+        left, right = (np.stack([self._row(one[side]) for one in term.products]) for side in (1, 2))
+        return left, right, np.array([one[0] for one in term.products])
+
+    def _row(self, amount: Amount) -> Floats:
+        row = np.zeros(self.n_dof)
+        if amount.places:
+            factors, at_x, at_y = np.array(amount.places).T
+            along_x = self.plate.x.shapes(at_x, self.parity.x).toarray()
+            along_y = self.plate.y.shapes(at_y, self.parity.y).toarray()
+            row += self._on_unknowns("w", np.einsum("p,pi,pj->ij", factors, along_x, along_y))
+        if amount.beside >= 0:
+            row[self.n_on_plate + amount.beside] = 1.0
+        return row
+
+    def _on_unknowns(self, name: str, values: Floats) -> Floats:
+        """From (..., n_x, n_y) values on a field's functions to (..., n_dof) on the unknowns."""
+        numbers = self._numbering[0][name].ravel()
+        kept = numbers >= 0
+        found = np.zeros((*values.shape[:-2], self.n_dof))
+        found[..., numbers[kept]] = values.reshape(*values.shape[:-2], -1)[..., kept]
+        return found
+
+    def _field(self, name: str, vectors: Floats) -> Floats:
+        """A field of (n_dof, n_vectors) vectors on all functions: (n_vectors, n_x, n_y) array."""
+        numbers = self._numbering[0][name]
+        padded = np.vstack([vectors, np.zeros((1, vectors.shape[1]))])
+        return np.moveaxis(padded[numbers], -1, 0)
+
+    def deflections(self, vectors: Floats) -> Deflections:
+        """Deflections of (n_dof, n_vectors) vectors."""
+        return Deflections(self.plate.x, self.plate.y, self.parity, self._field("w", vectors))
+
+    def strains(self, names: Sequence[str], vectors: Floats) -> dict[str, Floats]:
+        """Strains of (n_dof, n_vectors) vectors at the Gauss points: (n_vectors, n_points_x * n_points_y) arrays."""
+        kinematics = self.plate.kinematics
+        fields = {name: self._field(name, vectors) for name in kinematics.fields}
+        along_x, along_y = self.plate.x.derivatives, self.plate.y.derivatives
+        found: dict[str, Floats] = {}
+        for name in dict.fromkeys(names):
+            parts = (
+                one.factor * (along_x[one.along_x] @ fields[one.field] @ along_y[one.along_y].T)
+                for one in kinematics.strains[name]
+            )
+            found[name] = np.asarray(sum(parts)).reshape(vectors.shape[1], -1)
+        return found
+
+    def on_span(self, pencil: tuple[Any, Any], weights: Weights, vectors: Floats) -> tuple[Floats, Floats]:
+        """Stiffness and mass of one draw on the span of vectors, with the terms that exist on deflections only."""
+        found = []
+        for matrix, terms, own in zip(pencil, (self.plate.stiffness, self.plate.masses), weights, strict=True):
+            small = vectors.T @ (matrix @ vectors)
+            is_projected = [isinstance(term, OnDeflections) for term, _ in _each(terms)]
+            if any(is_projected):
+                projected = [each for each in terms if isinstance(each[0], OnDeflections)]
+                small = small + np.tensordot(own[is_projected], self._on_span(projected, vectors, _forms), axes=1)
+            found.append(0.5 * (small + small.T))
+        return found[0], found[1]
+
+    def project_stiffness(self, vectors: Floats) -> Floats:
+        """All stiffness terms on the span of (n_dof, n_vectors) vectors: (n_terms, n_vectors, n_vectors) array."""
+        return self._on_span(self.plate.stiffness, vectors, _forms)
+
+    def project_masses(self, vectors: Floats) -> Floats:
+        """All mass terms on the span of vectors: (n_masses, n_vectors, n_vectors) array."""
+        return self._on_span(self.plate.masses, vectors, _forms)
+
+    def energies(self, vectors: Floats) -> tuple[Floats, Floats]:
+        """phi' K phi and phi' M phi of every term: (n_vectors, n_terms) and (n_vectors, n_masses) arrays."""
+        stiffness, mass = (
+            self._on_span(terms, vectors, _squares).T for terms in (self.plate.stiffness, self.plate.masses)
         )
+        return stiffness, mass
+
+    def _on_span(
+        self,
+        terms: Sequence[tuple[Term, Floats | None]],
+        vectors: Floats,
+        product: Callable[[Floats, Floats, Floats], Floats],
+    ) -> Floats:
+        """Products of what each term multiplies, on vectors."""
+        over_plate = (term.strains for term, _ in terms if isinstance(term, OverPlate))
+        strains = self.strains([name for both in over_plate for name in both], vectors)
+        found = []
+        for term, grid in terms:
+            if isinstance(term, OverPlate):
+                first, second = (strains[name] for name in term.strains)
+                times = 1.0 if term.strains[0] == term.strains[1] else 2.0
+                found.append(product(first, second, times * np.ravel(np.asarray(grid)))[None])
+            elif isinstance(term, OnDeflections):
+                n = vectors.shape[1]
+                forms = np.reshape(term.project(self.deflections(vectors)), (term.n_terms, n, n))
+                found.append(forms if product is _forms else np.diagonal(forms, axis1=1, axis2=2))
+            else:
+                left, right, shares = self._rows[term]
+                found.append(product((left @ vectors).T, (right @ vectors).T, shares)[None])
+        return np.concatenate(found)
+
+    def project_beside(self, vectors: Floats) -> Floats:
+        """What each mass term gives to the coordinates beside the plate: (n_masses, n_vectors, n_vectors) array."""
+        beside = vectors[self.n_on_plate :]
+        found = np.zeros((sum(1 for _ in _each(self.plate.masses)), vectors.shape[1], vectors.shape[1]))
+        for k, (term, _) in enumerate(_each(self.plate.masses)):
+            if isinstance(term, AtPlaces):
+                for share, first, second in term.products:
+                    if first.beside >= 0 and second.beside >= 0:
+                        found[k] += share * np.outer(beside[first.beside], beside[second.beside])
+        return found
 
 
-def is_rigid(beams: Beams, ends_x: Ends, ends_y: Ends) -> bool:
-    """Whether a product of beam functions is a motion without bending: a shift or a turn, but not the twist xy."""
-    rigid_x, rigid_y = rigid_degrees(ends_x), rigid_degrees(ends_y)
-    if beams[0] >= len(rigid_x) or beams[1] >= len(rigid_y):
-        return False
-    return rigid_x[beams[0]] + rigid_y[beams[1]] <= 1
+def _forms(first: Floats, second: Floats, weights: Floats) -> Floats:
+    """Weighted sums of products of all pairs of vectors, symmetric."""
+    form = (first * weights) @ second.T
+    return np.asarray(0.5 * (form + form.T))
 
 
-def count_rigid(parity: Parity, x: Line, y: Line) -> int:
-    """Number of rigid motions of the plate in a class."""
-    return sum(
-        is_rigid((i, j), x.ends, y.ends)
-        for i in range(2)
-        for j in range(2)
-        if (i % 2 if x.is_symmetric else 0, j % 2 if y.is_symmetric else 0) == parity
-    )
+def _squares(first: Floats, second: Floats, weights: Floats) -> Floats:
+    """The same of each vector with itself."""
+    return np.asarray((first * second) @ weights)
+
+
+def _each(terms: Sequence[tuple[Term, Floats | None]]) -> Iterator[tuple[Term, Floats | None]]:
+    """Terms as often as they have weights."""
+    for term, grid in terms:
+        for _ in range(term.n_terms if isinstance(term, OnDeflections) else 1):
+            yield term, grid

@@ -1,40 +1,41 @@
-"""The reduced-order model: all stiffness and mass terms projected on the modes at the estimate and at points around it.
+"""The plate on a reduced basis: few vectors hold its modes over a whole region, thousands of times faster than a solve.
 
-Its eigenvalues are the exact frequencies to a few hundredths of a cent, thousands of times faster than a full solve;
-its diagonal at the centre is the linear law. `bayesplate.modes.reduction` builds it.
+The basis holds the modes at the centre and what those at points around it have beside these, in the order of their
+singular values, as many as bring the frequencies within a tolerance at points that were held out. All terms are
+projected on it, so that the exact frequencies of a draw are the eigenvalues of a small pencil; its diagonal at the
+centre is the linear law.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.definite import packed
-from bayesplate.modes.naming import Place, fits, name_parts
-from bayesplate.modes.pencils import (
-    condensed_eigenvalues,
-    pencil_eigenvalues,
-    pencil_modes,
-    stepped_eigenvalues,
-    stepped_modes,
-)
-from bayesplate.modes.plate import Beams, Parity, Weights
-from bayesplate.modes.threads import in_threads
+from bayesplate.modes.beams import Beams
+from bayesplate.modes.naming import Place, beam_parts, fits, name_parts
+from bayesplate.modes.plate import Plate, SymmetryClass
+from bayesplate.modes.solve import ClassModes, solve_classes
+from bayesplate.modes.terms import Parity, Weights
+
+Floats = NDArray[np.float64]
 
 SPARE = 2
 """Modes above the highest wanted one of a class that the basis is made for too."""
-WHOLE = 40
-"""Vectors up to which a draw's eigenvalues come from the whole small problem; above, with most vectors condensed."""
-_BATCH, _SMALL_BATCH = 24, 512
-"""Draws whose large or small matrices are held at once, at most: those of a whole posterior would not fit any cache."""
+_FEW = 9
+"""Training points that are always solved, all of them."""
+_GROWTH = 1.2
+_SPANNED = 1e-6
+"""Singular value of what a snapshot adds, over its own size, from which on it counts."""
+_BATCH = 512
+"""Draws whose small matrices are held at once."""
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedBlock:
-    """One symmetry class on a basis of few vectors, mass-orthonormal.
+class ReducedClass:
+    """One symmetry class on few vectors: its modes at the centre, mass-orthonormal there, and what completes them.
 
     Attributes
     ----------
@@ -42,101 +43,63 @@ class ReducedBlock:
     stiffness : (n_terms, r, r) array
         Projected stiffness terms.
     masses : (n_masses, r, r) array
-        Projected mass terms; none where the mass hardly varies over the region and the basis is orthonormal in it.
-    parts : (r, n_products) array
-        What each vector has of the products of beam functions that name modes.
+        Projected mass terms.
+    is_steady : bool
+        Whether the mass may be taken as that of the centre, times the first weight, all over the region.
     products : tuple of (int, int)
-        Their orders along x and y.
-    n_rigid : int
-        Rigid motions in the basis: the lowest eigenvalues, which are left out.
-    shift : float, s^-2
-        Keeps the stiffness of rigid motions above zero where several masses ask for a pencil.
-    n_kept : int
-        Where it is not 0, the basis is the block's modes at the centre in the order of their frequencies, and the
-        modes of each draw are found from so many of them (`bayesplate.modes.pencils`).
-    n_steps : int
-        Steps of inverse iteration that they go; where it is 0, they take all others along to first order instead.
+        Orders of the products of beam functions that name its modes.
+    parts : (r, n_products) array
+        What each vector has of these.
     squares : (r, r) array
         Mean products of the vectors' deflections.
     beside : (n_masses, r, r) array
         What each mass term gives to the coordinates beside the plate.
+    n_rigid : int
+        Rigid motions in the basis: the lowest eigenvalues, which are left out.
     """
 
     parity: Parity
-    stiffness: NDArray[np.float64]
-    masses: NDArray[np.float64]
-    parts: NDArray[np.float64]
+    stiffness: Floats
+    masses: Floats
+    is_steady: bool
     products: tuple[Beams, ...]
+    parts: Floats
+    squares: Floats
+    beside: Floats
     n_rigid: int = 0
-    shift: float = 1.0
-    n_kept: int = 0
-    n_steps: int = 0
-    squares: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
-    beside: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0, 0)))
 
-    def eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
-        """Elastic eigenvalues of many draws, increasing: (n_draws, n) array, s^-2.
+    def eigenvalues(self, weights: Weights) -> Floats:
+        """Elastic eigenvalues of many draws, increasing: (n_draws, r - n_rigid) array, s^-2.
 
-        All r - n_rigid of them, or n_kept - n_rigid.
+        Not a number at a draw that is no plate.
         """
-        is_large = self.stiffness.shape[-1] > WHOLE
-        starts = _starts(len(weights.stiffness)) if is_large else range(0, max(len(weights.stiffness), 1), _SMALL_BATCH)
-        parts = [Weights(*(w[start : start + starts.step] for w in weights)) for start in starts]
-        found = in_threads(self._eigenvalues, parts) if is_large else [self._eigenvalues(part) for part in parts]
-        return np.concatenate(found)
+        return np.concatenate([self._eigenvalues(part) for part in _batches(weights)])
 
-    def _eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
-        if self.n_kept and self.n_steps:
-            shift, triangles, mass = self._shifted(weights)
-            values = stepped_eigenvalues(triangles, mass, self.n_kept, self.n_steps) - shift
+    def _eigenvalues(self, weights: Weights) -> Floats:
+        stiffness = _weighted(weights.stiffness, self.stiffness)
+        if self.is_steady:
+            values = np.linalg.eigvalsh(stiffness)[:, self.n_rigid :] / weights.mass[:, :1]
         else:
-            stiffness = _weighted(weights.stiffness, self.stiffness)
-            mass = _weighted(weights.mass, self.masses) if len(self.masses) else None
-            if self.n_kept:
-                values = condensed_eigenvalues(stiffness, mass, self.n_kept, self.n_rigid)
-            elif mass is None:
-                values = np.asarray(np.linalg.eigvalsh(stiffness), dtype=np.float64)
-            else:
-                values = pencil_eigenvalues(stiffness, mass, self.shift)
-        values = values[:, self.n_rigid :]
-        return np.asarray(values if len(self.masses) else values / weights.mass[:, :1])
+            values = pencil_values(stiffness, self.mass(weights))[:, self.n_rigid :]
+        return np.where(values[:, :1] > 0.0, values, np.nan)
 
-    def modes(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def modes(self, weights: Weights, n_modes: int) -> tuple[Floats, Floats]:
         """Lowest elastic modes of many draws: (n_draws, n) eigenvalues, s^-2, and (n_draws, r, n) vectors.
 
         The vectors are combinations of the basis, normalised in the draw's mass. Neither is a number at a draw that is
         no plate.
         """
-        n_wanted = min(n_modes + self.n_rigid, self.stiffness.shape[-1])
-        if self.n_kept >= n_wanted and self.n_steps:
-            shift, triangles, mass = self._shifted(weights)
-            values, vectors = stepped_modes(triangles, mass, self.n_kept, self.n_steps, n_wanted)
-            values -= shift
-            if not len(self.masses):
-                values, vectors = values / weights.mass[:, :1], vectors / np.sqrt(weights.mass[:, :1, None])
-        else:
-            stiffness = _weighted(weights.stiffness, self.stiffness)
-            values, vectors = pencil_modes(stiffness, self.mass(weights), self.shift, n_wanted)
-        return values[:, self.n_rigid :], vectors[:, :, self.n_rigid :]
+        values, vectors = pencil_modes(_weighted(weights.stiffness, self.stiffness), self.mass(weights))
+        elastic = slice(self.n_rigid, self.n_rigid + n_modes)
+        values, vectors = values[:, elastic], vectors[:, :, elastic]
+        is_plate = values[:, 0] > 0.0
+        return np.where(is_plate[:, None], values, np.nan), np.where(is_plate[:, None, None], vectors, np.nan)
 
-    def _shifted(self, weights: Weights) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]:
-        """What lifts rigid motions off zero at many draws, (n_draws, 1) in s^-2; the stiffness so lifted, packed; mass.
-
-        The shift is the draw's own, so that eigenvalues are homogeneous in the stiffness.
-        """
-        lowest = self.n_rigid
-        stiffness = weights.stiffness @ self.stiffness[:, lowest, lowest, None]
-        if not len(self.masses):
-            return stiffness, np.hstack([weights.stiffness, stiffness]) @ self._triangles, None
-        shift = stiffness / (weights.mass @ self.masses[:, lowest, lowest, None])
-        shifted = np.hstack([weights.stiffness, shift * weights.mass]) @ self._triangles
-        return shift, shifted, _weighted(weights.mass, self.masses)
-
-    @cached_property
-    def _triangles(self) -> NDArray[np.float64]:
-        """The stiffness terms and then the masses, packed: (n_terms + n_masses, r (r + 1) / 2) array."""
-        masses = self.masses if len(self.masses) else np.eye(self.stiffness.shape[-1])[None]
-        return np.concatenate([packed(terms) for terms in (self.stiffness, masses)])
+    def mass(self, weights: Weights) -> Floats:
+        """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
+        if self.is_steady:
+            return weights.mass[:, :1, None] * np.eye(self.stiffness.shape[-1])
+        return _weighted(weights.mass, self.masses)
 
     def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
         """Which of the lowest elastic modes each of `products` names, with at least that correlation, at many draws.
@@ -155,42 +118,23 @@ class ReducedBlock:
                     found[draw, product] = mode
         return found
 
-    def _fits(self, mass: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _fits(self, mass: Floats, vectors: Floats) -> Floats:
         """How well each mode of a draw fits each product: (n_modes, n_products) array."""
-        forms = np.stack([self.squares, np.tensordot(mass[: len(self.beside)], self.beside, axes=1)])
+        forms = np.stack([self.squares, np.tensordot(mass, self.beside, axes=1)])
         squares, beside = np.einsum("rm,frs,sm->fm", vectors, forms, vectors, optimize=True)
         return fits(vectors.T @ self.parts, squares, 1.0 - beside)
 
-    def energies(self, weights: Weights, n_modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def energies(self, weights: Weights, n_modes: int) -> tuple[Floats, Floats]:
         """What each term has of the lowest modes of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays.
 
         The ratio of their weighted sums is omega^2 to second order around the draw.
         """
-        vectors = self.modes(weights, n_modes)[1][0].T
-        products = (vectors[:, :, None] * vectors[:, None, :]).reshape(len(vectors), -1)
-        stiffness = products @ self.stiffness.reshape(len(self.stiffness), -1).T
-        if len(self.masses):
-            return stiffness, products @ self.masses.reshape(len(self.masses), -1).T
-        first = np.eye(weights.mass.shape[1])[:1]
-        return stiffness, (vectors**2).sum(axis=1)[:, None] * first
-
-    def mass(self, weights: Weights) -> NDArray[np.float64]:
-        """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
-        if len(self.masses):
-            return _weighted(weights.mass, self.masses)
-        return weights.mass[:, :1, None] * np.eye(self.stiffness.shape[-1])
-
-
-def _starts(n_draws: int) -> range:
-    """First draws of batches of equal size, an even number of them: no core waits for another."""
-    n_batches = 2 * max(-(-n_draws // (2 * _BATCH)), 1)
-    return range(0, max(n_draws, 1), max(-(-n_draws // n_batches), 1))
-
-
-def _weighted(weights: NDArray[np.float64], terms: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weighted sums of terms, one (r, r) matrix per draw."""
-    n_terms, r, _ = terms.shape
-    return (weights @ terms.reshape(n_terms, r * r)).reshape(-1, r, r)
+        vectors = self.modes(weights, n_modes)[1][0]
+        stiffness, mass = (
+            np.einsum("rm,trs,sm->mt", vectors, terms, vectors, optimize=True)
+            for terms in (self.stiffness, self.masses)
+        )
+        return stiffness, mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,21 +145,21 @@ class ReducedOrderModel:
     ----------
     places : tuple of Place
         The wanted modes, in the caller's order.
-    blocks : tuple of ReducedBlock
+    classes : tuple of ReducedClass
     worst_cents : float
         Largest error against full solves that were held out when the basis was built.
     """
 
     places: tuple[Place, ...]
-    blocks: tuple[ReducedBlock, ...]
+    classes: tuple[ReducedClass, ...]
     worst_cents: float
 
-    def eigenvalues(self, weights: Weights) -> NDArray[np.float64]:
+    def eigenvalues(self, weights: Weights) -> Floats:
         """Eigenvalue of each wanted mode for many draws: (n_draws, n_modes) array, s^-2."""
         values = np.empty((weights.stiffness.shape[0], len(self.places)))
-        for block in self.blocks:
-            columns = [i for i, place in enumerate(self.places) if place.parity == block.parity]
-            values[:, columns] = block.eigenvalues(weights)[:, [self.places[i].rank for i in columns]]
+        for own in self.classes:
+            columns, ranks = self._of(own)
+            values[:, columns] = own.eigenvalues(weights)[:, ranks]
         return values
 
     def ranks(self, weights: Weights, least: float = 0.0) -> dict[Beams, NDArray[np.intp]]:
@@ -234,17 +178,211 @@ class ReducedOrderModel:
             draw that is no plate.
         """
         found: dict[Beams, NDArray[np.intp]] = {}
-        for block in self.blocks:
-            highest = max(place.rank for place in self.places if place.parity == block.parity)
-            found |= dict(zip(block.products, block.ranks(weights, highest + 1 + SPARE, least).T, strict=True))
+        for own in self.classes:
+            n_modes = max(self._of(own)[1]) + 1 + SPARE
+            found |= dict(zip(own.products, own.ranks(weights, n_modes, least).T, strict=True))
         return found
 
-    def energies(self, weights: Weights) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def energies(self, weights: Weights) -> tuple[Floats, Floats]:
         """What each term has of each wanted mode of one draw: (n_modes, n_terms) and (n_modes, n_masses) arrays."""
         stiffness, mass = (np.empty((len(self.places), part.shape[1])) for part in weights)
-        for block in self.blocks:
-            columns = [i for i, place in enumerate(self.places) if place.parity == block.parity]
-            ranks = [self.places[i].rank for i in columns]
-            own = block.energies(weights, max(ranks) + 1)
-            stiffness[columns], mass[columns] = (part[ranks] for part in own)
+        for own in self.classes:
+            columns, ranks = self._of(own)
+            stiffness[columns], mass[columns] = (part[ranks] for part in own.energies(weights, max(ranks) + 1))
         return stiffness, mass
+
+    def _of(self, own: ReducedClass) -> tuple[list[int], list[int]]:
+        """Which of the wanted modes are of a class, and their ranks there."""
+        both = [(i, place.rank) for i, place in enumerate(self.places) if place.parity == own.parity]
+        return [i for i, _ in both], [rank for _, rank in both]
+
+
+def reduced_order_model(
+    plate: Plate,
+    places: Sequence[Place],
+    centre: Weights,
+    around: Iterable[Weights],
+    held_out: Sequence[Weights],
+    tolerance: float,
+) -> ReducedOrderModel:
+    """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
+
+    Of many points around the first half will do if the error at the held-out ones stays within the tolerance. While it
+    does not, the second half joins the basis, then half of the held-out points. The check is made at those that did not
+    join: they lie as far out as the others, and none was chosen for its error, so that it is an honest sample of the
+    error over the region.
+
+    Parameters
+    ----------
+    plate : Plate
+    places : sequence of Place
+        The modes wanted.
+    centre : Weights
+        At the estimate.
+    around, held_out : sequences of Weights
+        At least one is held out. Points that are no plates are left out.
+    tolerance : float, cents
+
+    Returns
+    -------
+    ReducedOrderModel
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If none of the held-out points is a plate.
+    """
+    n_modes = {p: 1 + SPARE + max(one.rank for one in places if one.parity == p) for p in {o.parity for o in places}}
+    training = [centre, *around]
+    n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
+    (middle,) = _solved(plate, [centre], n_modes)
+    snapshots, checks = (_solved(plate, points, n_modes) for points in (training[1:n_first], held_out))
+    if not checks:
+        raise np.linalg.LinAlgError("none of the points that were held out is a plate")
+    n_joined, later = 0, training[n_first:]
+    while True:
+        joined = [*snapshots, *checks[:n_joined]]
+        found = [_reduced(plate.symmetry_class(p), middle, joined, checks[n_joined:], tolerance, p) for p in n_modes]
+        worst = max(cents for _, cents in found)
+        if worst > tolerance and later:
+            snapshots, later = [*snapshots, *_solved(plate, later, n_modes)], []
+        elif worst > tolerance and not n_joined and len(checks) > 1:
+            n_joined = len(checks) // 2
+        else:
+            return ReducedOrderModel(tuple(places), tuple(own for own, _ in found), worst)
+
+
+_Solved = tuple[Weights, dict[Parity, ClassModes]]
+
+
+def _solved(plate: Plate, points: Iterable[Weights], n_modes: dict[Parity, int]) -> list[_Solved]:
+    """The points that are plates, and their modes.
+
+    An expansion to second order in fields need not be positive where several of them are far out at once.
+    """
+    found = []
+    for weights in points:
+        try:
+            modes = solve_classes(plate, weights, n_modes)
+        except np.linalg.LinAlgError:
+            continue
+        if all((of_class.eigenvalues > 0.0).all() for of_class in modes.values()):
+            found.append((weights, modes))
+    return found
+
+
+def _reduced(
+    own: SymmetryClass,
+    middle: _Solved,
+    snapshots: Sequence[_Solved],
+    checks: Sequence[_Solved],
+    tolerance: float,
+    parity: Parity,
+) -> tuple[ReducedClass, float]:
+    """The smallest basis of a class that is within the tolerance at the points that check it, and its error there."""
+    centre, first = middle[0], middle[1][parity]
+    vectors = _basis(
+        own, centre, first, np.hstack([of_class[parity].vectors for _, of_class in snapshots] or [first.vectors])
+    )
+    exact = np.stack([of_class[parity].eigenvalues[:-SPARE] for _, of_class in checks])
+    forms = [
+        own.on_span(own.pencil(own.plate.elements(one)), one, vectors) for one in (centre, *(w for w, _ in checks))
+    ]
+    stiffness, mass = (np.stack(each) for each in zip(*forms, strict=True))
+    first_mass = np.array([weights.mass[0] for weights, _ in checks])[:, None]
+    for size in _sizes(first.vectors.shape[1] + own.n_rigid, vectors.shape[1]):
+        turn = pencil_modes(stiffness[:1, :size, :size], mass[:1, :size, :size])[1]
+        small_stiffness, small_mass = (turn[0].T @ one[1:, :size, :size] @ turn[0] for one in (stiffness, mass))
+        for is_steady in (True, False):
+            values = (
+                np.linalg.eigvalsh(small_stiffness) / first_mass
+                if is_steady
+                else pencil_values(small_stiffness, small_mass)
+            )
+            ratios = values[:, own.n_rigid : own.n_rigid + exact.shape[1]] / exact
+            cents = 600.0 * float(np.abs(np.log2(np.where(ratios > 0.0, ratios, np.inf))).max())
+            if cents <= tolerance:
+                break
+        if cents <= tolerance:
+            break
+    basis = vectors[:, :size] @ turn[0]
+    parts, squares = beam_parts(own, basis)
+    reduced = ReducedClass(
+        parity=parity,
+        stiffness=own.project_stiffness(basis),
+        masses=own.project_masses(basis),
+        is_steady=is_steady,
+        products=tuple(own.plate.elastic_products[parity]),
+        parts=parts,
+        squares=squares,
+        beside=own.project_beside(basis),
+        n_rigid=own.n_rigid,
+    )
+    return reduced, cents
+
+
+def _basis(own: SymmetryClass, weights: Weights, first: ClassModes, snapshots: Floats) -> Floats:
+    """Rigid motions, the modes at the centre, then what snapshots have beside them by singular value: (n_dof, r).
+
+    Orthonormal in the energy of the centre, potential and kinetic at its highest mode.
+    """
+    stiffness, mass = own.pencil(own.plate.elements(weights))
+    norm = stiffness + float(first.eigenvalues[-1]) * mass
+    known = _orthonormal(norm, np.hstack([first.rigid, first.vectors]))
+    sizes = np.sqrt(np.einsum("ij,ij->j", snapshots, norm @ snapshots))
+    rest = snapshots / sizes
+    for _ in range(2):
+        rest = rest - known @ (known.T @ (norm @ rest))
+    squared, turn = np.linalg.eigh(rest.T @ (norm @ rest))
+    kept = np.flatnonzero(squared > _SPANNED**2)[::-1]
+    return np.hstack([known, _orthonormal(norm, rest @ (turn[:, kept] / np.sqrt(squared[kept])))])
+
+
+def _orthonormal(norm: Floats, vectors: Floats) -> Floats:
+    """Vectors of which each is made orthonormal to those before it."""
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(vectors.T @ (norm @ vectors)), vectors.T).T)
+
+
+def _sizes(fewest: int, most: int) -> Iterator[int]:
+    """Sizes of a basis that are tried, growing."""
+    size = fewest
+    while size < most:
+        yield size
+        size = max(size + 2, round(_GROWTH * size))
+    yield most
+
+
+def pencil_values(stiffness: Floats, mass: Floats) -> Floats:
+    """All eigenvalues of many pencils of (n, r, r) arrays, increasing: (n, r); not numbers where no mass is positive."""
+    whitened, is_mass = _whitened(stiffness, mass)[:2]
+    return np.where(is_mass[:, None], np.linalg.eigvalsh(whitened), np.nan)
+
+
+def pencil_modes(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """The same, and the mass-normalised vectors: (n, r) and (n, r, r) arrays."""
+    whitened, is_mass, inverse = _whitened(stiffness, mass)
+    values, turned = np.linalg.eigh(whitened)
+    return np.where(is_mass[:, None], values, np.nan), np.swapaxes(inverse, -1, -2) @ turned
+
+
+def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    """Stiffness in coordinates in which the mass is one; which masses are positive; inverses of their factors."""
+    try:
+        factors = np.linalg.cholesky(mass)
+        is_mass = np.ones(len(mass), dtype=bool)
+    except np.linalg.LinAlgError:
+        is_mass = np.linalg.eigvalsh(mass)[:, 0] > 0.0
+        factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, np.eye(mass.shape[-1])))
+    inverse = np.linalg.inv(factors)
+    return inverse @ stiffness @ np.swapaxes(inverse, -1, -2), is_mass, inverse
+
+
+def _batches(weights: Weights) -> Iterator[Weights]:
+    for start in range(0, max(len(weights.stiffness), 1), _BATCH):
+        yield Weights(*(part[start : start + _BATCH] for part in weights))
+
+
+def _weighted(weights: Floats, terms: Floats) -> Floats:
+    """Weighted sums of terms, one (r, r) matrix per draw."""
+    n_terms, r, _ = terms.shape
+    return (weights @ terms.reshape(n_terms, r * r)).reshape(-1, r, r)

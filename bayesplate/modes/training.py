@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.errors import NotIdentifiableError
+from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import Beams, PlateMatrices, Weights
+from bayesplate.modes.plate import Plate
 from bayesplate.modes.shear import SHEAR_CORRECTION, SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate
 from bayesplate.modes.solve import Modes, solve
+from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.setup import Ends
@@ -205,13 +207,13 @@ def training_weights(
     return Weights(np.array([*thin, shear_x, shear_y]), np.array([1.0, over_x**2 / 12.0, over_y**2 / 12.0]))
 
 
-def training_matrices(ends_x: Ends, ends_y: Ends, theory: Theory) -> PlateMatrices:
+def training_matrices(ends_x: Ends, ends_y: Ends, theory: Theory) -> Plate:
     """Matrices of the training plates."""
     assemble = thin_plate if theory == "thin" else shear_flexible_plate
     return assemble(ends_x, ends_y, SHEAR_ELEMENTS_PER_SIDE, SHEAR_ELEMENTS_PER_SIDE)
 
 
-def _modes_to_hold(plate: PlateMatrices, weights: Weights, highest: float) -> int:
+def _modes_to_hold(plate: Plate, weights: Weights, highest: float) -> int:
     """How many modes reach the highest wanted one of the reference plate, and a few more for crossings."""
     n_modes = 2 * _SPARE_MODES
     while solve(plate, weights, n_modes).eigenvalues[-1 - _SPARE_MODES] < highest * (1.0 - 1e-9):

@@ -15,10 +15,9 @@ from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import design, normal_misfit
 from bayesplate.estimates.side_by_side import most_likely_of_each
 from bayesplate.frequencies.laws import LawName, cents
-from bayesplate.frequencies.model import SetupModel, are_twins, setup_model, with_exact, with_exact_of, with_others
+from bayesplate.frequencies.model import SetupModel, setup_model, with_exact, with_others
 from bayesplate.frequencies.peaks import takes_part
 from bayesplate.frequencies.predictor import Predictor
-from bayesplate.modes.reduction import ACCEPTED_CENTS
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
@@ -31,6 +30,7 @@ _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
 _N_HELD_OUT = 6
 _INSIDE = 0.1
+_SHARE_OF_NOISE = 0.2
 _ROUGH_CENTS = 1.0
 """Error of the law that finds the place where it is then made for good: small beside what any reading scatters."""
 _MOST_PLACES = 3
@@ -228,7 +228,7 @@ def exact_models(
     covariance: Floats,
     *,
     is_rough: bool = False,
-    accepted_cents: float = ACCEPTED_CENTS,
+    accepted_cents: float | None = None,
 ) -> tuple[SetupModel, ...]:
     """Models with the exact law, trained at the centre and at the corners of a box around it.
 
@@ -236,8 +236,7 @@ def exact_models(
     the rigidities, so a common factor needs no training, and side lengths only rescale the same terms; of an isotropic
     board it spans D itself, which does no harm. Parameters of
     effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
-    the box, and effects whose place is open the places all over the board. Sessions that hold the plate alike are
-    solved once.
+    the box, and effects whose place is open the places all over the board.
 
     Parameters
     ----------
@@ -247,8 +246,8 @@ def exact_models(
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
     is_rough : bool
         Two opposite corners, one end per effect and one check will do: near the centre the error is small all the same.
-    accepted_cents : float
-        Error at the checks up to which no further points are solved.
+    accepted_cents : float, optional
+        Error at the checks up to which no further points are solved; by default `law_tolerance`.
     """
     parameters = Parameters(board)
     n = parameters.n_constants
@@ -292,13 +291,14 @@ def exact_models(
 
     (middle,) = points(np.zeros((1, parameters.n_dim)))
     around, checks = points(corners), points(held_out)
-    every = [middle, *around, *checks]
-    made: list[SetupModel] = []
-    for model in models:
-        twin = next((one for one in made if are_twins(one, model, every)), None)
-        solved = with_exact_of(model, twin) if twin else with_exact(model, middle, around, checks, accepted_cents)
-        made.append(solved)
-    return tuple(made)
+    tolerance = law_tolerance(board) if accepted_cents is None else accepted_cents
+    return tuple(with_exact(model, middle, around, checks, tolerance) for model in models)
+
+
+def law_tolerance(board: Board) -> float:
+    """Error of an exact law, cents, that is small beside what any reading of a board scatters: a fifth of the least."""
+    medians = np.array([setup.noise.median for setup in board.setups])
+    return _SHARE_OF_NOISE * float(cents(reading_sd(board.setups, medians).min()))
 
 
 def _also_at(models: Sequence[SetupModel], parameters: Parameters, centre: Floats, reach: Floats) -> Floats:

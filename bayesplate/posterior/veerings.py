@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.labels import Label
+from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import CERTAIN
-from bayesplate.modes.plate import Beams
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.setup import Setup
 

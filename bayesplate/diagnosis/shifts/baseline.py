@@ -278,4 +278,4 @@ def places_of(models: Sequence[SetupModel]) -> tuple[Place, ...]:
 
 def symmetry_of(models: Sequence[SetupModel]) -> tuple[tuple[bool, bool], ...]:
     """Whether the two halves are alike along x and along y, setup after setup."""
-    return tuple((model.plate.line_x.is_symmetric, model.plate.line_y.is_symmetric) for model in models)
+    return tuple((model.plate.x.is_split, model.plate.y.is_split) for model in models)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.plate import Weights
-from bayesplate.modes.reduced import ReducedBlock
+from bayesplate.modes.reduced import ReducedClass
+from bayesplate.modes.terms import Weights
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Following:
 
     Attributes
     ----------
-    block : ReducedBlock
+    block : ReducedClass
     shapes : (n_modes, r) array
         Shape times mass of its lowest modes: their product with another shape is the share.
     wanted : (n_wanted,) array of int
@@ -36,14 +36,14 @@ class Following:
         Positions in `wanted` of the modes of one symmetry class, in the order of their ranks.
     """
 
-    block: ReducedBlock
+    block: ReducedClass
     shapes: Floats
     wanted: NDArray[np.intp]
     groups: tuple[NDArray[np.intp], ...]
 
     @classmethod
     def of(
-        cls, block: ReducedBlock, without: Weights, wanted: NDArray[np.intp], groups: tuple[NDArray[np.intp], ...]
+        cls, block: ReducedClass, without: Weights, wanted: NDArray[np.intp], groups: tuple[NDArray[np.intp], ...]
     ) -> Following:
         """Take the shapes at the weights of one draw without the effect."""
         _, vectors = block.modes(without, int(wanted.max()) + 1 + _BEYOND)

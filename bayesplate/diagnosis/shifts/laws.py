@@ -16,7 +16,7 @@ from bayesplate.frequencies.laws import ExactLaw, log_frequency, mean_log_freque
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import Place
-from bayesplate.modes.plate import Parity
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Values
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
@@ -101,7 +101,7 @@ class FormLaw:
         assert model.exact is not None
         weights = model.system.weights(self._without(baseline))
         result = []
-        for block in model.exact.reduced.blocks:
+        for block in model.exact.reduced.classes:
             rows = np.flatnonzero([place.parity == block.parity for place in model.every_place])
             classes: dict[object, list[int]] = {}
             for position, row in enumerate(rows):
@@ -132,7 +132,7 @@ class FormLaw:
         of_plate = baseline.every.log_frequency - baseline.every.discrepancy
         wanted = of_plate[start : start + len(of_base)]
         found: dict[int, Place] = {}
-        for block in model.exact.reduced.blocks:
+        for block in model.exact.reduced.classes:
             rows = [
                 i for i, place in enumerate(of_base) if merged(place.parity, symmetry_of([model])[0]) == block.parity
             ]
