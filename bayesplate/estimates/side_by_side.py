@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.estimates.refit import Bounds, Floats, Misfit, Predict, has_come_to_rest, most_likely, n_constants
-from bayesplate.modes.threads import in_threads
 
 _MOST_STEPS = 15
 _FIRST, _SECOND = 1e-4, 1e-3
@@ -67,9 +66,8 @@ def most_likely_of_each(
             found, is_settled = _newton(_Problems(predict, misfit, kept), starts)
         is_settled &= has_come_to_rest(found, starts, n_constants(predict))
     rest = np.flatnonzero(~is_settled).tolist()
-    alone = in_threads(lambda i: most_likely(predict, misfit, starts[i], bounds, left_out[i]), rest)
-    for i, one in zip(rest, alone, strict=True):
-        found[i] = one
+    for i in rest:
+        found[i] = most_likely(predict, misfit, starts[i], bounds, left_out[i])
     return found
 
 

@@ -353,7 +353,7 @@ def _sizes(fewest: int, most: int) -> Iterator[int]:
 
 
 def pencil_values(stiffness: Floats, mass: Floats) -> Floats:
-    """All eigenvalues of many pencils of (n, r, r) arrays, increasing: (n, r); not numbers where no mass is positive."""
+    """All eigenvalues of pencils of (n, r, r) arrays, increasing: (n, r); not numbers where no mass is positive."""
     whitened, is_mass = _whitened(stiffness, mass)[:2]
     return np.where(is_mass[:, None], np.linalg.eigvalsh(whitened), np.nan)
 

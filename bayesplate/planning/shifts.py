@@ -17,7 +17,6 @@ from bayesplate.diagnosis.evidence.search import Candidate, Found
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.diagnosis.shifts.forms import Form
 from bayesplate.diagnosis.shifts.tables import Table
-from bayesplate.modes.threads import in_threads
 from bayesplate.planning.station_laws import BareLaw, SolvedStation
 
 Floats = NDArray[np.float64]
@@ -155,7 +154,7 @@ def _lagrange(at: Floats, value: Floats) -> Floats:
 def form_shift(found: Found, candidate: Candidate, nodes: Nodes, law: BareLaw) -> FormShift:
     """Solve a form at its nodes in a station; not a number where a mode cannot be followed."""
     cells = nodes.cells.tolist()
-    solved = in_threads(lambda cell: _beside(found, candidate.fine, nodes.form, cell, law), cells)
+    solved = [_beside(found, candidate.fine, nodes.form, cell, law) for cell in cells]
     by_cell = dict(zip(cells, solved, strict=True))
     at, beside = [], []
     for j, cells in enumerate(nodes.along):

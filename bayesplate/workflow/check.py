@@ -12,7 +12,6 @@ from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.plate.material import MODULI, moduli
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.report.plots import CheckPlots
@@ -20,6 +19,7 @@ from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup
 from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.shown import show_check

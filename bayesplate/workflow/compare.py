@@ -13,7 +13,6 @@ from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.leave_one_out import CarryingMode, united
 from bayesplate.estimates.paper import paper_system
 from bayesplate.frequencies.laws import LawName
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
@@ -30,6 +29,7 @@ from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.check import expected_sd
 from bayesplate.workflow.fitting import not_converged
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_compare

@@ -31,7 +31,6 @@ from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, indices_of, united
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.survivors import survivors
 from bayesplate.plate.material import MODULI
@@ -46,6 +45,7 @@ from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
 from bayesplate.workflow.fitting import Fitted, fitted, opened, with_board
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.stages import Stages

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.frequencies.laws import LawName
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
@@ -25,6 +24,7 @@ from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fitting import Fitted, fitted, not_converged, opened, request_of
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem
 from bayesplate.workflow.shown import show_fit

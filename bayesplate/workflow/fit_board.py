@@ -9,13 +9,13 @@ from pathlib import Path
 from bayesplate.cards import BoardCard, CoefficientCard, NamedCards, PriorCard
 from bayesplate.errors import Fault, NotConvergedError
 from bayesplate.frequencies.laws import LawName
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.plate.board import Board
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import fit
 from bayesplate.workflow.fitting import fitted
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Prepared, prepare, prepared_card
 from bayesplate.workflow.problem import Problem
 

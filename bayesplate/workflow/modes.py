@@ -17,13 +17,13 @@ from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
 from bayesplate.results.folder import make_folder, require_new
 from bayesplate.results.sheets import ModesReport, proposed_labels, sheet_report
 from bayesplate.workflow.arguments import require_arguments
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Card, Prepared, prepare
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_modes

@@ -20,7 +20,6 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.planning.assembled import (
     Bench,
     benches,
@@ -38,6 +37,7 @@ from bayesplate.report.plots import PlanPlots
 from bayesplate.results.folder import DIAGNOSIS, json_text, make_folder, require_new, write_text
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Card, Prepared, prepare
 from bayesplate.workflow.problem import Problem, as_problem
 from bayesplate.workflow.shown import show_plan

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, cast
 from bayesplate.cards import NamedCards, PriorCard, card_names, load_board, load_named, load_prior, read_board_text
 from bayesplate.cards.words import shown
 from bayesplate.errors import Fault, InputError, plain
-from bayesplate.modes.threads import one_thread_each
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.folder import SUMMARY, json_text
 from bayesplate.results.summary import FORMAT
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fit import FitResult, fit
+from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import default_folder, prepared_card
 from bayesplate.workflow.problem import Problem
 

@@ -15,7 +15,6 @@ from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against
 from bayesplate.diagnosis.evidence.search import Ground
 from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.modes.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -106,7 +105,7 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
             after[sets] = hypothesis.terms(fold).left_out_errors(seen)
         return np.stack([before, after, chosen])
 
-    found = np.concatenate(in_threads(folded, modes))[np.argsort(np.concatenate(modes))]
+    found = np.concatenate([folded(mode) for mode in modes])[np.argsort(np.concatenate(modes))]
     before, after, chosen = np.moveaxis(found, 0, 2)
     return Nested(before, after, chosen.astype(np.intp))
 

@@ -9,9 +9,8 @@ constants, so that an error may rise as well as fall.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +33,6 @@ from bayesplate.estimates.refit import normal_misfit, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel, setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
-from bayesplate.modes.threads import in_threads
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.sessions import same_modes
@@ -109,17 +107,21 @@ def known_fits(
     far = [one for one in sets if len(one ^ own) != 1]
     n_fits = 1 + len(sets)
 
-    def reached(n_done: float) -> None:
-        if tell is not None:
-            tell(n_done / n_fits)
+    def told(fits: Iterable[KnownFit], n_before: int = 0) -> list[KnownFit]:
+        found = []
+        for one in fits:
+            found.append(one)
+            if tell is not None:
+                tell((n_before + len(found)) / n_fits)
+        return found
 
     def fit(combination: set[str]) -> KnownFit:
         solved = [laws[name] for name in combination - own if is_full and combination > own and name in laws]
         models = [one.models for one in solved if _is_as_known(board, one)]
         return known_fit(problem, in_order(combination), solved=models[0] if models else ())
 
-    first = [partial(known_fit, problem, solved=problem.posterior.models), *(partial(fit, one) for one in near)]
-    stands, *single = in_threads(lambda one: one(), first, lambda share: reached(share * len(first)))
+    stands = known_fit(problem, solved=problem.posterior.models)
+    single = told((fit(one) for one in near), 1)
     shifts = {
         next(iter(one ^ own)): found.log_rigidities - stands.log_rigidities
         for one, found in zip(near, single, strict=True)
@@ -129,7 +131,7 @@ def known_fits(
         start = sum((shifts[name] for name in combination ^ own if name in shifts), stands.log_rigidities)
         return known_fit(problem, in_order(combination), start=start)
 
-    several = in_threads(fit_from_shifts, far, lambda share: reached(len(first) + share * len(far))) if far else []
+    several = told((fit_from_shifts(one) for one in far), 1 + len(near))
     found = [*single, *several]
     return (stands, *sorted(found, key=lambda one: sets.index(set(one.combination))))
 

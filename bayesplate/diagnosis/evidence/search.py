@@ -23,7 +23,6 @@ from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve
 from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate, traced_shift
-from bayesplate.modes.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -195,7 +194,11 @@ def prepare_search(
     def candidate(name: str) -> Candidate:
         return _candidate(baseline, name, tuple(solve(baseline, form).placed(baseline) for form in every[name]))
 
-    made = in_threads(candidate, list(every), tell)
+    made = []
+    for name in every:
+        made.append(candidate(name))
+        if tell is not None:
+            tell(len(made) / len(every))
     candidates = {one.name: one for one in made if one.fine.n_cells and one.coarse.n_cells}
     ground = Ground(baseline, candidates, ())
     fine = {name: one.fine for name, one in candidates.items()}
