@@ -46,10 +46,11 @@ _COMPUTE: dict[str, Callable[[str], Json]] = {
 def compute(part: str, name: str) -> Json:
     """One result, rounded; a board, a campaign or a plan in a process of its own, so that no cache saves it time."""
     if part == "plates":
-        return rounded(_plate(name))
-    spawned = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, mp_context=spawned) as pool:
-        return rounded(pool.submit(_COMPUTE[part], name).result())
+        found = _plate(name)
+    else:
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            found = pool.submit(_COMPUTE[part], name).result()
+    return {key: _rounded_under(key, one) for key, one in found.items()}
 
 
 def make(
