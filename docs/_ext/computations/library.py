@@ -92,6 +92,11 @@ CHECKS = (
         "Four half-tops that were set aside until the rules of search and claim stood, tried unseen: what they share.",
     ),
     (
+        "spruce-half-tops-all",
+        "python examples/campaign.py spruce-half-tops-all --out docs/validation --results results/all",
+        "All ten together.",
+    ),
+    (
         "campaigns",
         "make campaigns",
         "Simulated campaigns of eight boards: with one sensor and the shear of one species on all, intervals of "
