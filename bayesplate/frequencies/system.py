@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -13,7 +13,7 @@ from bayesplate.effects import effects_of
 from bayesplate.effects.base import Contribution, Effect, Mass, Stiffness, Theory
 from bayesplate.frequencies.fabric import fabric_of, in_plane, over_fields
 from bayesplate.frequencies.terms import shear_term_weights, term_weights
-from bayesplate.modes.line import N_POINTS, N_POINTS_CUT, Hold, Holds, line
+from bayesplate.modes.line import N_POINTS, N_POINTS_CUT, Hold, Holds, Line, line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.modes.plate import Plate, plate_of
 from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, SHEAR_FLEXIBLE
@@ -55,8 +55,7 @@ class System:
         is_sheared = self.theory == "shear-flexible"
         finest = max((effect.refines for effect in self.effects), default=1.0)
         per_side = SHEAR_ELEMENTS_PER_SIDE if is_sheared else round(ELEMENTS_PER_SIDE * finest)
-        fabric, adjusted = fabric_of(self._acting), self.adjusted(values)
-        n_points = N_POINTS if fabric.outline is None else N_POINTS_CUT
+        n_points = N_POINTS if self.shaped is None else N_POINTS_CUT
         symmetry = zip(*((True, True), *(effect.keeps_symmetry() for effect in self._acting)), strict=True)
         x, y = (
             line(ends, n, is_sheared, all(keeps), self._held(ends), n_points)
@@ -67,12 +66,13 @@ class System:
                 strict=True,
             )
         )
+        adjusted = self.adjusted(values)
         membrane = in_plane(self.effects, adjusted)
         stiffness, masses = (
             [term for one in self._contributions(kind) for term in one.terms_at(adjusted, membrane)]
             for kind in (Stiffness, Mass)
         )
-        return plate_of(SHEAR_FLEXIBLE if is_sheared else THIN, x, y, stiffness, masses, fabric)
+        return _bare(self.theory, self._acting, x, y).with_terms(stiffness, masses)
 
     @cached_property
     def stations(self) -> tuple[System, ...]:
@@ -136,3 +136,9 @@ class System:
 def system_of(board: Board, setup: Setup) -> System:
     """A setup of a board with the board's declared effects."""
     return System(setup, effects_of(board, setup))
+
+
+@lru_cache(maxsize=8)
+def _bare(theory: Theory, effects: tuple[Effect, ...], x: Line, y: Line) -> Plate:
+    """The plate with its own terms alone, spread over the fields that effects give it."""
+    return plate_of(SHEAR_FLEXIBLE if theory == "shear-flexible" else THIN, x, y, fabric_of(effects))

@@ -70,13 +70,12 @@ class Fabric:
 
         The plate outside its outline belongs to the first field, whose weight is above zero; that of others may not be.
         """
-        return {
-            group: [
-                self._weights(one, _GHOST[group] if k == 0 else 0.0, x, y)
-                for k, one in enumerate(self.fields.get(group, (None,)))
-            ]
+        taken = {
+            group: [(one, _GHOST[group] if k == 0 else 0.0) for k, one in enumerate(self.fields.get(group, (None,)))]
             for group in groups
         }
+        made = {each: self._weights(*each, x, y) for each in {each for own in taken.values() for each in own}}
+        return {group: [made[each] for each in own] for group, own in taken.items()}
 
     def _weights(self, factor: Field | EdgeStrip | None, ghost: float, x: Line, y: Line) -> Floats:
         if isinstance(factor, EdgeStrip):

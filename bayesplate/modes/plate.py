@@ -9,7 +9,7 @@ y. The side lengths appear in the weights theta and mu only.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
 from typing import Any
@@ -63,6 +63,17 @@ class Plate:
     y: Line
     stiffness: tuple[tuple[Term, Floats | None], ...]
     masses: tuple[tuple[Term, Floats | None], ...]
+
+    def with_terms(self, stiffness: Sequence[Term], masses: Sequence[Term]) -> Plate:
+        """The plate with further terms, which come after its own."""
+        stiff, inert = (
+            tuple(
+                (one, weights_within(self.x, self.y, one.outline) if isinstance(one, OverPlate) else None)
+                for one in each
+            )
+            for each in (stiffness, masses)
+        )
+        return replace(self, stiffness=(*self.stiffness, *stiff), masses=(*self.masses, *inert))
 
     @cached_property
     def classes(self) -> tuple[SymmetryClass, ...]:
@@ -133,23 +144,14 @@ class Plate:
         return np.asarray(a.factor * b.factor * local.reshape(n_y * n_x, 16, 16))
 
 
-def plate_of(
-    kinematics: Kinematics,
-    x: Line,
-    y: Line,
-    stiffness: Sequence[Term] = (),
-    masses: Sequence[Term] = (),
-    fabric: Fabric = UNIFORM,
-) -> Plate:
-    """A plate on two sides.
+def plate_of(kinematics: Kinematics, x: Line, y: Line, fabric: Fabric = UNIFORM) -> Plate:
+    """A plate on two sides, with its own terms alone.
 
     Parameters
     ----------
     kinematics : Kinematics
     x, y : Line
-        Whole along a side on which a further term is not symmetric.
-    stiffness, masses : sequence of Term
-        Further terms; they come after the plate's own.
+        Whole along a side along which the halves differ.
     fabric : Fabric
         Varying properties repeat the plate's own terms in the order of `bayesplate.modes.fields.layout`.
 
@@ -164,11 +166,9 @@ def plate_of(
     def own(pairs: Sequence[Pair], group: Sequence[Group]) -> list[tuple[Term, Floats | None]]:
         return [(OverPlate(pairs[term]), weights[group[term]][k]) for term, k in layout(group, counts)]
 
-    def further(terms: Sequence[Term]) -> list[tuple[Term, Floats | None]]:
-        return [(one, weights_within(x, y, one.outline) if isinstance(one, OverPlate) else None) for one in terms]
-
-    stiff = (*own(kinematics.stiffnesses, groups[0]), *further(stiffness))
-    return Plate(kinematics, x, y, stiff, (*own(kinematics.masses, groups[1]), *further(masses)))
+    return Plate(
+        kinematics, x, y, tuple(own(kinematics.stiffnesses, groups[0])), tuple(own(kinematics.masses, groups[1]))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,16 +338,29 @@ class SymmetryClass:
             found[name] = np.asarray(sum(parts)).reshape(vectors.shape[1], -1)
         return found
 
-    def on_span(self, pencil: tuple[Any, Any], weights: Weights, vectors: Floats) -> tuple[Floats, Floats]:
-        """Stiffness and mass of one draw on the span of vectors, with the terms that exist on deflections only."""
+    def on_span(self, pencils: Sequence[tuple[Any, Any]], weights: Weights, vectors: Floats) -> tuple[Floats, Floats]:
+        """Stiffness and mass of some draws on the span of vectors, with the terms that exist on deflections only.
+
+        Parameters
+        ----------
+        pencils : sequence of n pairs of sparse arrays
+            As of `pencil`.
+        weights : Weights
+            (n, n_terms) and (n, n_masses) arrays.
+        vectors : (n_dof, n_vectors) array
+
+        Returns
+        -------
+        two (n, n_vectors, n_vectors) arrays
+        """
         found = []
-        for matrix, terms, own in zip(pencil, (self.plate.stiffness, self.plate.masses), weights, strict=True):
-            small = vectors.T @ (matrix @ vectors)
-            is_projected = [isinstance(term, OnDeflections) for term, _ in _each(terms)]
-            if any(is_projected):
-                projected = [each for each in terms if isinstance(each[0], OnDeflections)]
-                small = small + np.tensordot(own[is_projected], self._on_span(projected, vectors, _forms), axes=1)
-            found.append(0.5 * (small + small.T))
+        for side, (terms, own) in enumerate(zip((self.plate.stiffness, self.plate.masses), weights, strict=True)):
+            small = np.stack([vectors.T @ (pencil[side] @ vectors) for pencil in pencils])
+            projected = [each for each in terms if isinstance(each[0], OnDeflections)]
+            if projected:
+                at = [isinstance(term, OnDeflections) for term, _ in _each(terms)]
+                small = small + np.tensordot(own[:, at], self._on_span(projected, vectors, _forms), axes=1)
+            found.append(0.5 * (small + np.swapaxes(small, 1, 2)))
         return found[0], found[1]
 
     def project_stiffness(self, vectors: Floats) -> Floats:

@@ -8,8 +8,10 @@ centre is the linear law.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +24,15 @@ from bayesplate.modes.terms import Parity, Weights
 
 Floats = NDArray[np.float64]
 
-SPARE = 2
-"""Modes above the highest wanted one of a class that the basis is made for too."""
+SPARE = 4
+"""Modes above the highest wanted one of a class that are solved and kept too."""
 _FEW = 9
 """Training points that are always solved, all of them."""
+_LONG = 5
+"""Vectors over modes from which on more snapshots are solved: the more there are, the fewer vectors they need."""
 _GROWTH = 1.2
+_KEPT = 1.0, 1.5, 2.0
+"""Modes at the centre that a step starts from, over those that are solved."""
 _SPANNED = 1e-6
 """Singular value of what a snapshot adds, over its own size, from which on it counts."""
 _BATCH = 512
@@ -44,8 +50,8 @@ class ReducedClass:
         Projected stiffness terms.
     masses : (n_masses, r, r) array
         Projected mass terms.
-    is_steady : bool
-        Whether the mass may be taken as that of the centre, times the first weight, all over the region.
+    n_kept : int
+        How many of the vectors, the first ones, are modes at the centre from which those of a draw are found.
     products : tuple of (int, int)
         Orders of the products of beam functions that name its modes.
     parts : (r, n_products) array
@@ -61,7 +67,7 @@ class ReducedClass:
     parity: Parity
     stiffness: Floats
     masses: Floats
-    is_steady: bool
+    n_kept: int
     products: tuple[Beams, ...]
     parts: Floats
     squares: Floats
@@ -69,18 +75,15 @@ class ReducedClass:
     n_rigid: int = 0
 
     def eigenvalues(self, weights: Weights) -> Floats:
-        """Elastic eigenvalues of many draws, increasing: (n_draws, r - n_rigid) array, s^-2.
+        """Elastic eigenvalues of many draws, increasing: (n_draws, n_kept - n_rigid) array, s^-2.
 
         Not a number at a draw that is no plate.
         """
         return np.concatenate([self._eigenvalues(part) for part in _batches(weights)])
 
     def _eigenvalues(self, weights: Weights) -> Floats:
-        stiffness = _weighted(weights.stiffness, self.stiffness)
-        if self.is_steady:
-            values = np.linalg.eigvalsh(stiffness)[:, self.n_rigid :] / weights.mass[:, :1]
-        else:
-            values = pencil_values(stiffness, self.mass(weights))[:, self.n_rigid :]
+        step = _stepped(_weighted(weights.stiffness, self.stiffness), self.mass(weights), self.n_kept, self.n_rigid)
+        values = (pencil_values(step.stiffness, step.mass) - step.shift)[:, self.n_rigid :]
         return np.where(values[:, :1] > 0.0, values, np.nan)
 
     def modes(self, weights: Weights, n_modes: int) -> tuple[Floats, Floats]:
@@ -89,16 +92,15 @@ class ReducedClass:
         The vectors are combinations of the basis, normalised in the draw's mass. Neither is a number at a draw that is
         no plate.
         """
-        values, vectors = pencil_modes(_weighted(weights.stiffness, self.stiffness), self.mass(weights))
+        step = _stepped(_weighted(weights.stiffness, self.stiffness), self.mass(weights), self.n_kept, self.n_rigid)
+        values, turned = pencil_modes(step.stiffness, step.mass)
         elastic = slice(self.n_rigid, self.n_rigid + n_modes)
-        values, vectors = values[:, elastic], vectors[:, :, elastic]
+        values, vectors = (values - step.shift)[:, elastic], step.vectors @ turned[:, :, elastic]
         is_plate = values[:, 0] > 0.0
         return np.where(is_plate[:, None], values, np.nan), np.where(is_plate[:, None, None], vectors, np.nan)
 
     def mass(self, weights: Weights) -> Floats:
         """Mass matrices of many draws on the basis: (n_draws, r, r) array."""
-        if self.is_steady:
-            return weights.mass[:, :1, None] * np.eye(self.stiffness.shape[-1])
         return _weighted(weights.mass, self.masses)
 
     def ranks(self, weights: Weights, n_modes: int, least: float = 0.0) -> NDArray[np.intp]:
@@ -207,10 +209,10 @@ def reduced_order_model(
 ) -> ReducedOrderModel:
     """Project a plate on its modes at `centre` and `around` it, and check the result at the points `held_out`.
 
-    Of many points around the first half will do if the error at the held-out ones stays within the tolerance. While it
-    does not, the second half joins the basis, then half of the held-out points. The check is made at those that did not
-    join: they lie as far out as the others, and none was chosen for its error, so that it is an honest sample of the
-    error over the region.
+    Of many points around the first half will do if the error at the held-out ones stays within the tolerance and the
+    basis short. While that is not so, the second half joins the basis, then half of the held-out points. The check is
+    made at those that did not join: they lie as far out as the others, and none was chosen for its error, so that it is
+    an honest sample of the error over the region.
 
     Parameters
     ----------
@@ -244,7 +246,8 @@ def reduced_order_model(
         joined = [*snapshots, *checks[:n_joined]]
         found = [_reduced(plate.symmetry_class(p), middle, joined, checks[n_joined:], tolerance, p) for p in n_modes]
         worst = max(cents for _, cents in found)
-        if worst > tolerance and later:
+        is_long = any(own.stiffness.shape[-1] > _LONG * own.n_kept for own, _ in found)
+        if (worst > tolerance or is_long) and later:
             snapshots, later = [*snapshots, *_solved(plate, later, n_modes)], []
         elif worst > tolerance and not n_joined and len(checks) > 1:
             n_joined = len(checks) // 2
@@ -285,33 +288,34 @@ def _reduced(
         own, centre, first, np.hstack([of_class[parity].vectors for _, of_class in snapshots] or [first.vectors])
     )
     exact = np.stack([of_class[parity].eigenvalues[:-SPARE] for _, of_class in checks])
-    forms = [
-        own.on_span(own.pencil(own.plate.elements(one)), one, vectors) for one in (centre, *(w for w, _ in checks))
-    ]
-    stiffness, mass = (np.stack(each) for each in zip(*forms, strict=True))
-    first_mass = np.array([weights.mass[0] for weights, _ in checks])[:, None]
-    for size in _sizes(first.vectors.shape[1] + own.n_rigid, vectors.shape[1]):
-        turn = pencil_modes(stiffness[:1, :size, :size], mass[:1, :size, :size])[1]
-        small_stiffness, small_mass = (turn[0].T @ one[1:, :size, :size] @ turn[0] for one in (stiffness, mass))
-        for is_steady in (True, False):
-            values = (
-                np.linalg.eigvalsh(small_stiffness) / first_mass
-                if is_steady
-                else pencil_values(small_stiffness, small_mass)
-            )
-            ratios = values[:, own.n_rigid : own.n_rigid + exact.shape[1]] / exact
-            cents = 600.0 * float(np.abs(np.log2(np.where(ratios > 0.0, ratios, np.inf))).max())
-            if cents <= tolerance:
-                break
+    points = [centre, *(weights for weights, _ in checks)]
+    pencils = [own.pencil(own.plate.elements(one)) for one in points]
+    stiffness, mass = own.on_span(pencils, Weights(*(np.stack(part) for part in zip(*points, strict=True))), vectors)
+
+    def tried(size: int, n_kept: int) -> tuple[Floats, float]:
+        """What turns the first vectors to modes at the centre, and the error of their law where it is checked."""
+        turn = pencil_modes(stiffness[:1, :size, :size], mass[:1, :size, :size])[1][0]
+        turned = (turn.T @ one[1:, :size, :size] @ turn for one in (stiffness, mass))
+        step = _stepped(*turned, n_kept, own.n_rigid)
+        values = (pencil_values(step.stiffness, step.mass) - step.shift)[:, own.n_rigid :]
+        ratios = values[:, : exact.shape[1]] / exact
+        return turn, 600.0 * float(np.abs(np.log2(np.where(ratios > 0.0, ratios, np.inf))).max())
+
+    fewest, most = first.vectors.shape[1] + own.n_rigid, vectors.shape[1]
+    for n_kept in sorted({min(round(times * fewest), most) for times in _KEPT}):
+        (turn, cents), size = tried(most, n_kept), most
         if cents <= tolerance:
+            sizes = list(_sizes(n_kept, most))
+            size = sizes[bisect_left(sizes, True, key=lambda one: tried(one, n_kept)[1] <= tolerance)]
+            turn, cents = tried(size, n_kept)
             break
-    basis = vectors[:, :size] @ turn[0]
+    basis = vectors[:, :size] @ turn
     parts, squares = beam_parts(own, basis)
     reduced = ReducedClass(
         parity=parity,
         stiffness=own.project_stiffness(basis),
         masses=own.project_masses(basis),
-        is_steady=is_steady,
+        n_kept=n_kept,
         products=tuple(own.plate.elastic_products[parity]),
         parts=parts,
         squares=squares,
@@ -321,13 +325,38 @@ def _reduced(
     return reduced, cents
 
 
+class _Step(NamedTuple):
+    """Vectors after a step from the first ones, (n, r, n_kept); stiffness and mass on them; the shift, (n, 1), s^-2."""
+
+    vectors: Floats
+    stiffness: Floats
+    mass: Floats
+    shift: Floats
+
+
+def _stepped(stiffness: Floats, mass: Floats, n_kept: int, n_rigid: int) -> _Step:
+    """One step of inverse iteration on pencils of (n, r, r) arrays.
+
+    The shift lifts rigid motions off zero; it is the draw's own, so that eigenvalues are homogeneous in the stiffness.
+    """
+    shift = (stiffness[:, n_rigid, n_rigid] / mass[:, n_rigid, n_rigid])[:, None, None]
+    shifted = stiffness + shift * mass
+    if stiffness.shape[-1] == n_kept:
+        return _Step(np.eye(n_kept)[None], shifted, mass, shift[:, :, 0])
+    loads = mass[:, :, :n_kept]
+    vectors = np.linalg.solve(shifted, loads)
+    across = np.swapaxes(vectors, -1, -2)
+    return _Step(vectors, across @ loads, across @ (mass @ vectors), shift[:, :, 0])
+
+
 def _basis(own: SymmetryClass, weights: Weights, first: ClassModes, snapshots: Floats) -> Floats:
     """Rigid motions, the modes at the centre, then what snapshots have beside them by singular value: (n_dof, r).
 
-    Orthonormal in the energy of the centre, potential and kinetic at its highest mode.
+    Orthonormal in the energy of the centre, of which each snapshot has one: what a mode lacks then counts by its share
+    of the mode's own energy, which is the error of its eigenvalue.
     """
     stiffness, mass = own.pencil(own.plate.elements(weights))
-    norm = stiffness + float(first.eigenvalues[-1]) * mass
+    norm = stiffness + float(first.eigenvalues[0]) * mass
     known = _orthonormal(norm, np.hstack([first.rigid, first.vectors]))
     sizes = np.sqrt(np.einsum("ij,ij->j", snapshots, norm @ snapshots))
     rest = snapshots / sizes

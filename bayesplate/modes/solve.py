@@ -109,7 +109,8 @@ def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: We
     except (ArpackError, RuntimeError) as failure:
         raise np.linalg.LinAlgError(str(failure)) from failure
     # The solver's own values carry the rounding of a nearly singular factorisation where the plate can move as a whole.
-    values, combinations = eigh(*own.on_span((stiffness, mass), weights, vectors))
+    small = own.on_span([(stiffness, mass)], Weights(*(part[None] for part in weights)), vectors)
+    values, combinations = eigh(small[0][0], small[1][0])
     vectors = vectors @ combinations
     rigid, elastic = vectors[:, : own.n_rigid], vectors[:, own.n_rigid : own.n_rigid + n_modes]
     on_plate = 1.0 - np.diagonal(np.tensordot(weights.mass, own.project_beside(elastic), axes=1))

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 _BOX_SDS = 3.0
 _NARROWEST, _WIDEST = 0.1, 0.6
-_N_HELD_OUT = 6
+_N_HELD_OUT = 8
 _INSIDE = 0.1
 _SHARE_OF_NOISE = 0.2
 _ROUGH_CENTS = 1.0
@@ -277,20 +277,22 @@ def exact_models(
     everywhere = _also_at(models, parameters, centre, reach) / np.where(half_widths > 0.0, half_widths, 1.0)
     corners = np.concatenate(half if is_rough else [*half, corners[1:-1], ends[1::2], everywhere])
     n_held_out = 1 if is_rough else _N_HELD_OUT
-    held_out = np.random.default_rng(0).uniform(-1.0, 1.0, (n_held_out, parameters.n_dim))
+    held_out = np.random.default_rng(0).multivariate_normal(
+        np.zeros(parameters.n_dim), covariance, n_held_out, method="eigh"
+    )
 
     bounds = parameters.fitted_bounds
     columns_fitted = parameters.fitted_columns
 
-    def points(signs: Floats) -> list[Values]:
-        theta = centre + half_widths * signs
+    def points(steps: Floats) -> list[Values]:
+        theta = centre + steps
         theta[:, columns_fitted] = np.clip(theta[:, columns_fitted], bounds.lower, bounds.upper)
         values = parameters.values(theta)
-        columns = {name: np.broadcast_to(value, len(signs)) for name, value in values.items()}
-        return [{name: column[i] for name, column in columns.items()} for i in range(len(signs))]
+        columns = {name: np.broadcast_to(value, len(steps)) for name, value in values.items()}
+        return [{name: column[i] for name, column in columns.items()} for i in range(len(steps))]
 
     (middle,) = points(np.zeros((1, parameters.n_dim)))
-    around, checks = points(corners), points(held_out)
+    around, checks = points(half_widths * corners), points(held_out)
     tolerance = law_tolerance(board) if accepted_cents is None else accepted_cents
     return tuple(with_exact(model, middle, around, checks, tolerance) for model in models)
 

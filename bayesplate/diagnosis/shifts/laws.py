@@ -24,9 +24,6 @@ from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
-_ACCEPTED_CENTS = 0.5
-"""Error of a law at the ends of its region: small beside what readings scatter."""
-
 
 @dataclass(frozen=True, eq=False)
 class FormLaw:
@@ -176,7 +173,7 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
         covariance[:n, :n] = np.linalg.inv(weighted.T @ weighted)
     else:
         covariance[:n, :n] = np.diag([half_width**2 / 9.0] * (n - 1) + [0.0])
-    return FormLaw(form, exact_models(board, models, centre, covariance, accepted_cents=_ACCEPTED_CENTS))
+    return FormLaw(form, exact_models(board, models, centre, covariance))
 
 
 def merged(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:
