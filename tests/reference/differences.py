@@ -22,8 +22,8 @@ GAIN_SHARE = 0.1
 """Of a plan's gain, beside three times its own error."""
 MOST_TIME = 1.2
 """Processor time over that of the reference, all results of a part together."""
-_EXACT = ("verdict", "claim", "effects", "refitted", "theory", "law", "refused", "basis", "sentence")
-"""What must be the same word for word, in the order of importance: the later ones follow from the earlier."""
+_NAMES = ("effects", "refitted")
+"""Lists of which the order means nothing: alternatives stand in that of their probabilities."""
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,13 @@ def _judged(name: str, what: str, stored: Any, computed: Any) -> Iterator[Differ
         elif "sentence" in stored and "sentence" in computed:
             yield from _proposal(name, what, stored, computed)
         else:
-            for each in {**stored, **computed}:
+            every = [one for one in {**stored, **computed} if key != "answers" or (one in stored and one in computed)]
+            for each in every:
                 yield from _judged(name, f"{what} {each}", stored.get(each), computed.get(each))
-    elif isinstance(stored, list) and isinstance(computed, list) and key not in _EXACT:
+    elif isinstance(stored, list) and isinstance(computed, list) and key in _NAMES:
+        if sorted(stored) != sorted(computed):
+            yield Difference(name, what, _shown(stored), _shown(computed))
+    elif isinstance(stored, list) and isinstance(computed, list):
         if len(stored) != len(computed):
             yield Difference(name, what, f"{len(stored)} entries", f"{len(computed)} entries")
         for place, (one, other) in enumerate(zip(stored, computed, strict=False), start=1):
