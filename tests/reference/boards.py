@@ -73,7 +73,7 @@ def _fitted(out: Path) -> Json:
     """Constants, sizes and errors of a fit."""
     found = _read(out / "summary.json")
     draws = found["sampler"]["ess_min"]
-    constants = found["elastic"] | found["noise"]
+    constants = found["elastic"] | {f"noise[{setup}]": one for setup, one in found["noise"].items()}
     return {
         "theory": found["model"]["theory"],
         "law": found["model"]["law"],

@@ -33,7 +33,7 @@ def main() -> int:
     parser.add_argument("--stored", action="store_true", help="compute nothing: compare what the folder holds")
     options = parser.parse_args()
     known = {"": ""} if not KNOWN.exists() else tomllib.loads(KNOWN.read_text())
-    n_differing = 0
+    mesh, n_differing = read(HERE / "mesh.json"), 0
     for part, wanted in chosen(options):
         reference, path = read(HERE / f"{part}.json"), options.into / f"{part}.json"
         names = [name for name in wanted if name in reference]
@@ -42,7 +42,7 @@ def main() -> int:
             computed = {name: there[name] for name in names if name in there}
         else:
             computed = make(part, names, options.into, resume=options.resume, told=lambda line: print(line, flush=True))
-        n_differing += _told(part, len(computed), differences(part, reference, computed), known)
+        n_differing += _told(part, len(computed), differences(part, reference, computed, mesh), known)
         n_differing += _timed(times(reference, computed))
     return 1 if n_differing else 0
 

@@ -11,6 +11,8 @@ Json = Mapping[str, Any]
 
 FREQUENCY_CENTS = 0.1
 """A full solve against a full solve: a fiftieth of the smallest noise of a reading (0.3 % is 5 cents)."""
+MESH = 2.0
+"""The limit of ever finer meshes over what one half again as fine does: 1.8 where errors fall with the square."""
 MEAN_SDS, SD_SHARE = 0.1, 0.1
 """A mean by posterior standard deviations, and a standard deviation by itself: what nobody would act upon."""
 MONTE_CARLO = 3.0
@@ -22,8 +24,8 @@ GAIN_SHARE = 0.1
 """Of a plan's gain, beside three times its own error."""
 MOST_TIME = 1.2
 """Processor time over that of the reference, all results of a part together."""
-_EXACT = ("verdict", "claim", "effects", "refitted", "theory", "law", "refused", "basis", "sentence")
-"""What must be the same word for word, in the order of importance: the later ones follow from the earlier."""
+_NAMES = ("effects", "refitted")
+"""Lists of which the order means nothing: alternatives stand in that of their probabilities."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,9 @@ class Difference:
     size: str = ""
 
 
-def differences(part: str, stored: Mapping[str, Json], computed: Mapping[str, Json]) -> list[Difference]:
+def differences(
+    part: str, stored: Mapping[str, Json], computed: Mapping[str, Json], mesh: Mapping[str, Json] | None = None
+) -> list[Difference]:
     """Differences of the results that were computed from those that are stored, by the part's tolerances.
 
     Parameters
@@ -56,6 +60,8 @@ def differences(part: str, stored: Mapping[str, Json], computed: Mapping[str, Js
     part : str
     stored, computed : dict
         By name, as `results.read` gives them. What is stored but was not computed is not judged.
+    mesh : dict, optional
+        By plate and label under "cents": what a finer mesh did (`mesh.py`).
 
     Returns
     -------
@@ -74,14 +80,16 @@ def differences(part: str, stored: Mapping[str, Json], computed: Mapping[str, Js
                     Difference(name, key, "there" if key in kept else "none", "there" if key in judged else "none")
                 )
             elif part == "plates":
-                found += frequency_differences(name, key, kept[key], judged[key])
+                found += frequency_differences(
+                    name, key, kept[key], judged[key], (mesh or {}).get(name, {}).get("cents", {})
+                )
             else:
                 found += _judged(name, key, kept[key], judged[key])
     return found
 
 
 def frequency_differences(
-    name: str, what: str, stored: Mapping[str, float], computed: Mapping[str, float]
+    name: str, what: str, stored: Mapping[str, float], computed: Mapping[str, float], mesh: Mapping[str, float]
 ) -> list[Difference]:
     """Frequencies of a plate by label; modes of which only one side can tell the label are taken in their order."""
     pairs = [(label, label, stored[label], computed[label]) for label in stored if label in computed]
@@ -90,8 +98,8 @@ def frequency_differences(
     pairs += [(a, b, first, second) for (a, first), (b, second) in zip(left, new, strict=False)]
     found = []
     for label, other, first, second in pairs:
-        cents = 1200.0 * math.log2(second / first)
-        if abs(cents) > FREQUENCY_CENTS:
+        cents, open_to = 1200.0 * math.log2(second / first), MESH * mesh.get(label, 0.0)
+        if not min(0.0, open_to) - FREQUENCY_CENTS <= cents <= max(0.0, open_to) + FREQUENCY_CENTS:
             shown = label if label == other else f"{label} as {other}"
             found.append(Difference(name, f"{what} {shown}", f"{first:g} Hz", f"{second:g} Hz", f"{cents:+.2f} cents"))
     if len(stored) != len(computed):
@@ -108,9 +116,13 @@ def _judged(name: str, what: str, stored: Any, computed: Any) -> Iterator[Differ
         elif "sentence" in stored and "sentence" in computed:
             yield from _proposal(name, what, stored, computed)
         else:
-            for each in {**stored, **computed}:
+            every = [one for one in {**stored, **computed} if key != "answers" or (one in stored and one in computed)]
+            for each in every:
                 yield from _judged(name, f"{what} {each}", stored.get(each), computed.get(each))
-    elif isinstance(stored, list) and isinstance(computed, list) and key not in _EXACT:
+    elif isinstance(stored, list) and isinstance(computed, list) and key in _NAMES:
+        if sorted(stored) != sorted(computed):
+            yield Difference(name, what, _shown(stored), _shown(computed))
+    elif isinstance(stored, list) and isinstance(computed, list):
         if len(stored) != len(computed):
             yield Difference(name, what, f"{len(stored)} entries", f"{len(computed)} entries")
         for place, (one, other) in enumerate(zip(stored, computed, strict=False), start=1):

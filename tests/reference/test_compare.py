@@ -5,7 +5,6 @@ from __future__ import annotations
 from copy import deepcopy
 
 import pytest
-
 from reference.differences import differences, times
 
 PLATES = {"made": {"made_on": "a", "as stated": {"(1,1)": 129.0, "(2,0)": 281.0, "? 3": 308.0}}}
@@ -35,6 +34,14 @@ def test_a_frequency_may_move_by_a_tenth_of_a_cent(factor, found):
     moved = deepcopy(PLATES)
     moved["made"]["as stated"]["(2,0)"] *= factor
     assert _names_of("plates", PLATES, moved) == found
+
+
+@pytest.mark.parametrize(("cents", "found"), [(0.05, 0), (-0.65, 0), (0.15, 1), (-0.75, 1)])
+def test_a_finer_mesh_is_no_difference(cents, found):
+    """A mesh half again as fine lowers the mode by 0.3 cent: down to 0.6 cent, and a tenth, it may lie."""
+    moved = deepcopy(PLATES)
+    moved["made"]["as stated"]["(2,0)"] *= 2.0 ** (cents / 1200.0)
+    assert len(differences("plates", PLATES, moved, {"made": {"cents": {"(2,0)": -0.3}}})) == found
 
 
 def test_a_mode_that_lost_its_label_keeps_its_frequency():
