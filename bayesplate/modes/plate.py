@@ -292,8 +292,9 @@ class SymmetryClass:
         return rows, rows, shares
 
     def _at_places(self, term: AtPlaces) -> tuple[Floats, Floats, Floats]:
-        left, right = (np.stack([self._row(one[side]) for one in term.products]) for side in (1, 2))
-        return left, right, np.array([one[0] for one in term.products])
+        left = np.stack([self._row(first) for _, first, _ in term.products])
+        right = np.stack([self._row(second) for _, _, second in term.products])
+        return left, right, np.array([factor for factor, _, _ in term.products])
 
     def _row(self, amount: Amount) -> Floats:
         row = np.zeros(self.n_dof)

@@ -295,8 +295,8 @@ def _reduced(
     def tried(size: int, n_kept: int) -> tuple[Floats, float]:
         """What turns the first vectors to modes at the centre, and the error of their law where it is checked."""
         turn = pencil_modes(stiffness[:1, :size, :size], mass[:1, :size, :size])[1][0]
-        turned = (turn.T @ one[1:, :size, :size] @ turn for one in (stiffness, mass))
-        step = _stepped(*turned, n_kept, own.n_rigid)
+        turned = [turn.T @ one[1:, :size, :size] @ turn for one in (stiffness, mass)]
+        step = _stepped(turned[0], turned[1], n_kept, own.n_rigid)
         values = (pencil_values(step.stiffness, step.mass) - step.shift)[:, own.n_rigid :]
         ratios = values[:, : exact.shape[1]] / exact
         return turn, 600.0 * float(np.abs(np.log2(np.where(ratios > 0.0, ratios, np.inf))).max())
@@ -344,7 +344,7 @@ def _stepped(stiffness: Floats, mass: Floats, n_kept: int, n_rigid: int) -> _Ste
     if stiffness.shape[-1] == n_kept:
         return _Step(np.eye(n_kept)[None], shifted, mass, shift[:, :, 0])
     loads = mass[:, :, :n_kept]
-    vectors = np.linalg.solve(shifted, loads)
+    vectors = np.asarray(np.linalg.solve(shifted, loads), dtype=np.float64)
     across = np.swapaxes(vectors, -1, -2)
     return _Step(vectors, across @ loads, across @ (mass @ vectors), shift[:, :, 0])
 
