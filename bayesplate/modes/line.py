@@ -79,7 +79,7 @@ class Line:
     def local(self) -> Floats:
         """Functions of each element and their two derivatives at its Gauss points: (3, n_elements, n_q, 4) array."""
         functions = [self.basis.basis[i][0] for i in range(4)]
-        orders = [[f.value, f.grad[0], f.hess[0, 0]] for f in functions]
+        orders = [[np.asarray(f), f.grad[0], f.hess[0, 0]] for f in functions]
         return np.moveaxis(np.array(orders), 0, -1)
 
     @cached_property
