@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.beams import Beams
+from bayesplate.modes.classes import SymmetryClass
 from bayesplate.modes.naming import Place, beam_parts, fits, name_parts
-from bayesplate.modes.plate import Plate, SymmetryClass
+from bayesplate.modes.plate import Plate
 from bayesplate.modes.solve import ClassModes, solve_classes
 from bayesplate.modes.terms import Parity, Weights
 

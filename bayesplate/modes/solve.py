@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.plate import Elements, Plate, SymmetryClass
+from bayesplate.modes.classes import SymmetryClass
+from bayesplate.modes.forms import Elements
+from bayesplate.modes.plate import Plate
 from bayesplate.modes.terms import Parity, Weights
 
 Floats = NDArray[np.float64]
