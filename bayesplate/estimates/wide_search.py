@@ -29,7 +29,8 @@ from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.prior_bands import prior_draws
 from bayesplate.frequencies.system import System, system_of
 from bayesplate.modes.naming import Place
-from bayesplate.modes.reduced import ReducedOrderModel, reduced_order_model
+from bayesplate.modes.reduced import ReducedOrderModel
+from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli

@@ -16,7 +16,7 @@ from bayesplate.labels import Label
 from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
 from bayesplate.modes.plate import Plate
-from bayesplate.modes.reduced import reduced_order_model
+from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.modes.solve import Modes, solve_up_to
 from bayesplate.plate.board import Values
 from bayesplate.plate.sessions import discrepancy_names

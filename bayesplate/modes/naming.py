@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.modes.beams import Beams, beam_functions, product_coefficients
-from bayesplate.modes.plate import Plate, SymmetryClass
+from bayesplate.modes.classes import SymmetryClass
+from bayesplate.modes.plate import Plate
 from bayesplate.modes.solve import ClassModes, Modes, solve_classes
 from bayesplate.modes.terms import Parity, Weights
 

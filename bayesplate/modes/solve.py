@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.modes.plate import Elements, Plate, SymmetryClass
+from bayesplate.modes.classes import SymmetryClass
+from bayesplate.modes.forms import Elements
+from bayesplate.modes.plate import Plate
 from bayesplate.modes.terms import Parity, Weights
 
 Floats = NDArray[np.float64]
@@ -20,7 +22,7 @@ _SPARE_FOR_PROJECTED = 8
 _FIRST_OF_CLASS = 8
 _MORE, _FEWEST_MORE = 1.15, 4
 """What is added to an estimate of how many modes there are."""
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-8
 """Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
 
 

@@ -1,0 +1,65 @@
+"""Eigenvalues of many small pencils K x = omega^2 M x at once: all of them, or the lowest by a step from near modes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def pencil_values(stiffness: Floats, mass: Floats) -> Floats:
+    """All eigenvalues of pencils of (n, r, r) arrays, increasing: (n, r); not numbers where no mass is positive."""
+    whitened, is_mass = _whitened(stiffness, mass)[:2]
+    return np.where(is_mass[:, None], np.linalg.eigvalsh(whitened), np.nan)
+
+
+def pencil_modes(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """The same, and the mass-normalised vectors: (n, r) and (n, r, r) arrays."""
+    whitened, is_mass, inverse = _whitened(stiffness, mass)
+    values, turned = np.linalg.eigh(whitened)
+    return np.where(is_mass[:, None], values, np.nan), np.swapaxes(inverse, -1, -2) @ turned
+
+
+def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    """Stiffness in coordinates in which the mass is one; which masses are positive; inverses of their factors."""
+    try:
+        factors = np.linalg.cholesky(mass)
+        is_mass = np.ones(len(mass), dtype=bool)
+    except np.linalg.LinAlgError:
+        is_mass = np.linalg.eigvalsh(mass)[:, 0] > 0.0
+        factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, np.eye(mass.shape[-1])))
+    inverse = np.linalg.inv(factors)
+    return inverse @ stiffness @ np.swapaxes(inverse, -1, -2), is_mass, inverse
+
+
+class Step(NamedTuple):
+    """Vectors after a step from the first ones, (n, r, n_kept); stiffness and mass on them; the shift, (n, 1), s^-2."""
+
+    vectors: Floats
+    stiffness: Floats
+    mass: Floats
+    shift: Floats
+
+
+def stepped(stiffness: Floats, mass: Floats, n_kept: int, n_rigid: int) -> Step:
+    """One step of inverse iteration on pencils of (n, r, r) arrays.
+
+    The shift lifts rigid motions off zero; it is the draw's own, so that eigenvalues are homogeneous in the stiffness,
+    and not a number where nothing can be solved.
+    """
+    shift = (stiffness[:, n_rigid, n_rigid] / mass[:, n_rigid, n_rigid])[:, None, None]
+    shifted = stiffness + shift * mass
+    if stiffness.shape[-1] == n_kept:
+        return Step(np.eye(n_kept)[None], shifted, mass, shift[:, :, 0])
+    loads = mass[:, :, :n_kept]
+    try:
+        vectors = np.linalg.solve(shifted, loads)
+    except np.linalg.LinAlgError:
+        is_singular = np.linalg.slogdet(shifted)[0][:, None, None] == 0.0
+        vectors = np.linalg.solve(np.where(is_singular, np.eye(shifted.shape[-1]), shifted), loads)
+        shift = np.where(is_singular, np.nan, shift)
+    across = np.swapaxes(vectors, -1, -2)
+    return Step(np.asarray(vectors, dtype=np.float64), across @ loads, across @ (mass @ vectors), shift[:, :, 0])
