@@ -1,4 +1,4 @@
-"""Weights of a plate's Gauss points: fields of degree three, areas and moments within outlines, strips, order of terms."""
+"""Weights of a plate's Gauss points: fields of degree three, areas and moments within outlines, strips, their order."""
 
 from __future__ import annotations
 

@@ -72,7 +72,9 @@ def test_held_ends_take_their_unknowns(ends):
     assert whole.kept(0, is_sheared=False).sum() == 2 * 6 - 2 * n_clamped - n_supported
     assert whole.kept(0, is_sheared=True).sum() == 2 * 6 - n_clamped - n_supported
     assert whole.kept_strain(0).sum() == 2 * 6 - n_clamped
-    assert whole.ties() == [(2 * node, 2 * node + 1) for node, end in zip((0, 5), ends, strict=True) if end == "clamped"]
+    assert whole.ties() == [
+        (2 * node, 2 * node + 1) for node, end in zip((0, 5), ends, strict=True) if end == "clamped"
+    ]
 
 
 def test_what_is_held_may_be_less_than_the_ends_say():
@@ -160,7 +162,9 @@ def test_ends_have_their_own_values_and_slopes(order):
 
     for at in product((False, True), repeat=2):
         rows, weights = whole.at_ends(at, order)
-        expected = [cubic.deriv(order)(end) if order else cubic(end) for end, asked in zip((0.0, 1.0), at, strict=True) if asked]
+        expected = [
+            cubic.deriv(order)(end) if order else cubic(end) for end, asked in zip((0.0, 1.0), at, strict=True) if asked
+        ]
         np.testing.assert_allclose(rows @ unknowns(whole, cubic), expected)
         np.testing.assert_array_equal(weights, np.ones(sum(at)))
     rows, weights = half.at_ends((True, True), order)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from bayesplate.modes.reduced import ReducedClass, pencil_modes, pencil_values
+from bayesplate.modes.pencils import pencil_modes, pencil_values
+from bayesplate.modes.reduced import ReducedClass
 from bayesplate.modes.terms import Parity, Weights
 
 N_DRAWS, R, N_KEPT, N_WANTED, N_RIGID = 5, 40, 14, 8, 2

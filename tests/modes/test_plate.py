@@ -1,4 +1,4 @@
-"""The plate's terms: energies by hand, the two-dimensional element as oracle, rigid motions, and one pencil of each class."""
+"""The plate: energies by hand, the two-dimensional element as oracle, rigid motions, and one pencil of each class."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 import pytest
+from dense_pencils import dense, spectrum, together, whole
 from numpy.polynomial import Polynomial
-from pencils import dense, spectrum, together, whole
 from scipy.linalg import eigh
 from skfem import Basis, BilinearForm, ElementQuadBFS, MeshQuad
 
@@ -129,7 +129,9 @@ def test_deflections_have_the_parity_of_their_class(parity):
 
     np.testing.assert_allclose(deflections.on(1 - x, y), (-1.0) ** parity.x * here, atol=1e-12)
     np.testing.assert_allclose(deflections.on(x, 1 - y), (-1.0) ** parity.y * here, atol=1e-12)
-    np.testing.assert_allclose(deflections.across(x, np.stack([y, 1 - y])), _each_its_own(deflections, x, y), atol=1e-12)
+    np.testing.assert_allclose(
+        deflections.across(x, np.stack([y, 1 - y])), _each_its_own(deflections, x, y), atol=1e-12
+    )
 
 
 def _each_its_own(deflections, x, y):

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import ritz
 from bars import meets
-from pencils import together
+from dense_pencils import together
 
 from bayesplate.frequencies.laws import ExactLaw, LinearLaw
-from bayesplate.modes import reduced as reduced_file
+from bayesplate.modes import reduction
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
-from bayesplate.modes.reduced import reduced_order_model
+from bayesplate.modes.reduction import reduced_order_model
 from bayesplate.modes.shear import shear_flexible_plate
 from bayesplate.modes.solve import solve_classes
 from bayesplate.modes.terms import Weights
@@ -138,7 +138,9 @@ def test_further_points_are_solved_where_the_first_ones_will_not_do(tolerance, n
     """Of fourteen points around the centre half; held-out ones that join the basis no longer check it."""
     board, _ = WANTED["clamped"]
     plate, found = named("clamped")
-    around, held_out = ([weights_at(board, at) for at in points] for points in ([*CORNERS, *somewhere(6, 1)], somewhere(6, 2)))
+    around, held_out = (
+        [weights_at(board, at) for at in points] for points in ([*CORNERS, *somewhere(6, 1)], somewhere(6, 2))
+    )
     solved, checked = [], []
 
     def counted(plate, weights, n_modes):
@@ -149,9 +151,9 @@ def test_further_points_are_solved_where_the_first_ones_will_not_do(tolerance, n
         checked.append((len(snapshots), len(checks)))
         return _reduced(own, middle, snapshots, checks, *further)
 
-    _reduced = reduced_file._reduced
-    monkeypatch.setattr(reduced_file, "solve_classes", counted)
-    monkeypatch.setattr(reduced_file, "_reduced", watched)
+    _reduced = reduction._reduced
+    monkeypatch.setattr(reduction, "solve_classes", counted)
+    monkeypatch.setattr(reduction, "_reduced", watched)
     places = [one.place for one in found.values()]
     reduced_order_model(plate, places, weights_at(board, np.zeros(3)), around, held_out, tolerance)
 
@@ -291,7 +293,9 @@ def test_a_shear_flexible_plate_is_held_within_its_tolerance_too(support):
     rng = np.random.default_rng(11)
 
     def at(shares):
-        return Weights(np.array([*board.unit_weights, 2e4, 1e3]) * np.exp([0.3, 0.3, 0.2, 0.0, 0.7, 0.7] * shares), mass)
+        return Weights(
+            np.array([*board.unit_weights, 2e4, 1e3]) * np.exp([0.3, 0.3, 0.2, 0.0, 0.7, 0.7] * shares), mass
+        )
 
     names = [(1, 1), (2, 0), (0, 2), (2, 1)] if support == "free" else [(0, 0), (0, 1), (1, 0), (0, 2)]
     places = [one.place for one in find(plate, at(np.zeros(6)), names).values()]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import ritz
 from bars import meets
+from dense_pencils import dense
 from numpy.polynomial import Polynomial
-from pencils import dense
 from scipy.linalg import eigh
 
 from bayesplate.modes.line import line

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import ritz
 from bars import meets
-from pencils import spectrum, whole
+from dense_pencils import spectrum, whole
 from scipy.linalg import eigh
 
 from bayesplate.modes.line import line

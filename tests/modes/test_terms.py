@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -112,8 +114,10 @@ def test_terms_are_sums_over_points(kinematics, outline):
     fields = {group: [None, bump] for group in GROUPS} | {"mass": [None, bump, ripple]}
     # A mass at one place, and one that goes with how far two places move apart.
     places = Amount(((1.0, 0.3, 0.8), (-1.0, 0.3, 0.1)))
-    further = OverPlate(("slope_x", "slope_y"), outline), AlongEdges(0, (True, False), "turn_x"), AlongEdges(
-        1, (True, True), "turn_y"
+    further = (
+        OverPlate(("slope_x", "slope_y"), outline),
+        AlongEdges(0, (True, False), "turn_x"),
+        AlongEdges(1, (True, True), "turn_y"),
     )
     plate = plate_of(kinematics, x, y, Fabric(fields, outline, is_turned=True)).with_terms(
         further, [AtPlaces(((1.0, places, places),))]
@@ -139,9 +143,7 @@ def test_terms_are_sums_over_points(kinematics, outline):
     expected.append(sums.integral(2, *slopes, at_x, at_y, weights))
     (along, in_x), (across, in_y) = ([one.ravel() for one in gauss(s[:-1], np.diff(s), 6)] for s in (x.nodes, y.nodes))
     expected.append(sums.integral(1, TURN_X, TURN_X, np.zeros_like(across), across, in_y))
-    expected.append(
-        sum(sums.integral(1, TURN_Y, TURN_Y, along, np.full_like(along, end), in_x) for end in (0.0, 1.0))
-    )
+    expected.append(sum(sums.integral(1, TURN_Y, TURN_Y, along, np.full_like(along, end), in_x) for end in (0.0, 1.0)))
     masses = [MASS, *(ROTARY if is_sheared else [])]
     inert = [own_term(masses[i], fields[groups[1][i]][k], 1e-8) for i, k in layout(groups[1], counts)]
     at_places = sums.strain(DEFLECTION, np.array([0.3, 0.3]), np.array([0.8, 0.1]))
@@ -210,7 +212,7 @@ def test_a_mass_on_a_spring_at_the_tip_of_a_beam(mass):
     )
 
     at = np.linspace(0.3, 8.0, 400)
-    brackets = [(a, b) for a, b in zip(at[:-1], at[1:], strict=True) if equation(a) * equation(b) < 0.0]
+    brackets = [(a, b) for a, b in pairwise(at) if equation(a) * equation(b) < 0.0]
     assert are_near(found, roots(equation, brackets)[:3])
 
 
