@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from deflected import unknowns
 from numpy.polynomial import Polynomial
 
 from bayesplate.modes.beams import N_BEAMS, beam_functions
@@ -27,15 +28,14 @@ BEAM_WAVENUMBERS = {
 SQUARE_AGAINST_CUBE = {(0, 0): 1 / 6, (1, 1): 3 / 2, (2, 2): 6.0, (0, 2): 3 / 2, (2, 0): 1 / 2}
 
 
-def unknowns(side, cubic):
-    """Values and slopes of a cubic at the nodes."""
-    return np.column_stack([cubic(side.nodes), cubic.deriv()(side.nodes)]).ravel()
+def of_cubic(side, cubic):
+    return unknowns(side, cubic, cubic.deriv())
 
 
 @pytest.mark.parametrize("orders", SQUARE_AGAINST_CUBE)
 def test_integrals_of_cubics_are_exact(orders):
     free = line(("free", "free"), 3)
-    both = (unknowns(free, Polynomial.basis(degree)) for degree in (2, 3))
+    both = (of_cubic(free, Polynomial.basis(degree)) for degree in (2, 3))
 
     square, cube = (free.derivatives[order] @ one for order, one in zip(orders, both, strict=True))
 
@@ -47,7 +47,7 @@ def test_shapes_evaluate_a_cubic_exactly():
     cubic = Polynomial([1.0, -1.0, 0.0, 1.0])
     points = np.array([0.0, 0.1, 0.33, 0.5, 0.91, 1.0])
 
-    np.testing.assert_allclose(free.shapes(points) @ unknowns(free, cubic), cubic(points), rtol=1e-12)
+    np.testing.assert_allclose(free.shapes(points) @ of_cubic(free, cubic), cubic(points), rtol=1e-12)
 
 
 def test_points_and_weights_are_those_of_gauss_on_each_element():
@@ -64,7 +64,7 @@ def test_points_and_weights_are_those_of_gauss_on_each_element():
 
 
 @pytest.mark.parametrize("ends", ENDS)
-def test_held_ends_take_their_unknowns(ends):
+def test_held_ends_take_their_of_cubic(ends):
     """A clamp holds value and slope, on a shear-flexible plate the value alone; the slope there is the shear strain."""
     whole = line(ends, 5)
     n_clamped, n_supported = ends.count("clamped"), ends.count("supported")
@@ -165,10 +165,10 @@ def test_ends_have_their_own_values_and_slopes(order):
         expected = [
             cubic.deriv(order)(end) if order else cubic(end) for end, asked in zip((0.0, 1.0), at, strict=True) if asked
         ]
-        np.testing.assert_allclose(rows @ unknowns(whole, cubic), expected)
+        np.testing.assert_allclose(rows @ of_cubic(whole, cubic), expected)
         np.testing.assert_array_equal(weights, np.ones(sum(at)))
     rows, weights = half.at_ends((True, True), order)
-    assert rows @ unknowns(half, cubic) == pytest.approx(2.0 if order else 1.0)
+    assert rows @ of_cubic(half, cubic) == pytest.approx(2.0 if order else 1.0)
     np.testing.assert_array_equal(weights, [2.0])
 
 

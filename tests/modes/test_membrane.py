@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.polynomial import Polynomial
+from deflected import deflections, power
 
 import bayesplate.modes.membrane as membrane
 from bayesplate.modes.beams import beam_functions
 from bayesplate.modes.line import line
 from bayesplate.modes.membrane import CURVATURES, curvature_pairs, membrane_terms
-from bayesplate.modes.terms import Deflections, Parity
 
 FREE, CLAMPED = ("free", "free"), ("clamped", "clamped")
 SPRUCE = (12.07, 0.402, 1.006, 0.9)
@@ -26,12 +25,8 @@ def sides(ends_x=FREE, ends_y=FREE, n_x=12, n_y=8):
 def polynomials(x, y):
     """Deflections 1, x, y, x y, x^2, y^2 on two sides, whose functions are those of free ones."""
 
-    def of(side, degree):
-        one = Polynomial.basis(degree)
-        return np.column_stack([one(side.nodes), one.deriv()(side.nodes)]).ravel()
-
     orders = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2)]
-    return Deflections(x, y, Parity(0, 0), np.stack([np.outer(of(x, i), of(y, j)) for i, j in orders]))
+    return deflections(x, y, [np.outer(power(x, i), power(y, j)) for i, j in orders])
 
 
 def total(terms, curvatures, moduli=SPRUCE, names=CURVATURES):
@@ -100,7 +95,7 @@ def test_converged_in_its_elements(monkeypatch):
     shapes = [
         np.outer(*(beams.coefficients[:, k] for k in orders)) for orders in ((2, 0), (0, 2), (2, 1), (3, 2), (4, 1))
     ]
-    w = Deflections(beams.side, beams.side, Parity(0, 0), np.stack(shapes))
+    w = deflections(beams.side, beams.side, shapes)
     coarse = membrane_terms(w, ASPECT, SPRUCE)
     monkeypatch.setattr(membrane, "_ELEMENTS", 2 * membrane._ELEMENTS)
     membrane._matrices.cache_clear()

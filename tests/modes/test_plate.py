@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 import pytest
+from deflected import power
 from dense_pencils import dense, spectrum, together, whole
-from numpy.polynomial import Polynomial
 from scipy.linalg import eigh
 from skfem import Basis, BilinearForm, ElementQuadBFS, MeshQuad
 
@@ -39,12 +39,6 @@ PRODUCTS = {
     "x^2 y^2": [(2, 2)],
     "x^3 y^2": [(3, 2)],
 }
-
-
-def power(side, degree):
-    """Unknowns of x^degree on a free side."""
-    one = Polynomial.basis(degree)
-    return np.column_stack([one(side.nodes), one.deriv()(side.nodes)]).ravel()
 
 
 @pytest.mark.parametrize("polynomial", ENERGIES)

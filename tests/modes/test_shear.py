@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import ritz
 from bars import meets
+from deflected import power
 from dense_pencils import dense
-from numpy.polynomial import Polynomial
 from scipy.linalg import eigh
 
 from bayesplate.modes.line import line
@@ -124,15 +124,10 @@ def unsplit(n_x=6, n_y=5):
     return x, y, own
 
 
-def monomial(side, degree):
-    one = Polynomial.basis(degree)
-    return np.column_stack([one(side.nodes), one.deriv()(side.nodes)]).ravel()
-
-
 def fields(x, y, *powers):
     """Unknowns of w, g_x and g_y, each x^i y^j or, for None, nothing."""
     nothing = np.zeros(x.n_functions * y.n_functions)
-    return np.concatenate([nothing if p is None else np.kron(monomial(x, p[0]), monomial(y, p[1])) for p in powers])
+    return np.concatenate([nothing if p is None else np.kron(power(x, p[0]), power(y, p[1])) for p in powers])
 
 
 def test_energies_of_polynomials_are_those_found_by_hand():
@@ -144,11 +139,11 @@ def test_energies_of_polynomials_are_those_found_by_hand():
     assert energies == pytest.approx(ENERGIES, rel=1e-12)
 
 
-@pytest.mark.parametrize("power", [(0, 0), (1, 0), (0, 1)], ids=["shift", "turn along x", "turn along y"])
-def test_rigid_motions_strain_nothing(power):
+@pytest.mark.parametrize("powers", [(0, 0), (1, 0), (0, 1)], ids=["shift", "turn along x", "turn along y"])
+def test_rigid_motions_strain_nothing(powers):
     """No force on any unknown from any term, beside the largest entry of its matrix."""
     x, y, own = unsplit()
-    vector = fields(x, y, power, None, None)
+    vector = fields(x, y, powers, None, None)
 
     terms = own.project_stiffness(np.eye(own.n_dof))
 
