@@ -238,6 +238,8 @@ def exact_models(
     effects, and inputs that their fields follow, add the two ends of their own range, each beside an opposite corner of
     the box, and effects whose place is open the places all over the board.
 
+    The law is checked at places of the box with sizes of effects as likely as their own normal approximation says.
+
     Parameters
     ----------
     board : Board
@@ -277,9 +279,10 @@ def exact_models(
     everywhere = _also_at(models, parameters, centre, reach) / np.where(half_widths > 0.0, half_widths, 1.0)
     corners = np.concatenate(half if is_rough else [*half, corners[1:-1], ends[1::2], everywhere])
     n_held_out = 1 if is_rough else _N_HELD_OUT
-    held_out = np.random.default_rng(0).multivariate_normal(
-        np.zeros(parameters.n_dim), covariance, n_held_out, method="eigh"
-    )
+    rng = np.random.default_rng(0)
+    held_out = half_widths * rng.uniform(-1.0, 1.0, (n_held_out, parameters.n_dim))
+    # Sizes of effects are often known to a factor only: what lies far out in all of them at once counts for nothing.
+    held_out[:, alone] = sds[alone] * rng.standard_normal((n_held_out, len(alone)))
 
     bounds = parameters.fitted_bounds
     columns_fitted = parameters.fitted_columns
