@@ -43,10 +43,10 @@ AS_FOLDER_AND_COMMAND = """
 import bayesplate
 {first}
 import inspect
-from bayesplate.modes.plate import KronSum
+from bayesplate.modes.plate import plate_of
 from bayesplate.workflow.modes import modes
 assert inspect.signature(bayesplate.modes) == inspect.signature(modes)
-assert bayesplate.modes.plate.KronSum is KronSum
+assert bayesplate.modes.plate.plate_of is plate_of
 assert repr(bayesplate.modes("fiemme-spruce-clamped")).startswith("<ModesResult of fiemme-spruce-clamped: clamped: 12")
 """
 

@@ -155,7 +155,7 @@ def find(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams,
 
     Parameters
     ----------
-    plate : PlateMatrices
+    plate : Plate
     weights : Weights
         Of one draw.
     wanted : iterable of (int, int)
@@ -173,7 +173,7 @@ def find(plate: Plate, weights: Weights, wanted: Iterable[Beams]) -> dict[Beams,
     """
     names = list(wanted)
     # With as many modes as products a class has given all its names, and with more some modes would have none.
-    most = {parity: len(products) for parity, products in plate.elastic_products.items()}
+    most = {c.parity: min(len(plate.elastic_products[c.parity]), c.n_dof - c.n_rigid - 1) for c in plate.classes}
     counts = {p: min(n + _SPARE, most[p]) for p, n in _expected_ranks(plate, weights, names).items()}
     solved: dict[Parity, ClassModes] = {}
     places: dict[Beams, Place] = {}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.modes.beams import product_coefficients
 from bayesplate.modes.classes import SymmetryClass
 from bayesplate.modes.forms import Elements
 from bayesplate.modes.plate import Plate
@@ -24,6 +25,8 @@ _MORE, _FEWEST_MORE = 1.15, 4
 """What is added to an estimate of how many modes there are."""
 _TOLERANCE = 1e-8
 """Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
+_SHIFT = -1e-2
+"""Over the lowest elastic eigenvalue."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +96,7 @@ def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: We
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
     stiffness, mass = own.pencil(elements)
-    shift = _shift_below(own, stiffness.diagonal(), mass.diagonal())
+    shift = _shift_below(own, weights)
     options = {"SymmetricMode": True}
     n_wanted = min(own.n_rigid + n_modes + _SPARE_FOR_PROJECTED * own.plate.is_projected, own.n_dof - 1)
     try:
@@ -119,17 +122,16 @@ def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: We
     return ClassModes(own, values[own.n_rigid : own.n_rigid + n_modes], elastic, rigid, on_plate)
 
 
-def _shift_below(own: SymmetryClass, stiffness: Floats, mass: Floats) -> float:
+def _shift_below(own: SymmetryClass, weights: Weights) -> float:
     """A shift below zero that keeps rigid motions from making the shifted matrix singular, s^-2; 0 if there are none.
 
-    Its scale is the lowest Rayleigh quotient of a single unknown, from the diagonals: the lowest modes lie far below
-    it, so the shift stays small, and stiff shear or short elements cannot raise it.
+    It lies well below the lowest elastic mode, as products of beam functions bound it: seen from there rigid motions
+    are far from all else, so that the solver, which finds like ones by rounding, has them before it is content.
     """
     if not own.n_rigid:
         return 0.0
-    on_plate = slice(own.n_on_plate)
-    with np.errstate(divide="ignore"):
-        return -1e-6 * float((stiffness / mass)[on_plate].min())
+    values = np.tensordot(weights.stiffness[:4], product_coefficients(own.plate.x.ends, own.plate.y.ends), axes=1)
+    return _SHIFT * min(float(values[beams]) for beams in own.plate.elastic_products[own.parity])
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.modes import line
 from bayesplate.modes.mesh import mesh
-from bayesplate.modes.plate import Weights
 from bayesplate.modes.solve import solve, solve_classes
+from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.setup import Ends
 from bayesplate.posterior.convergence import autocorrelation_time, burn_in_steps
@@ -123,12 +123,15 @@ def plate_at_estimate(problem: PosedProblem) -> tuple[Ends, Ends, tuple[int, int
 
 def assembly(problem: PosedProblem, repeats: int = 5) -> float:
     """Matrices of a plate that was never assembled before in this process, its libraries imported."""
-    ends_x, ends_y, (n_x, n_y), _ = plate_at_estimate(problem)
+    ends_x, ends_y, (n_x, n_y), weights = plate_at_estimate(problem)
 
     def run() -> None:
         thin_plate.cache_clear()
         line.line.cache_clear()
-        thin_plate(ends_x, ends_y, n_x, n_y)
+        plate = thin_plate(ends_x, ends_y, n_x, n_y)
+        elements = plate.elements(weights)
+        for own in plate.classes:
+            own.pencil(elements)
 
     return best(run, repeats)
 

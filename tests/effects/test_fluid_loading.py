@@ -8,6 +8,7 @@ import generator.effects
 import numpy as np
 import pytest
 import ritz
+from deflected import deflections, power, unknowns
 from effect_plates import MADE, hertz_apart, modes_of, posed, setup_of, shifts
 from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from made_boards import board_of
@@ -30,8 +31,8 @@ def air(plate, baffle=UNKNOWN_BAFFLE):
 def piston(aspect_ratio, is_baffled):
     """Added mass of a free rectangle of unit area that moves as a whole, at unit density."""
     side = line(("free", "free"), 4)
-    shift = side.interpolate(np.ones_like, np.zeros_like)
-    return air_mass(side, side, np.outer(shift, shift)[None], aspect_ratio, is_baffled)[0, 0]
+    shift = power(side, 0)
+    return air_mass(deflections(side, side, [np.outer(shift, shift)]), aspect_ratio, is_baffled)[0, 0]
 
 
 @pytest.mark.parametrize("aspect_ratio", [0.25, 1.0, 3.0])
@@ -47,7 +48,7 @@ def test_baffled_kernel_against_a_polar_quadrature():
     """w = sin(pi x) sin(2 pi y) on the square: its autocorrelation over R, in polar coordinates no longer singular."""
     side = line(("supported", "supported"), 16)
     waves = (np.pi, 2 * np.pi)
-    along = [side.interpolate(lambda x, k=k: np.sin(k * x), lambda x, k=k: k * np.cos(k * x)) for k in waves]
+    along = [unknowns(side, lambda x, k=k: np.sin(k * x), lambda x, k=k: k * np.cos(k * x)) for k in waves]
 
     def correlation(k, s):
         """int sin(k x) sin(k (x + s)) dx over the overlap, for k a multiple of pi."""
@@ -63,7 +64,7 @@ def test_baffled_kernel_against_a_polar_quadrature():
         overlap = correlation(np.pi, r * np.cos(angle)) * correlation(2 * np.pi, r * np.sin(angle))
         total += 4.0 * np.pi / 4 * np.sum(weights[:, None] * weights * reach * overlap)
 
-    found = air_mass(side, side, np.outer(*along)[None], 1.0, True)[0, 0]
+    found = air_mass(deflections(side, side, [np.outer(*along)], (0, 1)), 1.0, True)[0, 0]
 
     assert found == pytest.approx(total / np.pi, rel=2e-4)
 

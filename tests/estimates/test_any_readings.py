@@ -24,7 +24,7 @@ from bayesplate.estimates.refit import (
     refit,
 )
 from bayesplate.estimates.side_by_side import most_likely_of_each
-from bayesplate.modes.plate import Weights
+from bayesplate.modes.terms import Weights
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import predictor

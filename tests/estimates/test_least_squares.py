@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from bayesplate.estimates import least_squares as estimates
 from bayesplate.estimates.least_squares import has_settled, log_measured, reading_scales, weighted_least_squares
 from bayesplate.modes.naming import Place
-from bayesplate.modes.plate import Parity
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare

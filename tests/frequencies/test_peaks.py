@@ -14,7 +14,7 @@ from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood, takes_part
 from bayesplate.frequencies.residues import NODAL_LINE, share_seen, sign_probabilities
 from bayesplate.modes.naming import Place
-from bayesplate.modes.plate import Parity
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.measured import Peak, Reading
 from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from deflected import deflections, power
 
 import bayesplate.modes.membrane as membrane
+from bayesplate.modes.beams import beam_functions
 from bayesplate.modes.line import line
 from bayesplate.modes.membrane import CURVATURES, curvature_pairs, membrane_terms
 
@@ -16,14 +18,15 @@ SPRUCE = (12.07, 0.402, 1.006, 0.9)
 ASPECT = 2.67
 
 
-def polynomials(x, y):
-    """Deflections 1, x, y, x y, x^2, y^2 on two free lines: (6, n_dof_x, n_dof_y) array."""
+def sides(ends_x=FREE, ends_y=FREE, n_x=12, n_y=8):
+    return line(ends_x, n_x, is_split=False), line(ends_y, n_y, is_split=False)
 
-    def of(side, degree):
-        return side.interpolate(lambda t: t**degree, lambda t: degree * t ** max(degree - 1, 0))
+
+def polynomials(x, y):
+    """Deflections 1, x, y, x y, x^2, y^2 on two sides, whose functions are those of free ones."""
 
     orders = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2)]
-    return np.stack([np.outer(of(x, i), of(y, j)) for i, j in orders])
+    return deflections(x, y, [np.outer(power(x, i), power(y, j)) for i, j in orders])
 
 
 def total(terms, curvatures, moduli=SPRUCE, names=CURVATURES):
@@ -35,8 +38,7 @@ def total(terms, curvatures, moduli=SPRUCE, names=CURVATURES):
 
 @pytest.fixture(scope="module")
 def free_terms():
-    x, y = line(FREE, 12), line(FREE, 8)
-    return membrane_terms(x, y, polynomials(x, y), ASPECT, SPRUCE)
+    return membrane_terms(polynomials(*sides()), ASPECT, SPRUCE)
 
 
 @pytest.mark.parametrize("curvatures", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, -1.0, 0.3)])
@@ -64,27 +66,23 @@ def test_energies_are_symmetric_and_never_negative(free_terms):
 
 def test_a_clamped_strip_that_is_shifted_stretches_as_a_whole():
     """Held on all sides, a uniform deflection w = 1 inside cannot be undone: kappa' Q kappa is the upper bound."""
-    x, y = line(FREE, 12), line(FREE, 8)
-    one = polynomials(x, y)[:1]
-    free = total(membrane_terms(x, y, one, ASPECT, SPRUCE), (0.0, 1.0, 0.0))[0, 0]
-    # The same deflection under a membrane whose edges are held: the functions are those of the free lines.
-    held = membrane_terms(replace(x, ends=CLAMPED), replace(y, ends=CLAMPED), one, ASPECT, SPRUCE)
+    free, held = (
+        total(membrane_terms(polynomials(*sides(ends, ends)), ASPECT, SPRUCE), (0.0, 1.0, 0.0))[0, 0]
+        for ends in (FREE, CLAMPED)
+    )
     assert free < 1e-6
-    stretched = total(held, (0.0, 1.0, 0.0))[0, 0]
-    assert stretched == pytest.approx(
-        SPRUCE[2], rel=1e-6
-    )  # a uniform stress is in balance, so that no field relieves it
+    assert held == pytest.approx(SPRUCE[2], rel=1e-6)  # a uniform stress is in balance, so that no field relieves it
 
 
 @pytest.mark.parametrize("curvatures", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
 def test_other_moduli_cost_a_part_of_the_second_order(curvatures):
     """Fields of moduli a fifth off: the energy is above the exact one by at most the square of that, four per cent."""
-    x, y = line(FREE, 12), line(FREE, 8)
-    w = polynomials(x, y)[3:]
+    w = polynomials(*sides())
+    w = replace(w, coefficients=w.coefficients[3:])
     for k in range(4):
         others = tuple(one * (1.2 if i == k else 1.0) for i, one in enumerate(SPRUCE))
-        exact = total(membrane_terms(x, y, w, ASPECT, others), curvatures, others)
-        frozen = total(membrane_terms(x, y, w, ASPECT, SPRUCE), curvatures, others)
+        exact = total(membrane_terms(w, ASPECT, others), curvatures, others)
+        frozen = total(membrane_terms(w, ASPECT, SPRUCE), curvatures, others)
         above = np.linalg.eigvalsh(frozen - exact)
         scale = np.abs(np.linalg.eigvalsh(exact)).max()
         assert above.min() > -1e-9 * scale
@@ -93,13 +91,16 @@ def test_other_moduli_cost_a_part_of_the_second_order(curvatures):
 
 def test_converged_in_its_elements(monkeypatch):
     """Twice as many elements change energies of bending shapes by less than two parts in a thousand."""
-    x, y = line(FREE, 16), line(FREE, 12)
-    w = np.stack([np.outer(x.beams[:, i], y.beams[:, j]) for i, j in ((2, 0), (0, 2), (2, 1), (3, 2), (4, 1))])
-    coarse = membrane_terms(x, y, w, ASPECT, SPRUCE)
+    beams = beam_functions(FREE)
+    shapes = [
+        np.outer(*(beams.coefficients[:, k] for k in orders)) for orders in ((2, 0), (0, 2), (2, 1), (3, 2), (4, 1))
+    ]
+    w = deflections(beams.side, beams.side, shapes)
+    coarse = membrane_terms(w, ASPECT, SPRUCE)
     monkeypatch.setattr(membrane, "_ELEMENTS", 2 * membrane._ELEMENTS)
     membrane._matrices.cache_clear()
     membrane._factors.cache_clear()
-    fine = membrane_terms(x, y, w, ASPECT, SPRUCE)
+    fine = membrane_terms(w, ASPECT, SPRUCE)
     membrane._matrices.cache_clear()
     membrane._factors.cache_clear()
     for curvatures in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)):

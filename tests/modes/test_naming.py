@@ -20,10 +20,11 @@ from generator.plate import solve as generated
 from bayesplate.effects.exciter import Drive, Exciter
 from bayesplate.effects.fluid_loading import FluidLoading
 from bayesplate.labels import HIGHEST_ORDER
+from bayesplate.modes.beams import is_rigid, product_coefficients
 from bayesplate.modes.mesh import mesh
-from bayesplate.modes.naming import CERTAIN, beam_parts, find, fits, name_modes, product_coefficients
-from bayesplate.modes.plate import Weights, is_rigid
+from bayesplate.modes.naming import CERTAIN, beam_parts, find, fits, name_modes
 from bayesplate.modes.solve import solve
+from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
 from bayesplate.quantities import Quantity
 
@@ -189,7 +190,7 @@ def test_name_far_above_the_resolved_modes_is_refused(beams):
 def test_beam_products_bound_the_lowest_mode_from_above(board, order):
     """Their Rayleigh quotients are the start of every estimate: above the lowest mode, and near it."""
     plate, weights = prepared(board)
-    quotients = np.tensordot(weights.stiffness, product_coefficients(plate), axes=1)
+    quotients = np.tensordot(weights.stiffness, product_coefficients(*board.ends), axes=1)
     lowest = find(plate, weights, order[:1])[order[0]].eigenvalue
 
     assert lowest <= quotients[order[0]] < 1.2 * lowest
@@ -221,11 +222,11 @@ def test_a_magnet_that_bounces_takes_no_name_from_the_board():
     at = ((0.5 * DRIVEN.L_x, 0.5 * DRIVEN.L_y),)
     independent = generated(DRIVEN, [GeneratorExciter.at_resonance(38.6, 48e-3, at)], 8)
     table = correlations(independent, ("clamped",) * 4)[:2, 0]
-    plate, (parity,) = modes.plate, set(modes.parities[:1])
-    parts = beam_parts(plate, modes.shapes[:2], parity)[0, 0]
-    squares = np.einsum("nij,nij->n", modes.shapes, plate.line_x.mass @ modes.shapes @ plate.line_y.mass)
-    on_plate = modes.classes[parity].on_plate[modes.ranks]
-    own, whole = fits(parts[:, None], squares, on_plate), fits(parts[:, None], squares, np.ones(2))
+    (parity,) = set(modes.parities[:2])
+    both = modes.by_class[parity].of([0, 1])
+    parts, squares = beam_parts(both.own, both.vectors)
+    column = both.own.plate.elastic_products[parity].index((0, 0))
+    own, whole = (fits(parts[:, [column]], np.diagonal(squares), share) for share in (both.on_plate, np.ones(2)))
 
     # A point force converges slowly on the generator's polynomials.
     assert np.abs(own[:, 0]) == pytest.approx(table, abs=0.01)

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 import ritz
 from bars import meets
+from deflected import power
+from dense_pencils import dense
 from scipy.linalg import eigh
 
-from bayesplate.modes.energies import assembled_plate
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
-from bayesplate.modes.plate import Weights
+from bayesplate.modes.plate import plate_of
 from bayesplate.modes.shear import (
     SHEAR_ELEMENTS_PER_SIDE,
     SHEAR_FLEXIBLE,
@@ -24,6 +25,7 @@ from bayesplate.modes.shear import (
     shear_flexible_plate,
 )
 from bayesplate.modes.solve import solve
+from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
 
 SUPPORTS = {
@@ -68,8 +70,8 @@ def solved(board, shear_moduli, n_modes, shape=None):
 def rounding(board, weights):
     """What rounding may leave of an eigenvalue at worst: the last digit of the stiffest unknown's own."""
     plate = shear_flexible_plate(*board.ends, *mesh(weights, SHEAR_ELEMENTS_PER_SIDE))
-    stiffest = [(one.stiffness(weights).diagonal() / one.mass(weights).diagonal()).max() for one in plate.blocks]
-    return np.finfo(float).eps * max(stiffest)
+    pencils = (own.pencil(plate.elements(weights)) for own in plate.classes)
+    return np.finfo(float).eps * max((k.diagonal() / m.diagonal()).max() for k, m in pencils)
 
 
 def cents(first, second):
@@ -117,40 +119,35 @@ ENERGIES = {
 
 def unsplit(n_x=6, n_y=5):
     """A plate without held edges and without classes: the unknowns of w, g_x and g_y are those of the two lines."""
-    free = ("free", "free")
-    x, y = (line(free, n, is_sheared=True, is_split=False) for n in (n_x, n_y))
-    (block,) = assembled_plate(SHEAR_FLEXIBLE, x, y).blocks
-    return x, y, block
-
-
-def monomial(side, degree):
-    return side.interpolate(lambda t: t**degree, lambda t: degree * t ** max(degree - 1, 0))
+    x, y = (line(("free", "free"), n, is_sheared=True, is_split=False) for n in (n_x, n_y))
+    (own,) = plate_of(SHEAR_FLEXIBLE, x, y).classes
+    return x, y, own
 
 
 def fields(x, y, *powers):
     """Unknowns of w, g_x and g_y, each x^i y^j or, for None, nothing."""
-    nothing = np.zeros(x.n_dof * y.n_dof)
-    return np.concatenate([nothing if p is None else np.kron(monomial(x, p[0]), monomial(y, p[1])) for p in powers])
+    nothing = np.zeros(x.n_functions * y.n_functions)
+    return np.concatenate([nothing if p is None else np.kron(power(x, p[0]), power(y, p[1])) for p in powers])
 
 
 def test_energies_of_polynomials_are_those_found_by_hand():
-    x, y, block = unsplit()
-    vector = fields(x, y, (2, 2), (1, 2), (1, 1))
+    x, y, own = unsplit()
 
-    matrices = [block.matrix(stored) for stored in (*block.terms, *block.masses)]
-    energies = dict(zip(SHEAR_TERMS + SHEAR_MASSES, (vector @ (m @ vector) for m in matrices), strict=True))
+    found = own.energies(fields(x, y, (2, 2), (1, 2), (1, 1))[:, None])
 
+    energies = dict(zip(SHEAR_TERMS + SHEAR_MASSES, np.hstack(found)[0], strict=True))
     assert energies == pytest.approx(ENERGIES, rel=1e-12)
 
 
-@pytest.mark.parametrize("power", [(0, 0), (1, 0), (0, 1)], ids=["shift", "turn along x", "turn along y"])
-def test_rigid_motions_strain_nothing(power):
-    x, y, block = unsplit()
-    vector = fields(x, y, power, None, None)
+@pytest.mark.parametrize("powers", [(0, 0), (1, 0), (0, 1)], ids=["shift", "turn along x", "turn along y"])
+def test_rigid_motions_strain_nothing(powers):
+    """No force on any unknown from any term, beside the largest entry of its matrix."""
+    x, y, own = unsplit()
+    vector = fields(x, y, powers, None, None)
 
-    strained = [np.abs(block.matrix(stored) @ vector).max() / np.abs(stored).max() for stored in block.terms]
+    terms = own.project_stiffness(np.eye(own.n_dof))
 
-    assert max(strained) < 1e-12
+    assert max(np.abs(term @ vector).max() / np.abs(term).max() for term in terms) < 1e-12
 
 
 @pytest.mark.parametrize(("support", "n_rigid"), [("free", 3), ("hinged at one edge", 1), ("mixed", 0)])
@@ -164,15 +161,13 @@ def test_rigid_motions_are_left_out_and_nothing_else(support, n_rigid, slenderne
     shift = 1e-2 * found.eigenvalues[0]
 
     # Inverted, so that the stiff end of the spectrum costs the soft end no digits.
-    inverse = [
-        eigh(b.mass(weights).toarray(), (b.stiffness(weights) + shift * b.mass(weights)).toarray(), eigvals_only=True)
-        for b in plate.blocks
-    ]
-    dense = np.sort(1.0 / np.concatenate(inverse)[np.concatenate(inverse) > 1e-9 / shift] - shift)
+    pencils = [dense(own, weights) for own in plate.classes]
+    inverse = np.concatenate([eigh(m, k + shift * m, eigvals_only=True) for k, m in pencils])
+    expected = np.sort(1.0 / inverse[inverse > 1e-9 / shift] - shift)
 
-    assert sum(block.n_rigid for block in plate.blocks) == n_rigid
-    assert np.abs(dense[:n_rigid]).max(initial=0.0) < 1e-5 * found.eigenvalues[0]
-    np.testing.assert_allclose(found.eigenvalues, dense[n_rigid:][:5], rtol=1e-6)
+    assert sum(own.n_rigid for own in plate.classes) == n_rigid
+    assert np.abs(expected[:n_rigid]).max(initial=0.0) < 1e-5 * found.eigenvalues[0]
+    np.testing.assert_allclose(found.eigenvalues, expected[n_rigid:][:5], rtol=1e-6)
 
 
 @pytest.mark.parametrize("slenderness", [10, 20, 50, 200, 2000])

@@ -10,8 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bayesplate.frequencies.shear_terms import shear_term_weights
-from bayesplate.frequencies.terms import term_weights
+from bayesplate.frequencies.terms import shear_term_weights, term_weights
 from bayesplate.modes.mesh import mesh
 from bayesplate.modes.naming import find
 from bayesplate.modes.shear import SHEAR_ELEMENTS_PER_SIDE, shear_flexible_plate

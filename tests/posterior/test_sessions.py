@@ -22,8 +22,8 @@ from bayesplate.effects import declare
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.modes.naming import Place
-from bayesplate.modes.plate import Parity
 from bayesplate.modes.reduced import ReducedOrderModel
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.sessions import discrepancy_names, sessions, with_discrepancies

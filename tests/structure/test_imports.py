@@ -212,7 +212,7 @@ def test_every_file_of_the_package_is_read():
 
 
 BAD_FILES = [
-    ("plate/bad.py", "from bayesplate.modes.plate import Weights", "plate imports modes"),
+    ("plate/bad.py", "from bayesplate.modes.terms import Weights", "plate imports modes"),
     ("plate/bad.py", "from bayesplate import modes", "plate imports modes"),
     ("plate/bad.py", "import bayesplate.modes.plate", "plate imports modes"),
     ("cards/bad.py", "def f():\n    from bayesplate.plate.board import Board", "cards imports plate"),
@@ -223,7 +223,7 @@ BAD_FILES = [
     ("posterior/bad.py", "from bayesplate.workflow.fit import fit", "posterior imports workflow"),
     ("modes/bad.py", "def f():\n    from bayesplate.workflow.modes import modes", "modes imports workflow"),
     ("modes/__init__.py", "from bayesplate.workflow.modes import modes", "modes imports workflow"),
-    ("cli.py", "from bayesplate.modes.plate import Weights", "cli imports modes"),
+    ("cli.py", "from bayesplate.modes.terms import Weights", "cli imports modes"),
     ("terminal.py", "from bayesplate.cli import main", "terminal imports cli"),
     ("workflow/bad.py", "from bayesplate.terminal import reporting", "workflow imports terminal"),
     ("batch.py", "from bayesplate.cli import main", "batch imports cli"),
@@ -265,7 +265,7 @@ BAD_FILES = [
         "from bayesplate.frequencies.spectrum import cents, spectra",
         "results takes spectra from frequencies",
     ),
-    ("results/bad.py", "from bayesplate.modes.plate import Weights", "results takes Weights from modes"),
+    ("results/bad.py", "from bayesplate.modes.terms import Weights", "results takes Weights from modes"),
     ("results/bad.py", "import bayesplate.modes.solve", "results takes bayesplate.modes.solve from modes"),
     ("results/bad.py", "import numpy as np\nnp.load('x', allow_pickle=True)", "allows pickles"),
     ("cards/bad.py", "x = eval('1')", "calls eval"),

@@ -20,7 +20,7 @@ from bayesplate.diagnosis.shifts.spectrum import Spectrum
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.modes.naming import Place
-from bayesplate.modes.plate import Parity
+from bayesplate.modes.terms import Parity
 
 PLACE = Place(Parity(0, 0), 0, 1.0)
 N_EVERY = 9

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bayesplate.diagnosis.shifts.following import Following
-from bayesplate.modes.plate import Weights
 from bayesplate.modes.reduced import ReducedBlock
+from bayesplate.modes.terms import Weights
 
 N = 8
 RAISED = 1
