@@ -25,6 +25,8 @@ _FEW = 9
 """Training points that are always solved, all of them."""
 _LONG = 5
 """Vectors over modes from which on more snapshots are solved: the more there are, the fewer vectors they need."""
+_BESIDE = 4
+"""Vectors that every basis has beside the modes: far beyond the points that check it these alone would not do."""
 _GROWTH = 1.2
 _KEPT = 1.0, 1.5, 2.0
 """Modes at the centre that a step starts from, over those that are solved."""
@@ -140,7 +142,7 @@ def _reduced(
     for n_kept in sorted({min(round(times * fewest), most) for times in _KEPT}):
         (turn, cents), size = tried(most, n_kept), most
         if cents <= tolerance:
-            sizes = list(_sizes(n_kept, most))
+            sizes = list(_sizes(min(n_kept + _BESIDE, most), most))
             size = sizes[bisect_left(sizes, True, key=lambda one: tried(one, n_kept)[1] <= tolerance)]
             turn, cents = tried(size, n_kept)
             break
