@@ -88,10 +88,10 @@ def test_where_a_rough_law_misled_the_models_are_made_anew(problem, most_places,
             return found
         (model,) = found
         reduced = model.exact.reduced
-        factors = np.ones(len(reduced.blocks[0].stiffness))
+        factors = np.ones(len(reduced.classes[0].stiffness))
         factors[0] = 1.02
-        blocks = tuple(replace(one, stiffness=factors[:, None, None] * one.stiffness) for one in reduced.blocks)
-        return (replace(model, exact=ExactLaw(replace(reduced, blocks=blocks))),)
+        classes = tuple(replace(one, stiffness=factors[:, None, None] * one.stiffness) for one in reduced.classes)
+        return (replace(model, exact=ExactLaw(replace(reduced, classes=classes))),)
 
     monkeypatch.setattr(laplace, "exact_models", misjudged)
     monkeypatch.setattr(laplace, "_MOST_PLACES", most_places)
