@@ -67,10 +67,12 @@ def reduced_order_model(
     numpy.linalg.LinAlgError
         If none of the held-out points is a plate.
     """
-    n_modes = {p: 1 + SPARE + max(one.rank for one in places if one.parity == p) for p in {o.parity for o in places}}
+    n_modes = {
+        p: 1 + max(one.rank for one in places if one.parity == p) for p in dict.fromkeys(o.parity for o in places)
+    }
     training = [centre, *around]
     n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
-    (middle,) = _solved(plate, [centre], n_modes)
+    (middle,) = _solved(plate, [centre], {parity: n + SPARE for parity, n in n_modes.items()})
     snapshots, checks = (_solved(plate, points, n_modes) for points in (training[1:n_first], held_out))
     if not checks:
         raise np.linalg.LinAlgError("none of the points that were held out is a plate")
@@ -120,7 +122,7 @@ def _reduced(
     vectors = _basis(
         own, centre, first, np.hstack([of_class[parity].vectors for _, of_class in snapshots] or [first.vectors])
     )
-    exact = np.stack([of_class[parity].eigenvalues[:-SPARE] for _, of_class in checks])
+    exact = np.stack([of_class[parity].eigenvalues for _, of_class in checks])
     points = [centre, *(weights for weights, _ in checks)]
     pencils = [own.pencil(own.plate.elements(one)) for one in points]
     stiffness, mass = own.on_span(pencils, Weights(*(np.stack(part) for part in zip(*points, strict=True))), vectors)
