@@ -24,15 +24,22 @@ def pencil_modes(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
 
 
 def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
-    """Stiffness in coordinates in which the mass is one; which masses are positive; inverses of their factors."""
+    """Stiffness in coordinates in which the mass is one; which masses are positive; inverses of their factors.
+
+    What is not finite never reaches a solver of eigenvalues, which would end everything at such a draw.
+    """
+    one = np.eye(mass.shape[-1])
+    is_mass = np.isfinite(mass).all(axis=(1, 2))
     try:
-        factors = np.linalg.cholesky(mass)
-        is_mass = np.ones(len(mass), dtype=bool)
+        factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, one))
     except np.linalg.LinAlgError:
-        is_mass = np.linalg.eigvalsh(mass)[:, 0] > 0.0
-        factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, np.eye(mass.shape[-1])))
+        is_mass &= np.linalg.eigvalsh(np.where(is_mass[:, None, None], mass, one))[:, 0] > 0.0
+        factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, one))
     inverse = np.linalg.inv(factors)
-    return inverse @ stiffness @ np.swapaxes(inverse, -1, -2), is_mass, inverse
+    with np.errstate(over="ignore", invalid="ignore"):
+        whitened = inverse @ stiffness @ np.swapaxes(inverse, -1, -2)
+    is_mass &= np.isfinite(whitened).all(axis=(1, 2))
+    return np.where(is_mass[:, None, None], whitened, one), is_mass, inverse
 
 
 class Step(NamedTuple):

@@ -120,7 +120,7 @@ def known_fits(
         models = [one.models for one in solved if _is_as_known(board, one)]
         return known_fit(problem, in_order(combination), solved=models[0] if models else ())
 
-    stands = known_fit(problem, solved=problem.posterior.models)
+    (stands,) = told([known_fit(problem, solved=problem.posterior.models)])
     single = told((fit(one) for one in near), 1)
     shifts = {
         next(iter(one ^ own)): found.log_rigidities - stands.log_rigidities

@@ -24,6 +24,9 @@ from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
+_ACCEPTED_CENTS = 0.5
+"""Error of a law where it is checked: what `check` solves in full is shown to a tenth of a cent beside it."""
+
 
 @dataclass(frozen=True, eq=False)
 class FormLaw:
@@ -173,7 +176,7 @@ def form_law(baseline: Baseline, form: Form, half_width: float | None = None) ->
         covariance[:n, :n] = np.linalg.inv(weighted.T @ weighted)
     else:
         covariance[:n, :n] = np.diag([half_width**2 / 9.0] * (n - 1) + [0.0])
-    return FormLaw(form, exact_models(board, models, centre, covariance))
+    return FormLaw(form, exact_models(board, models, centre, covariance, accepted_cents=_ACCEPTED_CENTS))
 
 
 def merged(parity: Parity, symmetry: tuple[bool, bool]) -> Parity:
