@@ -24,7 +24,7 @@ def pencil_modes(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
 
 
 def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_], Floats]:
-    """Stiffness in coordinates in which the mass is one; which draws have such a mass, and numbers; how to get there."""
+    """Stiffness in coordinates in which the mass is one; which masses are positive; inverses of their factors.
 
     What is not finite never reaches a solver of eigenvalues, which would end everything at such a draw.
     """
