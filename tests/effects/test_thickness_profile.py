@@ -22,7 +22,7 @@ from bayesplate.frequencies.system import System
 from bayesplate.plate.board import density
 from bayesplate.plate.random_field import Surface
 from bayesplate.posterior.inference import pose
-from bayesplate.posterior.laplace import worst_cents
+from bayesplate.posterior.laplace import law_tolerance, worst_cents
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
@@ -194,7 +194,8 @@ def test_a_thickness_read_alike_everywhere_is_uniform():
 @pytest.mark.parametrize("card", ["finnish-spruce-cantilever", "spruce-free-2R"])
 def test_reduced_order_model_is_exact(card):
     """The second card has readings at places, the first tapers."""
-    assert worst_cents(posed(card, ["thickness_profile"]).posterior.models) < 0.5
+    problem = posed(card, ["thickness_profile"])
+    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
 
 
 @pytest.fixture(scope="module")
@@ -216,4 +217,5 @@ def test_the_exact_law_knows_the_mean_thickness_that_the_field_goes_with(with_it
     theta[parameters.first_input + parameters.inputs.index("thickness")] = z
     values = {name: np.ravel(value)[0] for name, value in parameters.values(theta[None, :]).items()}
     apart = model.log_frequencies(values, "exact")[0] - full_log_frequencies(model, values)
-    assert cents(apart) == pytest.approx(0.0, abs=0.5)
+    # Almost three standard deviations out, where none of the draws lies that check the law: a factor.
+    assert np.abs(cents(apart)).max() <= 3.0 * law_tolerance(problem.board)

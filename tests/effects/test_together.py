@@ -124,7 +124,7 @@ def hertz(
     at = {name: np.asarray(value) for name, value in values.items()}
     system = system_of(declared, declared.setups[0])
     plate_at = system.plate(at)
-    squares = solve(plate_at, system.weights(at).at(0), N_MODES + plate_at.blocks[0].n_beside).eigenvalues
+    squares = solve(plate_at, system.weights(at).at(0), N_MODES + plate_at.n_beside).eigenvalues
     return np.sqrt(squares) / (2.0 * np.pi)
 
 
@@ -176,10 +176,10 @@ def test_three_masses_in_any_order_give_the_same_frequencies():
 
 @pytest.mark.parametrize("edges", [pytest.param("CFFF", marks=pytest.mark.slow), "CCCC"])
 @pytest.mark.usefixtures("coarse")
-def test_what_changes_no_matrix_shares_those_of_the_plate_without_it(edges):
-    """The air, a frame that moves, a cup and another Poisson ratio: projected terms and weights, nothing to assemble.
+def test_what_adds_terms_alone_leaves_the_plate_itself(edges):
+    """Air, a frame that moves, springs, tension and a cup are terms beside the plate's own: its sides stay, and these.
 
-    The warp has no twist here: with one beside a curvature the halves of the board differ, so its matrices do.
+    The warp has no twist here: with one beside a curvature the halves of the board differ, and so do its sides.
     """
     untwisted = replace(BOARDS[edges], warp={"twist": Quantity.exact(0.0)})
     plates = {}
@@ -187,14 +187,22 @@ def test_what_changes_no_matrix_shares_those_of_the_plate_without_it(edges):
         declared = declare(replace(untwisted, effects=tuple(filter(None, (name,)))))
         values = declared.nominal() | {"D_x": np.asarray(30.0), "D_y": np.asarray(2.0), "D_s": np.asarray(5.0)}
         plates[name] = system_of(declared, declared.setups[0]).plate(values)
-    bare = plates.pop("").blocks[0]
-    shared = {name for name, plate in plates.items() if plate.blocks[0].terms is bare.terms}
+    bare = plates.pop("")
+    shared = {
+        name for name, plate in plates.items() if (plate.x, plate.y) == (bare.x, bare.y) and has_terms_of(plate, bare)
+    }
     projected = KINDS["projected mass"] | KINDS["projected stiffness"]
+    terms_alone = projected | {"membrane_tension", "support_stiffness", "poisson_ratio"}
 
-    assert shared == ({*projected, "poisson_ratio"} & set(TOGETHER[edges]))
-    assert {name for name in shared if plates[name].blocks[0].projected} == shared & KINDS["projected mass"]
-    assert {name for name in shared if plates[name].blocks[0].projected_terms} == KINDS["projected stiffness"]
-    assert bare.projected == bare.projected_terms == ()
+    assert shared == terms_alone & set(TOGETHER[edges])
+    assert {name for name, plate in plates.items() if plate.is_projected} == projected & set(TOGETHER[edges])
+    assert not bare.is_projected
+
+
+def has_terms_of(plate, bare) -> bool:
+    """Whether the first terms of a plate are those of another one."""
+    both = [*zip(plate.stiffness, bare.stiffness, strict=False), *zip(plate.masses, bare.masses, strict=False)]
+    return all(a[0] == b[0] and np.array_equal(a[1], b[1]) for a, b in both)
 
 
 def left_at_nothing(plate: Plate, effects: Sequence[str]) -> float:

@@ -29,7 +29,10 @@ def exact(stiffness, mass):
 
 
 def a_class(stiffness, mass, n_kept):
-    """A class of which each draw is one term of stiffness and one of mass, and the weights that tell them apart."""
+    """A class of which each draw is one term of stiffness and one of mass, and the weights that tell them apart.
+
+    Terms are views, so that a draw may be spoilt.
+    """
     n, r, _ = stiffness.shape
     nothing = np.zeros((r, 0))
     own = ReducedClass(
@@ -71,6 +74,22 @@ def test_no_positive_mass_is_no_number_and_the_other_draws_stay(function):
 
     assert np.isnan(found[[1, 3]]).all()
     np.testing.assert_allclose(found[[0, 2, 4]], expected[[0, 2, 4]], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("nothing", [np.nan, np.inf])
+@pytest.mark.parametrize("n_kept", [N_KEPT, R])
+@pytest.mark.parametrize("spoilt", [0, 1], ids=["stiffness", "mass"])
+def test_weights_that_are_no_numbers_give_none_and_the_other_draws_stay(nothing, n_kept, spoilt):
+    """A sampler or a search may ask for any plate; LAPACK refuses all matrices for one of them."""
+    own, weights = a_class(*coupled(0.1, 2), n_kept)
+    expected = own.eigenvalues(weights)
+    weights[spoilt][1, 1] = nothing
+
+    with np.errstate(invalid="ignore"):
+        found = own.eigenvalues(weights)
+
+    assert np.isnan(found[1]).all()
+    np.testing.assert_allclose(found[[0, 2, 3, 4]], expected[[0, 2, 3, 4]], rtol=1e-9)
 
 
 def test_where_no_vector_is_left_out_the_eigenvalues_are_all_of_the_pencil():

@@ -22,7 +22,6 @@ from bayesplate.effects import declare
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode
 from bayesplate.modes.naming import Place
-from bayesplate.modes.reduced import ReducedOrderModel
 from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.parameter import BOARD
@@ -177,25 +176,20 @@ def test_a_scale_that_has_followed_the_residual_does_not_excuse_it(judge, rough,
     assert (found.p_value(0) < 0.01) == (judge == "prior"), found.p_value(0)
 
 
-@pytest.mark.parametrize(("effects", "n_solved"), [((), 1), (("clamp_rotation",), 3)])
-def test_sessions_that_are_one_plate_are_solved_once_and_others_each(effects, n_solved, monkeypatch):
+@pytest.mark.parametrize("effects", [(), ("clamp_rotation",)])
+def test_sessions_that_are_one_plate_have_one_law_and_others_each(effects):
     """A clamp that gives way differently on each day makes them different plates."""
     days = board(3, None)
     sizes = {q.name: q.prior for q in days.parameters if q.owner == BOARD}
     made = declare(made_board("made", sizes, [replace(one, group=None) for one in days.setups], effects=effects))
     problem = pose(made, load_prior("weakly-informative"), law="exact")
     theta = np.random.default_rng(4).multivariate_normal(problem.centre, problem.covariance, 20)
-    values = problem.parameters.values(theta)
-    expected = [
-        one.every_log_frequency(values, "exact") + one.discrepancies(values) for one in problem.posterior.models
-    ]
-    solved, solve = [], ReducedOrderModel.eigenvalues
-    monkeypatch.setattr(ReducedOrderModel, "eigenvalues", lambda self, w: solved.append(1) or solve(self, w))
-    found = problem.posterior.every_log_frequency(theta)
-    assert len(solved) == n_solved
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert (np.abs(found[0] - found[1]).max() > 1e-4) == bool(effects)  # what the days share is all without a clamp
+
+    first, *others = problem.posterior.every_log_frequency(theta)
+
+    for other in others:
+        # What the days share is all without a clamp, and their laws are made alike.
+        assert np.abs(first - other).max() > 1e-4 if effects else np.abs(first - other).max() < 1e-9
 
 
 def test_what_an_effect_shifts_is_told_beside_the_discrepancies():

@@ -5,26 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from bayesplate.diagnosis.shifts.following import Following
-from bayesplate.modes.reduced import ReducedBlock
-from bayesplate.modes.terms import Weights
+from bayesplate.modes.reduced import ReducedClass
+from bayesplate.modes.terms import Parity, Weights
 
 N = 8
 RAISED = 1
 """The mode whose stiffness the second term raises."""
 
 
-def block() -> ReducedBlock:
+def modes() -> ReducedClass:
     """Modes at 1, 4, 9, ... s^-2, and a term that raises one of them alone."""
     raising = np.zeros((N, N))
     raising[RAISED, RAISED] = 1.0
     stiffness = np.stack([np.diag(np.arange(1.0, N + 1.0) ** 2), raising])
-    return ReducedBlock((0, 0), stiffness, np.empty((0, N, N)), np.empty((N, 0)), ())
+    mass, nothing = np.eye(N)[None], np.zeros((1, N, N))
+    return ReducedClass(Parity(0, 0), stiffness, mass, N, (), np.empty((N, 0)), np.eye(N), nothing)
 
 
 def followed(*groups: tuple[int, ...], wanted: tuple[int, ...] = (0, 1, 2)) -> np.ndarray:
     """At the plate itself, where the raised mode has crossed the next one, and at no plate."""
     without = Weights(np.array([[1.0, 0.0]]), np.array([[1.0]]))
-    following = Following.of(block(), without, np.array(wanted), tuple(np.array(group) for group in groups))
+    following = Following.of(modes(), without, np.array(wanted), tuple(np.array(group) for group in groups))
     return following.eigenvalues(Weights(np.array([[1.0, 0.0], [1.0, 7.0], [-9.0, 0.0]]), np.ones((3, 1))))
 
 
