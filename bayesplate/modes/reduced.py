@@ -22,7 +22,7 @@ from bayesplate.modes.terms import Parity, Weights
 Floats = NDArray[np.float64]
 
 SPARE = 4
-"""Modes at the centre above the highest wanted one of a class that are kept too."""
+"""Modes above the highest wanted one of a class that the basis is made for too."""
 _BATCH = 512
 """Draws whose small matrices are held at once."""
 

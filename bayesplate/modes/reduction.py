@@ -74,8 +74,9 @@ def reduced_order_model(
     }
     training = [centre, *around]
     n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
-    (middle,) = _solved(plate, [centre], {parity: n + SPARE for parity, n in n_modes.items()})
-    snapshots, checks = (_solved(plate, points, n_modes) for points in (training[1:n_first], held_out))
+    n_trained = {parity: n + SPARE for parity, n in n_modes.items()}
+    (middle,), snapshots = (_solved(plate, points, n_trained) for points in ([centre], training[1:n_first]))
+    checks = _solved(plate, held_out, n_modes)
     if not checks:
         raise np.linalg.LinAlgError("none of the points that were held out is a plate")
     n_joined, later = 0, training[n_first:]
@@ -83,9 +84,9 @@ def reduced_order_model(
         joined = [*snapshots, *checks[:n_joined]]
         found = [_reduced(plate.symmetry_class(p), middle, joined, checks[n_joined:], tolerance, p) for p in n_modes]
         worst = max(cents for _, cents in found)
-        is_long = any(own.stiffness.shape[-1] > _LONG * own.n_kept for own, _ in found)
+        is_long = any(own.stiffness.shape[-1] > _LONG * n_trained[own.parity] for own, _ in found)
         if (worst > tolerance or is_long) and later:
-            snapshots, later = [*snapshots, *_solved(plate, later, n_modes)], []
+            snapshots, later = [*snapshots, *_solved(plate, later, n_trained)], []
         elif worst > tolerance and not n_joined and len(checks) > 1:
             n_joined = len(checks) // 2
         else:
