@@ -29,7 +29,7 @@ def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_
     What is not finite never reaches a solver of eigenvalues, which would end everything at such a draw.
     """
     one = np.eye(mass.shape[-1])
-    is_mass = np.isfinite(mass).all(axis=(1, 2))
+    is_mass = np.asarray(np.isfinite(mass).all(axis=(1, 2)))
     try:
         factors = np.linalg.cholesky(np.where(is_mass[:, None, None], mass, one))
     except np.linalg.LinAlgError:
@@ -39,7 +39,7 @@ def _whitened(stiffness: Floats, mass: Floats) -> tuple[Floats, NDArray[np.bool_
     with np.errstate(over="ignore", invalid="ignore"):
         whitened = inverse @ stiffness @ np.swapaxes(inverse, -1, -2)
     is_mass &= np.isfinite(whitened).all(axis=(1, 2))
-    return np.where(is_mass[:, None, None], whitened, one), is_mass, inverse
+    return np.where(is_mass[:, None, None], whitened, one), np.asarray(is_mass), np.asarray(inverse, dtype=np.float64)
 
 
 class Step(NamedTuple):
