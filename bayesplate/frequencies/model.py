@@ -17,7 +17,8 @@ from bayesplate.modes.beams import Beams
 from bayesplate.modes.naming import CERTAIN, Place, find, name_modes
 from bayesplate.modes.plate import Plate
 from bayesplate.modes.reduction import reduced_order_model
-from bayesplate.modes.solve import Modes, solve_up_to
+from bayesplate.modes.solve import Modes, solve_classes, solve_up_to
+from bayesplate.modes.terms import Parity
 from bayesplate.plate.board import Values
 from bayesplate.plate.sessions import discrepancy_names
 from bayesplate.plate.setup import Setup
@@ -199,7 +200,9 @@ class SetupModel:
         return np.column_stack(columns)
 
 
-def setup_model(system: System, values: Values, plate: Plate | None = None) -> SetupModel:
+def setup_model(
+    system: System, values: Values, plate: Plate | None = None, as_before: SetupModel | None = None
+) -> SetupModel:
     """Solve a setup at given constants and sizes, and find its labelled modes.
 
     Parameters
@@ -209,6 +212,8 @@ def setup_model(system: System, values: Values, plate: Plate | None = None) -> S
         D_x, D_y, D_s (N m), the board's inputs and the effects' parameters.
     plate : Plate, optional
         Matrices to use again; by default those of the production mesh for these values.
+    as_before : SetupModel, optional
+        A model whose labels keep their ranks; by default they are found by the shapes.
 
     Returns
     -------
@@ -220,12 +225,17 @@ def setup_model(system: System, values: Values, plate: Plate | None = None) -> S
     KeyError
         If a label is no mode of the plate.
     """
-    first, *further = system.stations
-    model = _setup_model(first, values, first.plate(values) if plate is None else plate)
-    return replace(model, roved=tuple(_setup_model(one, values, one.plate(values)) for one in further))
+    before = [None] * len(system.stations) if as_before is None else [one.places for one in as_before.stations]
+    first, *further = (
+        _setup_model(one, values, one.plate(values) if plate is None or k else plate, places)
+        for k, (one, places) in enumerate(zip(system.stations, before, strict=True))
+    )
+    return replace(first, roved=tuple(further))
 
 
-def _setup_model(system: System, values: Values, plate: Plate) -> SetupModel:
+def _setup_model(system: System, values: Values, plate: Plate, places: tuple[Place, ...] | None) -> SetupModel:
+    if places is not None:
+        return _ranked_model(system, values, plate, places)
     beams = [reading.beams for reading in system.setup.readings]
     weights = system.weights(values).at(0)
     found = find(plate, weights, beams)
@@ -238,6 +248,20 @@ def _setup_model(system: System, values: Values, plate: Plate) -> SetupModel:
             np.reshape([found[b].mass for b in beams], (len(beams), weights.mass.size)),
         ),
     )
+
+
+def _ranked_model(system: System, values: Values, plate: Plate, places: tuple[Place, ...]) -> SetupModel:
+    """The model in which each label means the mode at its place."""
+    weights = system.weights(values).at(0)
+    n_modes: dict[Parity, int] = {}
+    for place in places:
+        n_modes[place.parity] = max(n_modes.get(place.parity, 0), place.rank + 1)
+    energies = {parity: one.coefficients() for parity, one in solve_classes(plate, weights, n_modes).items()}
+    stiffness, mass = (
+        np.reshape([energies[one.parity][side][one.rank] for one in places], (len(places), weights[side].size))
+        for side in (0, 1)
+    )
+    return SetupModel(system, plate, places, LinearLaw(stiffness, mass))
 
 
 def with_others(model: SetupModel, values: Values) -> SetupModel:

@@ -102,9 +102,11 @@ def laplace_approximation(
         return LaplaceApproximation(centre, covariance, exact_models(board, models, centre, covariance))
     models = exact_models(board, models, centre, covariance, is_rough=True, accepted_cents=_ROUGH_CENTS)
     found, scales = _fitted(board, models, centre, noise, scales, is_once=robust)
-    for _ in range(_MOST_PLACES):
+    for k in range(_MOST_PLACES):
         centre, values = found, parameters.values_at(found)
-        models = _with_peaks([setup_model(model.system, values, model.plate) for model in models], values)
+        # Named once, where the rough law led: at a veering names would lead back and forth between two places.
+        made = [setup_model(model.system, values, model.plate, model if k else None) for model in models]
+        models = _with_peaks(made, values)
         covariance = _covariance(board, models, "linear", scales, centre, spread)
         models = exact_models(board, models, centre, covariance)
         noise = np.exp(parameters.log_noise(centre[None])[0])
