@@ -39,6 +39,18 @@ class Elements:
     over_plate: Mapping[tuple[str, str], Floats]
     elsewhere: tuple[tuple[AlongEdges | AtPlaces, float], ...]
 
+    @property
+    def is_definite(self) -> bool:
+        """Whether no product at a place weighs less than nothing: a place that is read between others makes such."""
+        return all(weight >= 0.0 for term, weight in self.elsewhere if isinstance(term, AtPlaces) and term.is_on_plate)
+
+    def without_less_than_nothing(self) -> Elements:
+        """The same without products at places that weigh less than nothing."""
+        kept = (
+            one for one in self.elsewhere if not (isinstance(one[0], AtPlaces) and one[0].is_on_plate and one[1] < 0.0)
+        )
+        return Elements(self.over_plate, tuple(kept))
+
 
 @dataclass(frozen=True, eq=False)
 class Forms:

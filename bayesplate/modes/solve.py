@@ -23,6 +23,7 @@ _SPARE_FOR_PROJECTED = 8
 _FIRST_OF_CLASS = 8
 _MORE, _FEWEST_MORE = 1.15, 4
 """What is added to an estimate of how many modes there are."""
+_MASSLESS = 1e-12
 _TOLERANCE = 1e-8
 """Of the solver's own values; those of the modes are Ritz values on its vectors, which err by the square of it."""
 _SHIFT = -1e-2
@@ -92,13 +93,17 @@ def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int])
 
 
 def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: Weights, n_modes: int) -> ClassModes:
-    from scipy.linalg import eigh
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
-    stiffness, mass = own.pencil(elements)
+    # The solver needs a mass above zero; what is left out for that joins on the span of its vectors.
+    is_whole = elements[1].is_definite
+    whole = own.pencil(elements)
+    stiffness, mass = whole if is_whole else own.pencil((elements[0], elements[1].without_less_than_nothing()))
     shift = _shift_below(own, weights)
     options = {"SymmetricMode": True}
-    n_wanted = min(own.n_rigid + n_modes + _SPARE_FOR_PROJECTED * own.plate.is_projected, own.n_dof - 1)
+    n_wanted = min(
+        own.n_rigid + n_modes + _SPARE_FOR_PROJECTED * (own.plate.is_projected or not is_whole), own.n_dof - 1
+    )
     try:
         factors = splu(stiffness - shift * mass, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
         _, vectors = eigsh(
@@ -114,12 +119,27 @@ def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: We
     except (ArpackError, RuntimeError) as failure:
         raise np.linalg.LinAlgError(str(failure)) from failure
     # The solver's own values carry the rounding of a nearly singular factorisation where the plate can move as a whole.
-    small = own.on_span([(stiffness, mass)], Weights(*(part[None] for part in weights)), vectors)
-    values, combinations = eigh(small[0][0], small[1][0])
+    small = own.on_span([whole], Weights(*(part[None] for part in weights)), vectors)
+    values, combinations = _ritz(small[0][0], small[1][0])
     vectors = vectors @ combinations
     rigid, elastic = vectors[:, : own.n_rigid], vectors[:, own.n_rigid : own.n_rigid + n_modes]
     on_plate = 1.0 - np.diagonal(np.tensordot(weights.mass, own.project_beside(elastic), axes=1))
     return ClassModes(own, values[own.n_rigid : own.n_rigid + n_modes], elastic, rigid, on_plate)
+
+
+def _ritz(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues on some vectors, increasing, and what combines these to modes of unit mass.
+
+    Where a mass at a place that is a parameter is read between places, the finest shapes may have a mass below zero:
+    they are no modes, and left out.
+    """
+    shares, directions = np.linalg.eigh(mass)
+    kept = shares > _MASSLESS * shares[-1]
+    if not kept.any():
+        raise np.linalg.LinAlgError("no shape has a mass above zero")
+    one = directions[:, kept] / np.sqrt(shares[kept])
+    values, turned = np.linalg.eigh(one.T @ stiffness @ one)
+    return np.asarray(values), np.asarray(one @ turned)
 
 
 def _shift_below(own: SymmetryClass, weights: Weights) -> float:
@@ -216,15 +236,16 @@ def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
     -------
     Modes
     """
-    n_each = -(-n_modes // len(plate.classes)) + 2
-    solved = solve_classes(plate, weights, dict.fromkeys((one.parity for one in plate.classes), n_each))
+    asked = dict.fromkeys((one.parity for one in plate.classes), -(-n_modes // len(plate.classes)) + 2)
+    solved = solve_classes(plate, weights, asked)
     while True:
         values = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
         limit = values[min(n_modes, values.size) - 1]
-        short = {p: 2 * c.eigenvalues.size for p, c in solved.items() if c.eigenvalues[-1] < limit}
+        short = [p for p, c in solved.items() if c.eigenvalues[-1] < limit]
         if not short and values.size >= n_modes:
             return collect(plate, solved, n_modes)
-        solved |= solve_classes(plate, weights, short or {p: 2 * c.eigenvalues.size for p, c in solved.items()})
+        asked |= {p: 2 * asked[p] for p in short or asked}
+        solved |= solve_classes(plate, weights, {p: asked[p] for p in short or asked})
 
 
 def solve_up_to(plate: Plate, weights: Weights, highest: float, n_least: int = 1) -> Modes:

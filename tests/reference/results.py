@@ -11,8 +11,9 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import bayesplate
 from reference import boards, plates
+
+import bayesplate
 
 Json = dict[str, Any]
 
