@@ -41,11 +41,11 @@ class Elements:
 
     @property
     def is_definite(self) -> bool:
-        """Whether no product at a place weighs less than nothing: a place that is read between others makes such."""
+        """Whether no product at a place has a negative weight; a place that is interpolated gives some."""
         return all(weight >= 0.0 for term, weight in self.elsewhere if isinstance(term, AtPlaces) and term.is_on_plate)
 
-    def without_less_than_nothing(self) -> Elements:
-        """The same without products at places that weigh less than nothing."""
+    def without_negative(self) -> Elements:
+        """The same without products at places of negative weight."""
         kept = (
             one for one in self.elsewhere if not (isinstance(one[0], AtPlaces) and one[0].is_on_plate and one[1] < 0.0)
         )

@@ -95,10 +95,10 @@ def solve_classes(plate: Plate, weights: Weights, n_modes: Mapping[Parity, int])
 def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: Weights, n_modes: int) -> ClassModes:
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
-    # The solver needs a mass above zero; what is left out for that joins on the span of its vectors.
+    # The solver needs a positive mass; what is left out for that joins on the span of its vectors.
     is_whole = elements[1].is_definite
     whole = own.pencil(elements)
-    stiffness, mass = whole if is_whole else own.pencil((elements[0], elements[1].without_less_than_nothing()))
+    stiffness, mass = whole if is_whole else own.pencil((elements[0], elements[1].without_negative()))
     shift = _shift_below(own, weights)
     options = {"SymmetricMode": True}
     n_wanted = min(
@@ -130,7 +130,7 @@ def _solved(own: SymmetryClass, elements: tuple[Elements, Elements], weights: We
 def _ritz(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues on some vectors, increasing, and what combines these to modes of unit mass.
 
-    Where a mass at a place that is a parameter is read between places, the finest shapes may have a mass below zero:
+    Where the mass at a place is interpolated between others, the finest shapes may have a negative mass:
     they are no modes, and left out.
     """
     shares, directions = np.linalg.eigh(mass)
