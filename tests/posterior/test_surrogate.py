@@ -138,7 +138,7 @@ def test_it_is_taught_on_while_it_would_hold_a_walker_somewhere(problem, monkeyp
 
     def too_low(self, posterior):
         right = density(self, posterior)
-        return lambda y: right(y) - 2.5 * (np.floor(1e7 * y[:, 0]) % 10 == 0)
+        return lambda y: right(y) - 2.5 * (np.floor(1e6 * y[:, 0]) % 10 == 0)
 
     monkeypatch.setattr(TailCoordinates, "density", too_low)
     assert found(problem) is not None

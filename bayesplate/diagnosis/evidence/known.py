@@ -46,6 +46,8 @@ Models = Sequence[SetupModel]
 Rows = NDArray[np.intp]
 
 _MOST_LABELLINGS, _MOST_PLACES = 4, 4
+_ACCEPTED_CENTS = 0.1
+"""Error of a law of a known effect: it is shown beside what `check` solves in full."""
 _NEAR = 0.1
 """Change of ln D up to which a law holds that was made before it: half a side of the smallest box it is trained in."""
 
@@ -310,4 +312,4 @@ def _solved(problem: PosedProblem, board: Board, at: Floats) -> Models:
     n, covariance = parameters.n_constants, np.eye(parameters.n_dim)
     covariance[:n, :n] = np.linalg.inv(weighted.T @ weighted)
     centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
-    return exact_models(fixed, models, centre, covariance, is_rough=True)
+    return exact_models(fixed, models, centre, covariance, is_rough=True, accepted_cents=_ACCEPTED_CENTS)
