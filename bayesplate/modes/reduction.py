@@ -22,10 +22,10 @@ from bayesplate.modes.terms import Parity, Weights
 Floats = NDArray[np.float64]
 
 _FEW = 9
-"""Training points that are always solved, all of them."""
+"""Training points, the centre among them, that are always solved, all of them."""
 _LONG = 5
 """Vectors over modes from which on more snapshots are solved: the more there are, the fewer vectors they need."""
-_BESIDE = 4
+_BESIDE = 8
 """Vectors that every basis has beside the modes: far beyond the points that check it these alone would not do."""
 _GROWTH = 1.2
 _KEPT = 1.0, 1.5, 2.0
@@ -67,22 +67,23 @@ def reduced_order_model(
     Raises
     ------
     numpy.linalg.LinAlgError
-        If none of the held-out points is a plate.
+        If the centre or none of the held-out points is a plate.
     """
-    n_modes = {
-        p: 1 + max(one.rank for one in places if one.parity == p) for p in dict.fromkeys(o.parity for o in places)
-    }
-    training = [centre, *around]
-    n_first = len(training) if len(training) <= _FEW else 1 + len(training) // 2
+    n_modes: dict[Parity, int] = {}
+    for place in places:
+        n_modes[place.parity] = max(n_modes.get(place.parity, 0), place.rank + 1)
     n_trained = {parity: n + SPARE for parity, n in n_modes.items()}
-    (middle,), snapshots = (_solved(plate, points, n_trained) for points in ([centre], training[1:n_first]))
+    training = list(around)
+    n_first = len(training) if len(training) < _FEW else (1 + len(training)) // 2
+    middle = centre, solve_classes(plate, centre, n_trained)
+    snapshots = _solved(plate, training[:n_first], n_trained)
     checks = _solved(plate, held_out, n_modes)
     if not checks:
         raise np.linalg.LinAlgError("none of the points that were held out is a plate")
     n_joined, later = 0, training[n_first:]
     while True:
         joined = [*snapshots, *checks[:n_joined]]
-        found = [_reduced(plate.symmetry_class(p), middle, joined, checks[n_joined:], tolerance, p) for p in n_modes]
+        found = [_reduced(plate.symmetry_class(p), middle, joined, checks[n_joined:], tolerance) for p in n_modes]
         worst = max(cents for _, cents in found)
         is_long = any(own.stiffness.shape[-1] > _LONG * n_trained[own.parity] for own, _ in found)
         if (worst > tolerance or is_long) and later:
@@ -118,9 +119,9 @@ def _reduced(
     snapshots: Sequence[_Solved],
     checks: Sequence[_Solved],
     tolerance: float,
-    parity: Parity,
 ) -> tuple[ReducedClass, float]:
     """The smallest basis of a class that is within the tolerance at the points that check it, and its error there."""
+    parity = own.parity
     centre, first = middle[0], middle[1][parity]
     vectors = _basis(
         own, centre, first, np.hstack([of_class[parity].vectors for _, of_class in snapshots] or [first.vectors])

@@ -236,7 +236,7 @@ def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
     -------
     Modes
     """
-    asked = dict.fromkeys((one.parity for one in plate.classes), -(-n_modes // len(plate.classes)) + 2)
+    asked = dict.fromkeys(plate.parities, -(-n_modes // len(plate.parities)) + 2)
     solved = solve_classes(plate, weights, asked)
     while True:
         values = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
@@ -250,11 +250,14 @@ def solve(plate: Plate, weights: Weights, n_modes: int) -> Modes:
 
 def solve_up_to(plate: Plate, weights: Weights, highest: float, n_least: int = 1) -> Modes:
     """All elastic modes of a plate up to an eigenvalue (s^-2), and at least so many; see `solve`."""
-    solved = solve_classes(plate, weights, dict.fromkeys((one.parity for one in plate.classes), _FIRST_OF_CLASS))
+    asked = dict.fromkeys(plate.parities, _FIRST_OF_CLASS)
+    solved = solve_classes(plate, weights, asked)
     eigenvalues = np.sort(np.concatenate([c.eigenvalues for c in solved.values()]))
     highest = max(highest, eigenvalues[min(n_least, eigenvalues.size) - 1])
-    while short := {p: _enough(c.eigenvalues, highest) for p, c in solved.items() if c.eigenvalues[-1] < highest}:
-        solved |= solve_classes(plate, weights, short)
+    while short := [p for p, c in solved.items() if c.eigenvalues[-1] < highest]:
+        # A class that came back with fewer than were asked for is asked for more all the same.
+        asked |= {p: max(_enough(solved[p].eigenvalues, highest), asked[p] + _FEWEST_MORE) for p in short}
+        solved |= solve_classes(plate, weights, {p: asked[p] for p in short})
     n_modes = sum(int(np.sum(c.eigenvalues <= highest)) for c in solved.values())
     return collect(plate, solved, n_modes)
 

@@ -12,7 +12,7 @@ from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 
 from bayesplate.effects.density_gradient import DensityGradient
 from bayesplate.effects.part import Part
-from bayesplate.posterior.laplace import law_tolerance, worst_cents
+from bayesplate.posterior.laplace import worst_cents
 
 GRADIENT = "density_gradient.gradient"
 
@@ -46,5 +46,4 @@ def test_a_rectangle_alike_at_both_ends_does_not_know_the_sign():
 
 
 def test_reduced_order_model_is_exact():
-    problem = posed("finnish-spruce-cantilever", ["density_gradient"])
-    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
+    assert worst_cents(posed("finnish-spruce-cantilever", ["density_gradient"]).posterior.models) < 0.5

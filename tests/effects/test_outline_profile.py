@@ -29,7 +29,7 @@ from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.random_field import Surface
 from bayesplate.plate.setup import AttachedItem
-from bayesplate.posterior.laplace import law_tolerance, worst_cents
+from bayesplate.posterior.laplace import worst_cents
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
@@ -252,8 +252,7 @@ THREE = pytest.param(["outline_profile", "thickness_profile", "grain_angle"], ma
 
 @pytest.mark.parametrize("effects", [["outline_profile"], THREE])
 def test_reduced_order_model_is_exact(effects):
-    problem = posed("spruce-free-1R", effects)
-    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
+    assert worst_cents(posed("spruce-free-1R", effects).posterior.models) < 0.5
 
 
 @pytest.mark.parametrize("steps", [-2.0, 2.0])

@@ -14,7 +14,7 @@ from bayesplate.effects.grain_angle import GrainAngle
 from bayesplate.effects.part import Part
 from bayesplate.effects.stiffness_gradient import StiffnessGradient
 from bayesplate.effects.thickness_profile import ThicknessProfile
-from bayesplate.posterior.laplace import law_tolerance, worst_cents
+from bayesplate.posterior.laplace import worst_cents
 
 GRADIENT = "stiffness_gradient.gradient"
 BEAM_ROOTS = (1.8751041, 4.6940911)
@@ -104,5 +104,4 @@ def test_a_rectangle_alike_at_both_ends_does_not_know_the_sign():
 
 
 def test_reduced_order_model_is_exact():
-    problem = posed("finnish-spruce-cantilever", ["stiffness_gradient"])
-    assert worst_cents(problem.posterior.models) <= law_tolerance(problem.board)
+    assert worst_cents(posed("finnish-spruce-cantilever", ["stiffness_gradient"]).posterior.models) < 0.5

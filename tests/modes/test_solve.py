@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import ritz
 from bars import meets
-from dense_pencils import spectrum, whole
-from scipy.linalg import eigh
+from dense_pencils import dense, spectrum, whole
+from scipy.linalg import eig, eigh
 
 from bayesplate.modes.line import line
 from bayesplate.modes.mesh import ELEMENTS_PER_SIDE, mesh
 from bayesplate.modes.plate import plate_of
 from bayesplate.modes.shear import SHEAR_FLEXIBLE, shear_flexible_plate
 from bayesplate.modes.solve import solve, solve_classes, solve_up_to
-from bayesplate.modes.terms import OnDeflections, Weights
-from bayesplate.modes.thin import thin_plate
+from bayesplate.modes.terms import Amount, AtPlaces, OnDeflections, Weights
+from bayesplate.modes.thin import THIN, thin_plate
 
 SQUARE = ritz.Plate.isotropic(0.3, ritz.ALL_FREE)
 SUPPORTS = {
@@ -325,3 +325,23 @@ def test_free_plate_answers_for_its_rounding_alone(projected):
     np.testing.assert_allclose(solve(moved, weights, 6).eigenvalues, modes.eigenvalues, rtol=1e-7)
     quotients = (modes.coefficients @ weights.stiffness) / (modes.mass_coefficients @ weights.mass)
     np.testing.assert_allclose(quotients, modes.eigenvalues, rtol=1e-7)
+
+
+def test_a_mass_below_zero_at_a_place_takes_no_mode_with_it():
+    """As where a place is read between others: 2 and -1 % of the board. Against all eigenvalues of the whole pencil.
+
+    What is left out for the solver comes back on the span of its vectors: an error below half of that mass.
+    """
+    x, y = (line(("clamped", "clamped"), n, is_split=False) for n in (10, 8))
+    here, there = (Amount(((1.0, at, 0.37),)) for at in (0.31, 0.44))
+    places = [AtPlaces(((1.0, one, one),)) for one in (here, there)]
+    plate = plate_of(THIN, x, y).with_terms([], places)
+    weights = Weights(np.array([3e4, 1e4, 3e3, 1e4]), np.array([1.0, 0.02, -0.01]))
+    (own,) = plate.classes
+    stiffness, mass = dense(own, weights)
+    every = eig(stiffness, mass, right=False)
+    elastic = np.sort(every[np.isfinite(every) & (every.real > 0.0)].real)
+    assert np.linalg.eigvalsh(mass)[0] < 0.0
+
+    found = solve_classes(plate, weights, {own.parity: 12})[own.parity].eigenvalues
+    assert found == pytest.approx(elastic[:12], rel=0.005)

@@ -136,13 +136,18 @@ def test_it_is_taught_on_while_it_would_hold_a_walker_somewhere(problem, monkeyp
     assert found(problem) is not None
     assert len(n_fitted) == 3
 
-    def too_low(self, posterior):
-        right = density(self, posterior)
-        return lambda y: right(y) - 2.5 * (np.floor(1e6 * y[:, 0]) % 10 == 0)
+    n_taught = []
+    for digit in (1e5, 1e6, 3e6, 1e7, 1e8):  # which places these are is chance, and so is whether a walker meets one
 
-    monkeypatch.setattr(TailCoordinates, "density", too_low)
-    assert found(problem) is not None
-    assert len(n_fitted) == 3 + 8
+        def too_low(self, posterior, digit=digit):
+            right = density(self, posterior)
+            return lambda y: right(y) - 2.5 * (np.floor(digit * y[:, 0]) % 10 == 0)
+
+        monkeypatch.setattr(TailCoordinates, "density", too_low)
+        n_fitted.clear()
+        assert found(problem) is not None
+        n_taught.append(len(n_fitted))
+    assert n_taught.count(8) >= 4
 
 
 def test_within_reach_its_weight_is_one_and_beyond_it_ends(inference):
