@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from bayesplate.posterior.convergence import autocorrelation_time
+from bayesplate.posterior.convergence import autocorrelation_times
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.normal_case import NormalCase
 
@@ -156,7 +156,7 @@ def _standardised(series: Floats) -> Floats:
     """Means of series over their Monte Carlo errors: (n_ensembles, n_steps, n_walkers, n) to (n,) array."""
     n_ensembles, n_steps, n_walkers, _ = series.shape
     with np.errstate(invalid="ignore"):  # a series that is zero almost everywhere
-        variances = [each.var(axis=(0, 1)) * autocorrelation_time(each) / (n_steps * n_walkers) for each in series]
+        variances = [each.var(axis=(0, 1)) * autocorrelation_times(each) / (n_steps * n_walkers) for each in series]
     error = np.sqrt(np.sum(variances, axis=0)) / n_ensembles
     mean = series.mean(axis=(0, 1, 2))
     found = np.divide(mean, error, out=np.full_like(mean, _MOST_ERRORS), where=error > 0)

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bayesplate.files import writing
 from bayesplate.results.board_rows import BoardRow
-from bayesplate.results.folder import writing
 
 
 class Journal:

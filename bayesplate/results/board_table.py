@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bayesplate.errors import Fault, InputError
+from bayesplate.files import writing
 from bayesplate.results.board_rows import NUMBERS, WORDS, BoardRow
 from bayesplate.results.exports import csv_text
-from bayesplate.results.folder import writing
 
 TableKind = Literal["csv", "parquet"]
 _AT_ONCE = 1000

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from bayesplate.errors import CheckpointError, Fault, InputError, RunInterrupted, UnwritableError
-from bayesplate.posterior.checkpoint import Checkpoint, take
+from bayesplate.files import make_folder
+from bayesplate.posterior.checkpoint import CHAINS, Checkpoint, take
 from bayesplate.results.contract import as_json
 
 SUMMARY = "summary.json"
@@ -56,7 +57,7 @@ class OutputFolder:
 
     @property
     def checkpoint(self) -> Path:
-        """Folder of the unfinished run's chunks."""
+        """Folder of the unfinished run's chains."""
         return self.path / CHECKPOINT
 
     @property
@@ -150,19 +151,15 @@ class OutputFolder:
 
     @property
     def has_checkpoint(self) -> bool:
-        """Whether there are chunks of a run, sound or set aside as damaged."""
-        return any(self.checkpoint.rglob("chunk-*.npz*"))
+        """Whether there are chains of a run to go on from."""
+        return any(self.checkpoint.rglob(CHAINS))
 
     def close(self) -> None:
-        """Remove the checkpoint of a run that is done, and what it replaces; chunks found damaged stay to be looked at.
-
-        Chunks first, the last of them before the first: a run that is killed at it can be resumed.
-        """
+        """Remove the checkpoint of a run that is done, and what it replaces."""
         shutil.rmtree(self.earlier, ignore_errors=True)
-        for manifest in sorted(self.checkpoint.rglob("manifest.json"), reverse=True):
-            Checkpoint(manifest.parent, "").discard()
-        if not any(self.checkpoint.rglob("*.damaged")):
-            shutil.rmtree(self.checkpoint, ignore_errors=True)
+        for chains in sorted(self.checkpoint.rglob(CHAINS), reverse=True):
+            Checkpoint(chains.parent, "").discard()
+        shutil.rmtree(self.checkpoint, ignore_errors=True)
 
     def release(self) -> None:
         """Let others use the folder, and leave none behind that holds nothing."""
@@ -266,63 +263,6 @@ def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Pat
     return paths
 
 
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Writing a file or a folder's files: what the system refuses is told with the place.
-
-    Raises
-    ------
-    UnwritableError
-        In place of an OSError.
-    """
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        wanted, remedy = "a file that can be written", "make room, or take another place with --out"
-        raise UnwritableError(Fault(str(path), wanted, reason, remedy)) from error
-
-
-def make_folder(folder: Path) -> None:
-    """Make the folder of an output.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        fault = Fault(f"--out {folder}", "a folder that can be written", error.strerror or str(error))
-        raise UnwritableError(fault) from error
-
-
 def json_text(content: Any) -> str:
     """JSON of a result, as it is written and printed; refuses numbers that JSON does not have."""
     return json.dumps(as_json(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file completely or not at all; raises as `write_bytes`."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all.
-
-    Raises
-    ------
-    UnwritableError
-        If the disk is full or the place is not ours.
-    """
-    partial = path.with_name(path.name + ".partial")
-    with writing(path):
-        try:
-            with partial.open("wb") as stream:
-                stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)

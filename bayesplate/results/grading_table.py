@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from bayesplate.files import writing
 from bayesplate.plate.material import MODULI
 from bayesplate.results.board_table import write_rows
 from bayesplate.results.exports import Cell
-from bayesplate.results.folder import writing
 from bayesplate.results.grading import Grading
 from bayesplate.results.log_figures import FIGURES, LogFigure, limit_told
 from bayesplate.results.tables import Table

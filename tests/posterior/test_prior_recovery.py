@@ -12,10 +12,10 @@ from scipy import stats
 
 from bayesplate.cards import load_prior
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.draws import thin_walker_major
 from bayesplate.posterior.inference import infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
+from bayesplate.posterior.thinning import thin_walker_major
 from bayesplate.quantities import Quantity
 
 
