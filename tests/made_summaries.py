@@ -17,7 +17,6 @@ from bayesplate.results.summary import (
     Percentile,
     PercentileValue,
     PointEstimate,
-    Request,
     SamplerHealth,
     Summary,
 )
@@ -110,5 +109,4 @@ SUMMARY = Summary(
     certificate=Certificate(True, True, "", 20, "median of ln D_y", 1.5, 3000.0),
     identifiability=("the modes tell E_y least well",),
     warnings=("made by hand",),
-    request=Request('format = 1\nname = "made"\n', None, {"prior weakly-informative": "0" * 64}),
 )

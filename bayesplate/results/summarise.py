@@ -34,7 +34,6 @@ from bayesplate.results.summary import (
     Percentile,
     PercentileValue,
     PointEstimate,
-    Request,
     SamplerHealth,
     Summary,
     Unconverged,
@@ -55,7 +54,6 @@ def unconverged_summary(
     seed: int,
     versions: Mapping[str, str],
     sha256: str,
-    request: Request,
 ) -> Unconverged:
     """The summary of a run that failed the gate."""
     return Unconverged(
@@ -68,7 +66,6 @@ def unconverged_summary(
         converged=False,
         sampler=sampler_health(chains, convergence),
         warnings=(*convergence.reasons, f"suggested steps: {convergence.suggested_steps}", *problem.doubts),
-        request=request,
     )
 
 
@@ -80,7 +77,6 @@ def summarise(
     versions: Mapping[str, str],
     card_sha256: str,
     certificate: Certificate | None = None,
-    request: Request | None = None,
 ) -> Summary:
     """The summary of a converged fit.
 
@@ -95,8 +91,6 @@ def summarise(
     card_sha256 : str
     certificate : Certificate, optional
         Of the draws of the fit; those that other boards teach have none.
-    request : Request, optional
-        Of the fit; a board of a campaign has none.
 
     Returns
     -------
@@ -153,7 +147,6 @@ def summarise(
         ),
         warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
         doubts=doubts_of(problem, assessment, certificate),
-        request=request,
         carrying_modes=assessment.carrying,
     )
 

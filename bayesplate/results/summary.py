@@ -127,32 +127,12 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Request:
-    """What a fit was asked for, so that its summary alone can repeat it.
-
-    Attributes
-    ----------
-    card : str
-        Text of the board card, with what a --setup put in its place.
-    law : "linear", "exact" or None
-        As asked; None leaves the choice to the fit.
-    named : dict of str
-        SHA-256 of the numbers of the prior and the tables that the card names, by kind and name.
-    """
-
-    card: str
-    law: str | None
-    named: Mapping[str, str]
-
-
-@dataclass(frozen=True)
 class Unconverged(Run):
     """The summary of a run that failed the convergence gate: its diagnostics, and no constants."""
 
     converged: bool
     sampler: SamplerHealth
     warnings: tuple[str, ...]
-    request: Request | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -195,8 +175,6 @@ class Summary(Run):
     identifiability, warnings : tuple of str
     doubts : tuple of str
         Those of the warnings that are reasons not to trust the constants.
-    request : Request or None
-        None for a board of a campaign, whose draws follow from all boards.
     carrying_modes : tuple of CarryingMode
         Modes that alone carry a constant or a size: they count in no error of modes left out.
     """
@@ -223,7 +201,6 @@ class Summary(Run):
     identifiability: tuple[str, ...]
     warnings: tuple[str, ...]
     doubts: tuple[str, ...] = ()
-    request: Request | None = None
     carrying_modes: tuple[CarryingMode, ...] = ()
 
     @property

@@ -254,7 +254,6 @@ SECURITY = (
         tests=(
             "workflow/test_batch.py::test_a_link_out",
             "workflow/test_batch.py::test_bad_rows_are_rows",
-            "workflow/test_repeat.py::test_a_summary_cannot_name",
         ),
     ),
     Row(
