@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from html import escape
 
 from bayesplate.estimates.leave_one_out import CarryingMode
-from bayesplate.posterior.certificate import Certificate
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import ModeRow
@@ -170,8 +169,6 @@ class Summary(Run):
         Of the setups that have such peaks: all modes that they may be.
     error : ErrorFigures
     sampler : SamplerHealth
-    certificate : Certificate
-        Whether the draws agree with an answer in closed form on the same readings.
     identifiability, warnings : tuple of str
     doubts : tuple of str
         Those of the warnings that are reasons not to trust the constants.
@@ -197,7 +194,6 @@ class Summary(Run):
     spectra: tuple[Spectrum, ...]
     error: ErrorFigures
     sampler: SamplerHealth
-    certificate: Certificate
     identifiability: tuple[str, ...]
     warnings: tuple[str, ...]
     doubts: tuple[str, ...] = ()

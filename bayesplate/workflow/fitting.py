@@ -12,7 +12,6 @@ from pathlib import Path
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
-from bayesplate.posterior.certificate import certify
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws, with_likely_labels
@@ -165,9 +164,7 @@ def fitted(
         inference, draws = sampled(problem.posed.under("exact"))
         errors = linearisation(inference, draws)
     assessment = assess(inference, draws, errors)
-    certificate = certify(inference, seed)
-    sha256 = problem.prepared.card.sha256
-    summary = summarise(inference, draws, assessment, seed, versions(), sha256, certificate)
+    summary = summarise(inference, draws, assessment, seed, versions(), problem.prepared.card.sha256)
     return Fitted(problem, inference, draws, summary)
 
 

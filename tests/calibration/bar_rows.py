@@ -150,10 +150,14 @@ CONVERGENCE = (
         ),
     ),
     Row(
-        "certificate",
-        "Draws against the closed form on the user's own data, where there is one",
+        "normal case",
+        "Draws of fits, weighted to the normal case of their boards, against its closed form",
         "within 4 Monte Carlo errors",
-        tests=("posterior/test_certificate.py::test_right_draws", "posterior/test_certificate.py::test_control"),
+        tests=(
+            "posterior/test_closed_form.py::test_right_draws",
+            "posterior/test_closed_form.py::test_control",
+            "posterior/test_sessions.py::test_draws_of_constants",
+        ),
     ),
 )
 

@@ -22,8 +22,8 @@ MEANS = [*ELASTIC, *RIGIDITY, "effective_draws"]
 CONTRACT = {
     "": ["format", "name", "seed", "versions", "card_sha256", "model", "converged", "elastic", "rigidity", "effects",
          "noise", "inputs", "derived", "joint", "least_squares", "weighted_least_squares", "percentile", "linear_means",
-         "exact_means", "modes", "peaks", "spectra", "error", "sampler", "certificate", "identifiability",
-         "warnings", "doubts", "carrying_modes"],
+         "exact_means", "modes", "peaks", "spectra", "error", "sampler", "identifiability", "warnings",
+         "doubts", "carrying_modes"],
     "model": ["theory", "law", "effects", "robust", "prior", "isotropic"],
     "elastic": ELASTIC, "elastic/E_x": SPREAD,
     "rigidity": RIGIDITY, "rigidity/D_x": SPREAD,
@@ -42,7 +42,6 @@ CONTRACT = {
     "error": ["in_sample_rms_cents", "leave_one_out_rms_cents", "linearisation_rms_cents", "exact_law_worst_cents",
               "surrogate_rms_cents", "surrogate_worst_cents"],
     "sampler": ["ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance"],
-    "certificate": ["applies", "passed", "reason", "comparisons", "worst", "worst_errors", "effective_draws"],
 }  # fmt: skip
 """Keys of summary.json in their order, by the place where they stand."""
 
