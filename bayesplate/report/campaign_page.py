@@ -16,11 +16,12 @@ from bayesplate.campaigns.tables import (
     shared_table,
     taught_table,
 )
+from bayesplate.files import make_folder, write_text
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.report.campaign_figures import every_picture, pooled_rms_cents
 from bayesplate.report.page import policy, shown_picture, template
 from bayesplate.report.saving import drawing, save_pictures
-from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
+from bayesplate.results.folder import FIGURES, PAGE
 from bayesplate.results.words import interval, plus_minus
 
 

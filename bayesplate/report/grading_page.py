@@ -5,11 +5,12 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+from bayesplate.files import make_folder, write_text
 from bayesplate.report.grading_figures import every_grading_picture
 from bayesplate.report.page import policy, shown_picture, template
 from bayesplate.report.saving import drawing, save_pictures
 from bayesplate.results.batch_summary import BatchSummary
-from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
+from bayesplate.results.folder import FIGURES, PAGE
 from bayesplate.results.grading import TARGET, Grading
 from bayesplate.results.grading_table import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
 from bayesplate.results.log_figures import limit_told

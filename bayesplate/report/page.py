@@ -21,6 +21,7 @@ from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
 from bayesplate.estimates.sheet import points
+from bayesplate.files import make_folder, write_text
 from bayesplate.plate.board import vibrating_lengths
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
@@ -42,7 +43,7 @@ from bayesplate.report.style import Picture, visible
 from bayesplate.report.symbols import in_page
 from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, quoted_constants, short_sentences
 from bayesplate.results.exports import write_exports
-from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
+from bayesplate.results.folder import FIGURES, PAGE
 from bayesplate.results.references import references
 from bayesplate.results.summary import Summary
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+from bayesplate.files import write_text
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.picking import Picked
 from bayesplate.recordings.responses import averaged
@@ -12,7 +13,7 @@ from bayesplate.recordings.taking import Heard
 from bayesplate.report.page import policy, shown_picture, template
 from bayesplate.report.recordings_figures import every_picture
 from bayesplate.report.saving import drawing, save_pictures
-from bayesplate.results.folder import FIGURES, write_text
+from bayesplate.results.folder import FIGURES
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING, chances, percent, two_digits
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.results.folder import write_bytes
+from bayesplate.files import write_bytes
 
 Arrays = Mapping[str, NDArray[Any]]
 

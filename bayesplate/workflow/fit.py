@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.files import write_text, writing
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import FitPlots
 from bayesplate.results.archive import to_arviz
-from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, json_text, run_of_its_own, write_text, writing
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, run_of_its_own
 from bayesplate.results.store import attributes_of, posterior_archive, write_posterior
 from bayesplate.results.summarise import unconverged_summary
 from bayesplate.results.summary import Summary

@@ -34,7 +34,7 @@ from bayesplate.results.command_tables import (
     sheet_tables,
 )
 from bayesplate.results.comparison import Comparison
-from bayesplate.results.folder import json_text
+from bayesplate.results.contract import json_text
 from bayesplate.results.grading import Grading
 from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables
 from bayesplate.results.notebook import html

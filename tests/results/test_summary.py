@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from made_summaries import SUMMARY
 
-from bayesplate.results.contract import Elastic, Spread, finite, rms
-from bayesplate.results.folder import json_text
+from bayesplate.results.contract import Elastic, Spread, finite, json_text, rms
 from bayesplate.results.summary import ModelHeader, SamplerHealth, Unconverged
 
 SPREAD = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
