@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from bayesplate.errors import CheckpointError, Fault, InputError, RunInterrupted, UnwritableError
-from bayesplate.files import make_folder
+from bayesplate.files import make_folder, names_in
 from bayesplate.posterior.checkpoint import CHAINS, Checkpoint, take
-from bayesplate.results.contract import as_json
 
 SUMMARY = "summary.json"
 ARCHIVE = "posterior.nc"
@@ -75,7 +73,7 @@ class OutputFolder:
         CheckpointError
             If there is nothing to resume.
         """
-        has_content = any(map(_is_of_a_run, _names_in(self.path)))
+        has_content = any(map(_is_of_a_run, names_in(self.path)))
         self._is_new = not force and not resume
         if resume:
             if not os.path.isdir(self.checkpoint):
@@ -216,24 +214,6 @@ def _where_the_earlier_are(held: list[OutputFolder]) -> str:
     return "".join(f"\nwhat was there before is in {folder.earlier}" for folder in held if folder.earlier.is_dir())
 
 
-def _names_in(folder: Path) -> list[str]:
-    """What a folder of outputs holds; nothing where there is none yet.
-
-    Raises
-    ------
-    InputError
-        If it is no folder, or the system does not let us look.
-    """
-    try:
-        return os.listdir(folder)
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        is_file = os.path.exists(folder) and not os.path.isdir(folder)
-        got = "a file" if is_file else error.strerror or str(error)
-        raise InputError(Fault(f"--out {folder}", "a folder", got, "choose another place")) from None
-
-
 def _remove_empty(folder: Path, above: Path) -> None:
     """Remove a folder that is empty now, and those that it leaves empty; all of them lie below another one."""
     with suppress(OSError):  # not there, or not empty
@@ -244,25 +224,3 @@ def _remove_empty(folder: Path, above: Path) -> None:
 
 def _is_of_a_run(name: str) -> bool:
     return name not in BESIDE and not (name.startswith(_DRAWN_BESIDE) and name.endswith((".png", ".svg")))
-
-
-def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:
-    """The files that a command will write beside others, checked before any work and without writing.
-
-    Raises
-    ------
-    InputError
-        If one is there and `force` is not given, or if the folder is no folder.
-    """
-    found = set(_names_in(folder))
-    paths = tuple(folder / name for name in names)
-    there = [path.name for path in paths if path.name in found]
-    if there and not force:
-        wanted, remedy = "new files", "--force replaces them, --out takes another place"
-        raise InputError(Fault(f"--out {folder}", wanted, f"{', '.join(there)} already there", remedy))
-    return paths
-
-
-def json_text(content: Any) -> str:
-    """JSON of a result, as it is written and printed; refuses numbers that JSON does not have."""
-    return json.dumps(as_json(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"

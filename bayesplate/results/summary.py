@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from html import escape
 
 from bayesplate.estimates.leave_one_out import CarryingMode
-from bayesplate.posterior.certificate import Certificate
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import ModeRow
@@ -127,32 +126,12 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Request:
-    """What a fit was asked for, so that its summary alone can repeat it.
-
-    Attributes
-    ----------
-    card : str
-        Text of the board card, with what a --setup put in its place.
-    law : "linear", "exact" or None
-        As asked; None leaves the choice to the fit.
-    named : dict of str
-        SHA-256 of the numbers of the prior and the tables that the card names, by kind and name.
-    """
-
-    card: str
-    law: str | None
-    named: Mapping[str, str]
-
-
-@dataclass(frozen=True)
 class Unconverged(Run):
     """The summary of a run that failed the convergence gate: its diagnostics, and no constants."""
 
     converged: bool
     sampler: SamplerHealth
     warnings: tuple[str, ...]
-    request: Request | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -190,13 +169,9 @@ class Summary(Run):
         Of the setups that have such peaks: all modes that they may be.
     error : ErrorFigures
     sampler : SamplerHealth
-    certificate : Certificate
-        Whether the draws agree with an answer in closed form on the same readings.
     identifiability, warnings : tuple of str
     doubts : tuple of str
         Those of the warnings that are reasons not to trust the constants.
-    request : Request or None
-        None for a board of a campaign, whose draws follow from all boards.
     carrying_modes : tuple of CarryingMode
         Modes that alone carry a constant or a size: they count in no error of modes left out.
     """
@@ -219,11 +194,9 @@ class Summary(Run):
     spectra: tuple[Spectrum, ...]
     error: ErrorFigures
     sampler: SamplerHealth
-    certificate: Certificate
     identifiability: tuple[str, ...]
     warnings: tuple[str, ...]
     doubts: tuple[str, ...] = ()
-    request: Request | None = None
     carrying_modes: tuple[CarryingMode, ...] = ()
 
     @property

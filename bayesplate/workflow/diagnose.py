@@ -39,7 +39,8 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots
 from bayesplate.results.archive import to_arviz
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, run_of_its_own
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
 from bayesplate.results.store import attributes_of, posterior_archive
 from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments

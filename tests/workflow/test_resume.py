@@ -14,8 +14,7 @@ import runs
 from runs import files_in, read_json
 
 BOARD = "fiemme-spruce-clamped"
-UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings",
-               "request"}  # fmt: skip
+UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings"}
 RESULTS = {"summary.json", "posterior.nc"}
 """What a fit without a report leaves; that a report is the same too is shown where threads are counted."""
 
