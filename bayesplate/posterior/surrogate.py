@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.board import Values
+from bayesplate.posterior.ensembles import pilot
 from bayesplate.posterior.mixture import Mixture
-from bayesplate.posterior.sampling import pilot
 from bayesplate.posterior.starts import cholesky_factor
 from bayesplate.posterior.statistics import effective_share, may_stand, smoothed
 from bayesplate.posterior.tails import TailCoordinates

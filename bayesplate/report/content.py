@@ -252,6 +252,7 @@ def sampler_rows(summary: Summary) -> list[tuple[str, str]]:
         (f"smallest effective size (at least {limits.ess_min:g})", number(one.ess_min, 0)),
         ("largest autocorrelation time, steps", number(one.tau_max, 1)),
         ("accepted proposals", percent(one.acceptance)),
+        *([] if one.pareto_k is None else [("Pareto k-hat of the weights to the exact law", number(one.pareto_k, 2))]),
     ]
 
 

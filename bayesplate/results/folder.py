@@ -12,7 +12,8 @@ from typing import IO
 
 from bayesplate.errors import CheckpointError, Fault, InputError, RunInterrupted, UnwritableError
 from bayesplate.files import make_folder, names_in
-from bayesplate.posterior.checkpoint import CHAINS, Checkpoint, take
+from bayesplate.locks import take
+from bayesplate.posterior.checkpoint import CHAINS, Checkpoint
 
 SUMMARY = "summary.json"
 ARCHIVE = "posterior.nc"

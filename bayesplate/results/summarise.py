@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +130,11 @@ def summarise(
             surrogate_rms_cents=rms(assessment.surrogate_errors),
             surrogate_worst_cents=finite(_worst(assessment.surrogate_errors)),
         ),
-        sampler=sampler_health(inference.chains, inference.convergence),
+        sampler=replace(
+            sampler_health(inference.chains, inference.convergence),
+            drawn_from="law" if inference.surrogate is None else "polynomial",
+            pareto_k=inference.pareto_k,
+        ),
         identifiability=(
             *remarks(board, problem.identifiability, carrying_sentence(assessment.carrying)),
             *prior_remarks(draws, problem.prior),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
+from typing import Literal
 
 from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
@@ -35,7 +36,15 @@ class ModelHeader:
 
 @dataclass(frozen=True)
 class SamplerHealth:
-    """How the sampler fared; None where a number does not exist yet."""
+    """How the sampler fared; None where a number does not exist, or not yet.
+
+    Attributes
+    ----------
+    drawn_from : "law" or "polynomial"
+        The frequency law of the model, or a polynomial of it whose draws are weighted to the law.
+    pareto_k : float or None
+        k-hat of these weights.
+    """
 
     ensembles: int
     walkers: int
@@ -44,6 +53,8 @@ class SamplerHealth:
     rhat_max: float | None
     ess_min: float | None
     acceptance: float | None
+    drawn_from: Literal["law", "polynomial"] = "law"
+    pareto_k: float | None = None
 
 
 @dataclass(frozen=True)

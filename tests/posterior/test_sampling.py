@@ -9,7 +9,7 @@ import pytest
 from statistics_checks import differences_from_normal
 
 from bayesplate.errors import BayesplateError, InputError, NotConvergedError, NotIdentifiableError
-from bayesplate.posterior import sampling
+from bayesplate.posterior import ensembles
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings, is_hopeless, sample
 
@@ -74,7 +74,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
 
 
 def test_two_ensembles_differ_even_from_one_start(monkeypatch):
-    walked = sampling.pilot
+    walked = ensembles.pilot
 
     def same_ends(*arguments):
         found = walked(*arguments)
@@ -82,7 +82,7 @@ def test_two_ensembles_differ_even_from_one_start(monkeypatch):
             found, points=np.repeat(found.points[::4], 4, axis=0), log_prob=np.repeat(found.log_prob[::4], 4)
         )
 
-    monkeypatch.setattr(sampling, "pilot", same_ends)
+    monkeypatch.setattr(ensembles, "pilot", same_ends)
     chains, _ = sample(log_normal_density, MEAN, COVARIANCE, short())
     for other in (1, 2, 3):
         assert not np.array_equal(chains.draws[0, -1], chains.draws[other, -1])

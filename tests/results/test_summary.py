@@ -40,7 +40,8 @@ CONTRACT = {
     "spectra/0/modes/0": ["setup", "label", "predicted_hz", "seen_probability"],
     "error": ["in_sample_rms_cents", "leave_one_out_rms_cents", "linearisation_rms_cents", "exact_law_worst_cents",
               "surrogate_rms_cents", "surrogate_worst_cents"],
-    "sampler": ["ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance"],
+    "sampler": ["ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance", "drawn_from",
+                "pareto_k"],
 }  # fmt: skip
 """Keys of summary.json in their order, by the place where they stand."""
 

@@ -18,7 +18,7 @@ from runs import files_in
 
 from bayesplate.cli import main
 from bayesplate.errors import InputError
-from bayesplate.posterior.checkpoint import take
+from bayesplate.locks import take
 from bayesplate.results.folder import OutputFolder
 from bayesplate.workflow import campaign_fit
 from bayesplate.workflow.stages import Stages

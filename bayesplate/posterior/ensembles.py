@@ -1,0 +1,174 @@
+"""Walkers: ensembles of emcee with random streams of their own, and the pilot that shows them where to begin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.posterior.checkpoint import Snapshot
+from bayesplate.posterior.mixture import Mixture
+from bayesplate.posterior.moves import moves
+from bayesplate.posterior.starts import LogDensity, finite_starts
+from bayesplate.streams import stream
+
+Floats = NDArray[np.float64]
+
+_PILOT_STEPS = 40
+FEWEST_ROUNDS, _MOST_ROUNDS = 3, 24
+"""Of a pilot. One that teaches proposals makes as many as there are parameters: the longer, the better they are."""
+_RISE = 1.0
+"""Of the mean log density from one round of the pilot to the next, from which on it is still on its way."""
+
+
+class Ensembles:
+    """Walkers of several emcee samplers, each with its own random state.
+
+    Parameters
+    ----------
+    log_density : callable, (n_points, n_dim) -> (n_points,) array
+    centre : (n_dim,) array
+    factor : (n_dim, n_dim) array
+        Lower Cholesky factor of the estimate's covariance.
+    seed : int
+    shape : (int, int)
+        Ensembles, and walkers of each.
+    """
+
+    def __init__(
+        self, log_density: LogDensity, centre: Floats, factor: Floats, seed: int, shape: tuple[int, int]
+    ) -> None:
+        self.log_density, self.centre, self.factor, self.seed, self.shape = log_density, centre, factor, seed, shape
+        self.n_steps = 0
+        self._backends: list[Any] = []
+
+    def begin(self, saved: Snapshot | None) -> None:
+        """Take up a run that was saved, or begin a new one."""
+        from emcee.backends import Backend
+
+        if saved is None:
+            self._backends = [Backend() for _ in range(self.shape[0])]
+        else:
+            self._backends, self.n_steps = list(saved.backends), saved.n_steps
+
+    @cached_property
+    def pilot(self) -> Pilot:
+        """The walk from the starts to where the ensembles begin."""
+        rng, n_walkers = stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
+        return pilot(self.log_density, self.centre, self.factor, rng, n_walkers, len(self.centre))
+
+    @property
+    def chain(self) -> Floats:
+        """(n_ensembles, n_steps, n_walkers, n_dim) array."""
+        return np.stack([one.chain for one in self._backends])
+
+    @property
+    def log_prob(self) -> Floats:
+        """(n_ensembles, n_steps, n_walkers) array."""
+        return np.stack([one.log_prob for one in self._backends])
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """Where the run stands."""
+        states = [one.random_state for one in self._backends]
+        return Snapshot(tuple(self._backends), states, self.n_steps)
+
+    @cached_property
+    def mixture(self) -> Mixture:
+        """What independent proposals are drawn from."""
+        return Mixture.fitted(self.pilot.draws)
+
+    def advance(self, n_steps: int) -> None:
+        """Let all ensembles make so many steps."""
+        for i, backend in enumerate(self._backends):
+            start = None if self.n_steps else self._start(i)
+            walk(self.log_density, self.mixture, backend, start, n_steps)
+        self.n_steps += n_steps
+
+    def _start(self, ensemble: int) -> Any:
+        """Where an ensemble begins: with every so many of the pilot's walkers, and random numbers of its own."""
+        import emcee
+
+        own = slice(ensemble, None, self.shape[0])
+        state = random_state(stream(self.seed, "ensemble", ensemble))
+        return emcee.State(self.pilot.points[own], log_prob=self.pilot.log_prob[own], random_state=state)
+
+
+def walk(log_density: LogDensity, mixture: Mixture, backend: Any, start: Any, n_steps: int) -> None:
+    """Let the walkers of one ensemble make so many steps; from where its backend ends unless a start is given.
+
+    emcee's own check that walkers span the space depends on the units of the parameters, and is left out.
+    """
+    import emcee
+
+    n_walkers, n_dim = backend.shape if start is None else start.coords.shape
+    sampler = emcee.EnsembleSampler(
+        n_walkers, n_dim, log_density, moves=moves(mixture), vectorize=True, backend=backend
+    )
+    sampler.log_prob_fn = log_density  # emcee's own wrapper prints what it raises
+    sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
+
+
+def random_state(rng: np.random.Generator) -> Any:
+    """A state of the generator that emcee uses, drawn from a stream."""
+    return np.random.RandomState(rng.integers(2**32, size=8)).get_state()
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """What an ensemble walked that nobody keeps.
+
+    Attributes
+    ----------
+    draws : (n_draws, n_dim) array
+        Of its last rounds, a third of them: near the posterior.
+    points : (n_walkers, n_dim) array
+        Where it ended.
+    log_prob : (n_walkers,) array
+    """
+
+    draws: Floats
+    points: Floats
+    log_prob: Floats
+
+
+def pilot(
+    log_density: LogDensity,
+    centre: Floats,
+    factor: Floats,
+    rng: np.random.Generator,
+    n_walkers: int = 128,
+    fewest_rounds: int = FEWEST_ROUNDS,
+) -> Pilot:
+    """Walk from three standard errors around the estimate, in rounds each of which teaches the next, until arrived.
+
+    Parameters
+    ----------
+    log_density : callable, (n_points, n_dim) -> (n_points,) array
+    centre : (n_dim,) array
+    factor : (n_dim, n_dim) array
+        Lower Cholesky factor of the estimate's covariance.
+    rng : numpy.random.Generator
+    n_walkers, fewest_rounds : int, optional
+
+    Returns
+    -------
+    Pilot
+    """
+    import emcee
+
+    points, log_prob = finite_starts(log_density, centre, factor, n_walkers, rng)
+    start: Any = emcee.State(points, log_prob=log_prob, random_state=random_state(rng))
+    backend, mixture, before = emcee.backends.Backend(), Mixture.with_covariance(centre, factor @ factor.T), -np.inf
+    fewest_rounds = min(max(fewest_rounds, FEWEST_ROUNDS), _MOST_ROUNDS)
+    for n_rounds in range(1, _MOST_ROUNDS + 1):
+        walk(log_density, mixture, backend, start, _PILOT_STEPS)
+        start, draws = None, backend.chain[-_PILOT_STEPS * -(-n_rounds // 3) :]
+        now = float(backend.log_prob[-_PILOT_STEPS:].mean())
+        if n_rounds >= fewest_rounds and now - before < _RISE:
+            break
+        mixture, before = Mixture.fitted(draws), now
+    return Pilot(draws.reshape(-1, len(centre)), backend.chain[-1], backend.log_prob[-1])
