@@ -125,7 +125,7 @@ class Session:
         self.checkpoint, self.identity = checkpoint, identity
         self._latest: Snapshot | None = None
         self._n_saved = 0
-        self._due = time.monotonic() + EVERY_SECONDS
+        self._due = 0.0  # the first chunk is saved at once
 
     def load(self) -> Snapshot | None:
         """Where the run stands that is saved; None if there is none.
@@ -165,7 +165,7 @@ class Session:
         return Snapshot(backends, states, self._n_saved)
 
     def reached(self, snapshot: Snapshot) -> None:
-        """Note where the run stands, and save it if the last time is long enough ago.
+        """Note where the run stands, and save it at the first time, then if the last time is long enough ago.
 
         Raises
         ------

@@ -90,13 +90,13 @@ def test_a_finished_run_is_read_back_without_new_steps(folder):
     sample(must_not_be_called, np.zeros(2), np.eye(2), settings(max_steps=30), checkpoint=Checkpoint(folder, "f"))
 
 
-def test_it_is_saved_every_few_seconds_only(tmp_path, monkeypatch):
+def test_it_is_saved_at_once_then_every_few_seconds_only(tmp_path, monkeypatch):
     """And once more at the end."""
     monkeypatch.setattr(checkpoint_module, "EVERY_SECONDS", 1e3)
     written = []
     monkeypatch.setattr(checkpoint_module, "_content", lambda snapshot, _: written.append(snapshot.n_steps) or b"")
     run(Checkpoint(tmp_path, "f"))
-    assert written == [50]
+    assert written == [10, 50]
 
 
 def test_an_interrupt_saves_the_last_whole_chunk_and_frees_the_lock(tmp_path, uninterrupted, monkeypatch):
