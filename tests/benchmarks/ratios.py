@@ -30,8 +30,8 @@ HEAD = """# Benchmarks
 Written by `make benchmarks`; do not edit. Every ratio is of two things that were measured in one run on one thread. The
 unit of cold times is a process of its own that poses a clamped board with five parameters and samples its linear law
 with emcee as it comes (stretch moves, vectorised, {walkers} walkers, {steps} steps). Effective draws are those of the
-parameter that has fewest, by the package's autocorrelation time; the median of {seeds} seeds counts, and the time
-includes the surrogate, the warm-up and every judgement of convergence. Emcee walks here on the package's own posterior;
+parameter that has fewest, by emcee's autocorrelation time; the median of {seeds} seeds counts, and the time
+includes the surrogate, the pilot and every judgement of convergence. Emcee walks here on the package's own posterior;
 beside other samplers, on a page of its own, it is given a density in NumPy, and its ratio there is another one.
 
 | what | ratio | limit | |

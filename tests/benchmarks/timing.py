@@ -103,15 +103,19 @@ def plain_emcee(problem: PosedProblem, seed: int) -> float:
 
     seconds = best(run, 1)
     kept = sampler.get_chain(discard=burn_in_steps(PLAIN_STEPS))
-    return float(kept.shape[0] * n_walkers / autocorrelation_times(kept).max() / seconds)
+    return float(kept[..., 0].size / autocorrelation_times(kept).max() / seconds)
 
 
 def our_sampling(problem: PosedProblem, seed: int) -> float:
-    """Effective draws per second of the package, of the parameter that has fewest: surrogate, warm-up and judgements
-    of convergence count as time."""
+    """Effective draws per second of the package, by the same measure: surrogate, pilot and judgements of convergence
+    count as time, and of a surrogate no more draws than are weighted."""
     started = time.perf_counter()
     inference = infer(problem, SamplerSettings(seed=seed))
-    return inference.convergence.ess_min / (time.perf_counter() - started)
+    seconds = time.perf_counter() - started
+    n_effective = inference.chains.kept[..., 0].size / inference.convergence.tau_max
+    if inference.surrogate is not None:
+        n_effective = min(n_effective, inference.convergence.ess_min)
+    return float(n_effective / seconds)
 
 
 def plate_at_estimate(problem: PosedProblem) -> tuple[Ends, Ends, tuple[int, int], Weights]:
