@@ -15,6 +15,8 @@ from bayesplate.quantities import Quantity
 LIGHTEST, HEAVIEST = 20.0, 25_000.0  # kg/m3: lighter than balsa foam, heavier than any metal in use
 _LIGHT, _HEAVY = 100.0, 9_000.0  # kg/m3: balsa and brass, between which a board is likely
 MOST_WARP = 0.1  # of the side: a shallow shell, of which the effect is computed, rises by less
+MM_OF_A_THOU, THINNEST_IN_THOU = 0.0254, 20.0
+"""A thickness in thousandths of an inch is a number of tens and more: veneer of half a millimetre has 20."""
 THICKEST_SHARE = 0.5  # of the shorter side; beyond it no plate theory holds
 
 
@@ -76,7 +78,10 @@ def _plate_faults(card: BoardCard, file: str) -> Iterator[Fault]:
     shorter = min(plate.length_x_mm.mean, plate.length_y_mm.mean)
     if plate.thickness_mm.mean > THICKEST_SHARE * shorter:
         wanted = f"at most half the shorter side, {THICKEST_SHARE * shorter:g} mm"
-        yield Fault(f"{file} [plate] thickness_mm", wanted, f"{plate.thickness_mm.mean:g} mm", "no plate is so thick")
+        remedy, thickness = "no plate is so thick", plate.thickness_mm.mean
+        if thickness >= THINNEST_IN_THOU and thickness * MM_OF_A_THOU <= THICKEST_SHARE * shorter:
+            remedy += f"; {thickness:g} thousandths of an inch would be {thickness * MM_OF_A_THOU:.3g} mm"
+        yield Fault(f"{file} [plate] thickness_mm", wanted, f"{thickness:g} mm", remedy)
     sides = {"cup": plate.length_y_mm.mean, "bow": plate.length_x_mm.mean}
     for key, warp in plate.warp_mm.items():
         most = MOST_WARP * sides.get(key, max(sides.values()))

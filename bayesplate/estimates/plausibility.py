@@ -83,6 +83,7 @@ class Suspect:
 
 
 _SIDES = ("length_x", "length_y")
+_LENGTHS = (*_SIDES, "thickness")
 SUSPECTS = (
     Suspect("in rad/s? in Hz they are that over 2 pi = 6.28", frequency=2.0 * np.pi),
     Suspect("in kHz? 1 kHz is 1000 Hz", frequency=1e-3),
@@ -90,8 +91,13 @@ SUSPECTS = (
     Suspect("are length_x_mm and length_y_mm ten times too large?", wrong=tuple((side, 10.0) for side in _SIDES)),
     Suspect("is thickness_mm ten times too large?", wrong=(("thickness", 10.0),)),
     Suspect("is thickness_mm ten times too small?", wrong=(("thickness", 0.1),)),
-    Suspect("are all three lengths in cm?", wrong=tuple((size, 0.1) for size in (*_SIDES, "thickness"))),
-    Suspect("are all three lengths ten times too large?", wrong=tuple((size, 10.0) for size in (*_SIDES, "thickness"))),
+    Suspect("are all three lengths in cm?", wrong=tuple((size, 0.1) for size in _LENGTHS)),
+    Suspect("are all three lengths ten times too large?", wrong=tuple((size, 10.0) for size in _LENGTHS)),
+    Suspect(
+        "are length_x_mm and length_y_mm in inches? 1 inch is 25.4 mm", wrong=tuple((side, 1 / 25.4) for side in _SIDES)
+    ),
+    Suspect("are all three lengths in inches? 1 inch is 25.4 mm", wrong=tuple((size, 1 / 25.4) for size in _LENGTHS)),
+    Suspect("is thickness_mm in thousandths of an inch? 118 of them are 3 mm", wrong=(("thickness", 1 / 0.0254),)),
     Suspect("are the constants of the prior in MPa? 1 GPa is 1000 MPa", frequency=1e-3**0.5),
     Suspect("are length_x_mm and length_y_mm exchanged? x is along the grain", exchanged=_SIDES),
     Suspect("is y along the grain in all of the card? x should be", exchanged=("D_x", "D_y")),

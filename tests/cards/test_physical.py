@@ -34,7 +34,7 @@ CASES = [
     ("mass_g = 41.0", "density_kg_m3 = 4.7", "[plate] density_kg_m3", "a density from 20 to 25000 kg/m3", "4.7 kg/m3",
      "mass in g, density in kg/m3, lengths in mm"),
     ("{ mean = 3.0, sd = 0.03 }", "60", "[plate] thickness_mm", "at most half the shorter side, 57 mm", "60 mm",
-     "no plate is so thick"),
+     "no plate is so thick; 60 thousandths of an inch would be 1.52 mm"),
     ("{ mean = 3.0, sd = 0.03 }", "{ readings = [3, 3], at_x_mm = [0, 254], at_y_mm = [0, 0] }",
      "[plate] thickness_mm.at_x_mm 2", "a place on the board, 0 to 253 mm", "254 mm", ""),
     ("length_y_mm = 114", "length_y_mm = { readings = [114, 113], at_x_mm = [-1, 9] }", "[plate] length_y_mm.at_x_mm 1",

@@ -104,6 +104,14 @@ def test_a_prior_that_knows_the_wood_also_asks_about_a_factor_of_ten(name):
     assert "is thickness_mm ten times too large" in asked(measured_as(board, 10.0, ("thickness",)), "spruce")
 
 
+def test_inches_are_asked_about():
+    """A density from the card: in inches cubed a mass would be refused before. In thousandths, a thickness too."""
+    board = board_of("spruce-free-2R", "spruce")
+    assert "are length_x_mm and length_y_mm in inches?" in asked(measured_as(board, 1 / 25.4, SIDES), "spruce")
+    assert "are all three lengths in inches?" in asked(measured_as(board, 1 / 25.4, (*SIDES, "thickness")), "spruce")
+    assert "is thickness_mm in thousandths of an inch?" in asked(measured_as(board, 39.37, ("thickness",)), "spruce")
+
+
 def test_a_setup_without_labels_is_asked_nothing():
     board = board_of("spruce-free-2R", "spruce")
     peaks = replace(board.setups[0], name="other", readings=(), peaks=made_boards.peaks_of(50.0, 70.0))
