@@ -1,28 +1,51 @@
-"""The corner plot of chosen draws by the `corner` package, for scripts; the report's own fits a phone."""
+"""The corner plot, by the package corner: every pair of quantities against each other, on the page and for scripts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import PosedProblem
+from bayesplate.report.priors import input_words
 from bayesplate.report.saving import drawing, save_figure
-from bayesplate.report.style import BLUE, ORANGE
+from bayesplate.report.style import BLACK, ORANGE, POSTERIOR, SMALL, WIDTH, Picture, limits, short
+from bayesplate.report.symbols import in_figure, is_symbol
+from bayesplate.results.archive import load_arviz
+from bayesplate.results.budget import input_shares
+from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_INCHES = 1.9
+Floats = NDArray[np.float64]
+
+MOST = 6
+"""Columns of the report: more cannot be read on a phone."""
+
 _HELD = (0.5, 0.9)
+_LEFT, _BOTTOM, _TOP, _RIGHT, _GAP = 0.72, 0.72, 0.08, 0.12, 0.07
+_STRONG = 0.5
+_CHARACTERS_AN_INCH = 17
+_BRIEF = {
+    "length along the grain": "length",
+    "length across the grain": "width",
+    " profile": "",
+    " of transverse shear": "",
+    "Poisson ratio ": "",
+}
 
 
 def corner_figure(
-    columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float | None] | None = None
+    columns: Mapping[str, Floats],
+    marked: Mapping[str, float | None] | None = None,
+    labels: Sequence[str] | None = None,
 ) -> Figure:
-    """Every pair of columns against each other.
+    """Every pair of columns against each other; the lines hold half and nine tenths of the draws.
 
     Parameters
     ----------
@@ -30,35 +53,153 @@ def corner_figure(
         Draws by what stands at their axis, units included; all of one size.
     marked : dict of float, optional
         Values to mark by a line, such as the least squares, by the same words.
+    labels : sequence of str, optional
+        What stands at the axes instead.
 
     Returns
     -------
     matplotlib.figure.Figure
+        No state of pyplot is touched.
     """
-    import corner
     from matplotlib.figure import Figure
 
-    side = _INCHES * len(columns)
-    truths = None if marked is None else [marked.get(name) for name in columns]
-    figure = Figure(figsize=(side, side))
-    corner.corner(
+    marks = [(marked or {}).get(name) for name in columns]
+    side = panel_side(len(columns))
+    width = _LEFT + len(columns) * (side + _GAP) - _GAP + _RIGHT
+    height = width - _LEFT - _RIGHT + _BOTTOM + _TOP
+    figure = Figure(figsize=(width, height))
+    load_corner().corner(
         np.column_stack([np.ravel(values) for values in columns.values()]),
         fig=figure,
-        labels=list(columns),
+        labels=list(labels or columns),
+        label_kwargs={"fontsize": SMALL - 1},
+        labelpad=0.42 / side - 0.3,  # of corner's own 0.3 sides
+        range=[
+            limits(values, () if mark is None else [mark]) for values, mark in zip(columns.values(), marks, strict=True)
+        ],
+        bins=40,
+        smooth=1.6,
         levels=_HELD,
-        smooth=1.0,
-        color=BLUE,
-        truths=None if len(columns) == 1 else truths,
+        color=POSTERIOR,
+        fill_contours=True,
+        no_fill_contours=True,
+        plot_datapoints=False,
+        plot_density=False,
+        contour_kwargs={"colors": BLACK, "linewidths": 0.7},
+        hist_kwargs={"histtype": "stepfilled", "alpha": 0.4},
+        truths=marks if len(marks) > 1 and any(marks) else None,
         truth_color=ORANGE,
+        max_n_ticks=int(np.clip(4 * side, 2, 5)),
+        quiet=True,
     )
-    if len(columns) == 1 and truths is not None and truths[0] is not None:  # which corner marks in pairs only
-        figure.axes[0].axvline(truths[0], color=ORANGE)
+    figure.subplots_adjust(
+        left=_LEFT / width, right=1 - _RIGHT / width, bottom=_BOTTOM / height, top=1 - _TOP / height,
+        wspace=_GAP / side, hspace=_GAP / side,
+    )  # fmt: skip
+    for panel in figure.axes:
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(labelsize=SMALL - 1.5, labelrotation=45, length=3)
+    if len(marks) == 1 and marks[0] is not None:  # which corner marks in pairs only
+        figure.axes[0].axvline(marks[0], color=ORANGE)
     return figure
 
 
 @drawing()
 def write_corner_plot(
-    path: Path, columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float | None] | None = None
+    path: Path, columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None
 ) -> None:
     """Write the figure by the ending of the path, PNG or SVG; further parameters as of `corner_figure`."""
     save_figure(corner_figure(columns, marked), path)
+
+
+def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
+    """The constants, the noise and the inputs that matter most.
+
+    Parameters
+    ----------
+    problem : PosedProblem
+    draws : Draws
+
+    Returns
+    -------
+    Picture
+    """
+    columns = chosen(problem, draws)
+    strong = _strong(columns)
+    told = _told(strong) if strong else "No pair hangs together strongly."
+    alt = f"Draws in pairs of {', '.join(name.partition(',')[0] for name in columns)}. {told}"
+    caption = (
+        "Each square shows two quantities at once; the lines hold half and nine tenths of the probability. A slanted "
+        "shape means that an error in one would be made up for by the other."
+    )
+    figure = corner_figure(columns, labels=axis_labels(list(columns)))
+    return Picture("corner", "Which quantities hang together", alt, caption, figure)
+
+
+def load_corner() -> Any:
+    """The package."""
+    load_arviz()  # which corner imports, and which has to be kept quiet
+    import corner
+
+    return corner
+
+
+def panel_side(n_columns: int) -> float:
+    """Side of a panel in inches: the figure is as wide as the others of the report, wider beyond its columns."""
+    n = min(n_columns, MOST)
+    return (WIDTH - _LEFT - _RIGHT - (n - 1) * _GAP) / n
+
+
+def axis_labels(names: Sequence[str]) -> list[str]:
+    """What stands at the axes of columns, in two lines where there is no room for one."""
+    return [axis_label(name, panel_side(len(names))) for name in names]
+
+
+def axis_label(name: str, side: float) -> str:
+    """A name and its unit, in lines no longer than the panel, as matplotlib sets them.
+
+    Parameters
+    ----------
+    name : str
+        A symbol of ours becomes mathematics; nothing else does.
+    side : float
+        Of the panel, inches.
+    """
+    for words, brief in _BRIEF.items():
+        name = name.replace(words, brief)
+    longest = int(_CHARACTERS_AN_INCH * side)
+    first, comma, below = name.rpartition(", ") if ", " in name else name.partition(" of ")
+    if len(name) > longest:
+        name = f"{short(first, longest)}{',' if comma else ''}\n{short(below, longest)}".strip()
+    return in_figure(name) if is_symbol(first) else name.replace("$", r"\$")
+
+
+def chosen(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
+    """Moduli in GPa, the noise of each setup in %, and the inputs with the largest share in the moduli's variance."""
+    columns = {f"{name}, GPa": values.ravel() * GPA for name, values in draws.moduli.items()}
+    setups = problem.board.setups
+    for i, setup in enumerate(setups[: MOST - len(columns) - 1]):
+        columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i].ravel()
+    shares = input_shares(draws)
+    largest = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
+    every = {one.name: one for one in problem.board.uncertain if one.is_listed}
+    for name in sorted(every, key=lambda one: -largest[one])[: MOST - len(columns)]:
+        words, factor, unit = input_words(every[name], problem.board)
+        columns[f"{words}, {unit}" if unit else words] = draws.inputs[name].ravel() * factor
+    return columns
+
+
+def _strong(columns: dict[str, Floats]) -> list[tuple[str, str, float]]:
+    """Pairs whose correlation is strong."""
+    names = [name.partition(",")[0] for name in columns]
+    matrix = np.atleast_2d(np.corrcoef(np.stack(list(columns.values()))))
+    return [
+        (names[j], names[i], float(matrix[i, j]))
+        for i in range(len(names))
+        for j in range(i)
+        if abs(matrix[i, j]) > _STRONG
+    ]
+
+
+def _told(pairs: list[tuple[str, str, float]]) -> str:
+    return "Correlated: " + "; ".join(f"{one} with {other} ({value:+.2f})" for one, other, value in pairs) + "."

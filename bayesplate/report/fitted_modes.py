@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.system import Limits
 from bayesplate.plate.setup import Setup
-from bayesplate.report.chladni import draw_edge, draw_sand
-from bayesplate.report.style import DARK, SMALL, WIDTH, WORDS, Picture
+from bayesplate.report.chladni import board_panel, caption, draw_sand
+from bayesplate.report.style import WIDTH, Picture
 from bayesplate.results.modes import ModeRow
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_SIDE, _GAP, _BAND = 0.22, 0.26, 0.05
-_CAPTION, _TALLEST = 0.56, 2.4
+_SIDE, _GAP = 0.22, 0.26
+_CAPTION, _TALLEST = 0.6, 2.4
 _MARGIN = 0.14
 _N_COLUMNS = 3
 
@@ -70,25 +66,13 @@ def fitted_modes_picture(
         at_row, column = divmod(i, _N_COLUMNS)
         left = _SIDE + column * cell + (cell - _GAP - side) / 2
         bottom = height - _MARGIN - at_row * row - size[1]
-        panel = figure.add_axes((left / WIDTH, bottom / height, size[0] / WIDTH, size[1] / height))
-        panel.set(xlim=(0, 1), ylim=(0, 1))
-        panel.set_axis_off()
-        for edge, word in setup.edges.items():
-            draw_edge(panel, edge, word, _BAND / size[0] if edge[0] == "x" else _BAND / size[1], limits)
+        panel = board_panel(figure, (left, bottom), size, setup.edges, limits)
         draw_sand(panel, shapes[mode.label], limits)
-        _caption(panel, mode)
+        measured, predicted = f"measured {mode.measured_hz:.6g} Hz", f"predicted {mode.predicted_hz.mean:.1f} Hz"
+        caption(panel, mode.label, measured, predicted)
     told = "; ".join(
         f"{mode.label} measured {mode.measured_hz:.6g} Hz, predicted {mode.predicted_hz.mean:.1f} Hz"
         for mode in ordered
     )
     title = f"Chladni figures of the fitted modes, setup {setup.name}"
     return Picture(name, title, f"Nodal lines of {len(ordered)} modes: {told}.", CAPTION, figure)
-
-
-def _caption(panel: Axes, mode: ModeRow) -> None:
-    """Name, measured and predicted frequency below a panel."""
-    common: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
-    panel.annotate(mode.label, (0.5, 0.0), (0, -5), fontsize=WORDS, weight="bold", **common)
-    panel.annotate(f"measured {mode.measured_hz:.6g} Hz", (0.5, 0.0), (0, -16), fontsize=SMALL, **common)
-    predicted = f"predicted {mode.predicted_hz.mean:.1f} Hz"
-    panel.annotate(predicted, (0.5, 0.0), (0, -26), fontsize=SMALL, color=DARK, **common)

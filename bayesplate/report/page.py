@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
@@ -27,10 +27,10 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
 from bayesplate.report.board import board_picture
 from bayesplate.report.constants import constants_picture
+from bayesplate.report.corner_plot import corner_picture, load_corner
 from bayesplate.report.fitted_modes import fitted_modes_picture
 from bayesplate.report.health import health_picture
 from bayesplate.report.null_control import null_picture
-from bayesplate.report.pairs import pairs_picture
 from bayesplate.report.percentiles import percentiles_picture
 from bayesplate.report.priors import priors_picture
 from bayesplate.report.residuals import predictive_picture, residuals_picture
@@ -71,6 +71,8 @@ def load_libraries() -> None:
     from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
     from matplotlib.figure import Figure  # noqa: F401
 
+    load_corner()
+
 
 @drawing()
 def write_report(
@@ -100,21 +102,41 @@ def write_report(
     Path
         Of report.html. It shows the SVG figures, and is there before the PNG files are.
     """
-    make_folder(folder / FIGURES)
-    page = folder / PAGE
     with _uncollected():
-        groups = pictures(inference, draws, summary, diagnosis)
-        every = [one for found in groups.values() for one in found]
-        vector = save_pictures(every, folder / FIGURES, "svg")
-        shown = {place: [shown_picture(one, vector[one.name]) for one in found] for place, found in groups.items()}
         title = inference.problem.board.title or summary.name
+        make_folder(folder)
         write_exports(folder, quoted(summary, diagnosis), title)
         if diagnosis is not None:
             write_before_after(folder, diagnosis, title)
             write_known(folder, diagnosis, title)
-        write_text(page, render(card, inference, draws, summary, shown, diagnosis))
-        save_pictures(every, folder / FIGURES, "png")
-    return page
+        groups = pictures(inference, draws, summary, diagnosis)
+        return save_page(folder / PAGE, groups, lambda shown: render(card, inference, draws, summary, shown, diagnosis))
+
+
+def save_page(
+    path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[Shown]]], str]
+) -> Path:
+    """Write a page and, into the folder beside it, its figures as PNG and SVG.
+
+    Parameters
+    ----------
+    path : Path
+    groups : dict of sequence of Picture
+        By the place where they stand.
+    text : callable
+        The page, given its pictures by their place.
+
+    Returns
+    -------
+    Path
+        Of the page. It shows the SVG figures, and is there before the PNG files are.
+    """
+    make_folder(path.parent / FIGURES)
+    every = [one for found in groups.values() for one in found]
+    vector = save_pictures(every, path.parent / FIGURES, "svg")
+    write_text(path, text({place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}))
+    save_pictures(every, path.parent / FIGURES, "png")
+    return path
 
 
 @contextmanager
@@ -148,7 +170,7 @@ def pictures(
             *percentiles_pictures(inference, draws),
             predictive_picture(summary, draws.predictive),
             priors_picture(problem, draws),
-            pairs_picture(problem, draws),
+            corner_picture(problem, draws),
             health_picture(inference),
         ],
     }
@@ -192,7 +214,7 @@ def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list
     return found
 
 
-def shown_picture(picture: Picture, svg: bytes) -> Shown:
+def _shown(picture: Picture, svg: bytes) -> Shown:
     """A picture as a page holds it, from the content of its SVG file."""
     from markupsafe import Markup
 
@@ -210,14 +232,10 @@ def render(
     diagnosis: Diagnosis | None = None,
 ) -> str:
     """The page as text; parameters as of `write_report`, `shown` the pictures by their place."""
-    from markupsafe import Markup
-
     problem = inference.problem
     board, prior = problem.board, problem.prior
-    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    return template("report.html").render(
-        policy=policy(css),
-        css=Markup(css),  # our own file; the policy lets in nothing else
+    return from_template(
+        "report.html",
         title=board.title or board.name,
         name=board.name,
         sentences=short_sentences(summary, diagnosis),
@@ -225,7 +243,7 @@ def render(
         weak=summary.identifiability,
         effects=content.effect_sentences(summary),
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
-        pictures=_with_all_places(shown),
+        pictures=dict.fromkeys(PLACES, ()) | dict(shown),
         tables={
             "constants": quoted_constants(summary, diagnosis),
             "effects": content.effects_table(board, summary),
@@ -250,18 +268,11 @@ PLACES = ("diagnosis_first", "diagnosis_more", "constants", "board", "modes", "e
 """Where pictures stand on the page."""
 
 
-def _with_all_places(shown: Mapping[str, Sequence[Shown]]) -> dict[str, Sequence[Shown]]:
-    return {place: shown.get(place, ()) for place in PLACES}
+def from_template(template: str, /, **values: Any) -> str:
+    """A page, every value cleaned of what steers the way text runs, then escaped.
 
-
-def policy(css: str) -> str:
-    """What a browser may do with the page: show its own pictures in its own style, and nothing else whatever."""
-    digest = b64encode(sha256(css.encode("utf-8")).digest()).decode("ascii")
-    return f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
-
-
-def template(name: str) -> Any:
-    """A template by its name, every value cleaned of what steers the way text runs, then escaped."""
+    A browser may show its own pictures in its own style, and do nothing else whatever.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -271,4 +282,8 @@ def template(name: str) -> Any:
     loader = PackageLoader("bayesplate.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=cleaned)
     environment.filters["symbols"] = lambda text: in_page(visible(str(text)))
-    return environment.get_template(name)
+    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
+    digest = b64encode(sha256(css.encode("utf-8")).digest()).decode("ascii")
+    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
+    # our own file; the policy lets in nothing else
+    return environment.get_template(template).render(policy=policy, css=Markup(css), **values)

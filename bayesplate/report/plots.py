@@ -6,9 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
@@ -17,10 +14,8 @@ from bayesplate.estimates.sheet import Sheet
 from bayesplate.planning.assembled import Bench
 from bayesplate.planning.plan import Plan
 from bayesplate.plate.material import MODULI
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
-from bayesplate.report.symbols import in_figure
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.summary import Summary
 from bayesplate.results.words import GPA
@@ -59,7 +54,7 @@ class FitPlots:
             One or more, each once, of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
             units of cards.
         """
-        from bayesplate.report.corner_plot import corner_figure
+        from bayesplate.report.corner_plot import axis_labels, corner_figure
 
         known = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
         if isinstance(names, str) or not len(names) or len(set(names)) < len(names):
@@ -71,15 +66,16 @@ class FitPlots:
         estimate = self.summary.weighted_least_squares
         at = {name: estimate[name] if name in estimate.NAMES else None for name in names}
         return corner_figure(
-            {words: known[name] * factor for name, (factor, words) in shown.items()},
-            {words: None if (v := at[name]) is None else v * factor for name, (factor, words) in shown.items()},
+            {name: known[name] * factor for name, (factor, _) in shown.items()},
+            {name: None if (v := at[name]) is None else v * factor for name, (factor, _) in shown.items()},
+            axis_labels([words for _, words in shown.values()]),
         )
 
     def pairs(self) -> Figure:
         """Every pair of the constants, the noise and the inputs that matter most, as in the report."""
-        from bayesplate.report.pairs import pairs_picture
+        from bayesplate.report.corner_plot import corner_picture
 
-        return pairs_picture(self.inference.problem, self.draws).figure
+        return corner_picture(self.inference.problem, self.draws).figure
 
     def priors(self) -> Figure:
         """Prior and posterior of every quantity that was not known."""
@@ -233,11 +229,11 @@ class ComparePlots:
 
     def corner(self, theory: str = "thin") -> Figure:
         """Every pair of moduli under one theory, by the package corner."""
-        from bayesplate.report.corner_plot import corner_figure
+        from bayesplate.report.corner_plot import axis_labels, corner_figure
 
         _place("theory", theory, list(self.draws))
-        moduli: Mapping[str, NDArray[np.float64]] = self.draws[theory].moduli
-        return corner_figure({f"{in_figure(name)}, GPa": values * GPA for name, values in moduli.items()})
+        columns = {f"{name}, GPa": values * GPA for name, values in self.draws[theory].moduli.items()}
+        return corner_figure(columns, labels=axis_labels(list(columns)))
 
     def __repr__(self) -> str:
         return f"<figures: {_methods(self)}>"
@@ -252,12 +248,12 @@ def _place(what: str, name: str | None, names: Sequence[str]) -> int:
 
 def _factor_and_words(name: str, problem: PosedProblem) -> tuple[float, str]:
     """Factor to the unit that people use, and what stands at the axis."""
-    if name in MODULI:
-        return GPA, f"{in_figure(name)}, GPa"
+    from bayesplate.report.priors import input_words
+
     if name not in problem.board.inputs:
-        return 1.0, f"{in_figure(name)}, N m"
-    factor, unit = unit_of_people(problem.board.parameter(name).unit)
-    return factor, f"{name}, {unit}" if unit else name
+        return (GPA, f"{name}, GPa") if name in MODULI else (1.0, f"{name}, N m")
+    words, factor, unit = input_words(problem.board.parameter(name), problem.board)
+    return factor, f"{words}, {unit}" if unit else words
 
 
 def _methods(plots: object) -> str:

@@ -7,11 +7,14 @@ ArviZ.
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -112,7 +115,7 @@ def to_arviz(archive: Archive) -> Any:
     arviz.InferenceData or xarray.DataTree
     """
     xarray: Any = import_module("xarray")
-    arviz: Any = import_module("arviz")
+    arviz = load_arviz()
     axes, groups = archive.placed()
     datasets = {}
     for name, variables in groups.items():
@@ -121,6 +124,19 @@ def to_arviz(archive: Archive) -> Any:
     if "InferenceData" in vars(arviz):  # 1.3 answers to the name with a warning, and has a tree behind it
         return arviz.InferenceData(attrs=dict(archive.attributes), **datasets)
     return xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=dict(archive.attributes)), **datasets})
+
+
+def load_arviz() -> Any:
+    """ArviZ. Once a day 0.23 announces version 1, and notes the day in a cache of the user, which may be read-only."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        try:
+            return import_module("arviz")
+        except OSError:
+            from unittest.mock import patch
+
+            with TemporaryDirectory() as folder, patch.dict(os.environ, XDG_CACHE_HOME=folder):
+                return import_module("arviz")
 
 
 def _place(
