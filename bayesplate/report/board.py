@@ -33,16 +33,7 @@ _MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p"}
 
 
 def board_picture(board: Board) -> Picture:
-    """Draw a board in each of its setups, from above.
-
-    Parameters
-    ----------
-    board : Board
-
-    Returns
-    -------
-    Picture
-    """
+    """A board in each of its setups, from above."""
     from matplotlib.figure import Figure
 
     values = board.nominal()

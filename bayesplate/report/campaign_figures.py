@@ -43,18 +43,7 @@ _LONGEST = 16
 
 
 def shared_picture(summary: CampaignSummary, name: str) -> Picture:
-    """One shared number: each board alone, what the others teach it, and all boards together.
-
-    Parameters
-    ----------
-    summary : CampaignSummary
-    name : str
-        Of the number.
-
-    Returns
-    -------
-    Picture
-    """
+    """One shared number, by its name: each board alone, what the others teach it, and all boards together."""
     one = summary.shared[name]
     factor = unit_of_people(one.all_boards.unit)[0]
     boards = list(one.own)
@@ -103,13 +92,7 @@ def boards_picture(summary: CampaignSummary) -> Picture:
 
 
 def common_picture(common: Mapping[str, CommonResidual]) -> Picture:
-    """What is left over, mode by mode: each board, and the mean with its error.
-
-    Parameters
-    ----------
-    common : dict of CommonResidual
-        By label.
-    """
+    """What is left over, by the label of the mode: each board, and the mean with its error."""
     figure, panel = in_rows(list(common), left=0.75, bottom=0.95)
     clear = clear_of_zero(common)
     usual, beyond = (BLUE, "o"), (ORANGE, "D")

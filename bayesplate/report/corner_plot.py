@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import PosedProblem
 from bayesplate.report.priors import input_words
@@ -113,17 +115,7 @@ def write_corner_plot(
 
 
 def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
-    """The constants, the noise and the inputs that matter most.
-
-    Parameters
-    ----------
-    problem : PosedProblem
-    draws : Draws
-
-    Returns
-    -------
-    Picture
-    """
+    """The constants, the noise and the inputs that matter most against each other."""
     columns = chosen(problem, draws)
     strong = _strong(columns)
     told = _told(strong) if strong else "No pair hangs together strongly."
@@ -176,23 +168,31 @@ def axis_label(name: str, side: float) -> str:
 
 def chosen(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
     """Moduli in GPa, the noise of each setup in %, and the inputs with the largest share in the moduli's variance."""
-    columns = {f"{name}, GPa": values.ravel() * GPA for name, values in draws.moduli.items()}
+    columns = {f"{name}, GPa": values * GPA for name, values in draws.moduli.items()}
     setups = problem.board.setups
     for i, setup in enumerate(setups[: MOST - len(columns) - 1]):
-        columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i].ravel()
+        columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i]
     shares = input_shares(draws)
     largest = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
-    every = {one.name: one for one in problem.board.uncertain if one.is_listed}
-    for name in sorted(every, key=lambda one: -largest[one])[: MOST - len(columns)]:
-        words, factor, unit = input_words(every[name], problem.board)
-        columns[f"{words}, {unit}" if unit else words] = draws.inputs[name].ravel() * factor
+    listed = [one.name for one in problem.board.uncertain if one.is_listed]
+    for name in sorted(listed, key=lambda one: -largest[one])[: MOST - len(columns)]:
+        words, factor = words_and_factor(name, problem.board)
+        columns[words] = draws.inputs[name] * factor
     return columns
+
+
+def words_and_factor(name: str, board: Board) -> tuple[str, float]:
+    """What stands at the axis of a modulus, a rigidity or an input, and the factor from SI to its unit."""
+    if name not in board.inputs:
+        return (f"{name}, GPa", GPA) if name in MODULI else (f"{name}, N m", 1.0)
+    words, factor, unit = input_words(board.parameter(name), board)
+    return f"{words}, {unit}" if unit else words, factor
 
 
 def _strong(columns: dict[str, Floats]) -> list[tuple[str, str, float]]:
     """Pairs whose correlation is strong."""
     names = [name.partition(",")[0] for name in columns]
-    matrix = np.atleast_2d(np.corrcoef(np.stack(list(columns.values()))))
+    matrix = np.corrcoef([values.ravel() for values in columns.values()])
     return [
         (names[j], names[i], float(matrix[i, j]))
         for i in range(len(names))

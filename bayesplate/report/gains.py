@@ -39,16 +39,7 @@ _LINE = 46
 
 
 def gains_picture(plan: Plan) -> Picture:
-    """Doubt that goes and intervals that are left, proposal by proposal; parameters that boards share for a campaign.
-
-    Parameters
-    ----------
-    plan : Plan
-
-    Returns
-    -------
-    Picture
-    """
+    """Doubt that goes and intervals that are left, proposal by proposal; of a campaign those of what boards share."""
     from matplotlib.figure import Figure
 
     shown = plan.proposals[:MOST]

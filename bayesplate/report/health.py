@@ -25,16 +25,7 @@ _MOST_POINTS = 240
 
 
 def health_picture(inference: Inference) -> Picture:
-    """Draw the mean over the walkers of each ensemble, step by step.
-
-    Parameters
-    ----------
-    inference : Inference
-
-    Returns
-    -------
-    Picture
-    """
+    """The mean over the walkers of each ensemble, step by step."""
     convergence = inference.convergence
     ways, burn_in = _ways(inference)
     n_ensembles, n_steps, _ = ways.shape

@@ -12,26 +12,19 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bayesplate.cards import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.exports import write_before_after, write_known
-from bayesplate.estimates.paper import paper_system
-from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
-from bayesplate.estimates.sheet import points
-from bayesplate.plate.board import vibrating_lengths
-from bayesplate.posterior.draws import Draws, posterior_mean_values
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
 from bayesplate.report.board import board_picture
 from bayesplate.report.constants import constants_picture
 from bayesplate.report.corner_plot import corner_picture, load_corner
-from bayesplate.report.fitted_modes import fitted_modes_picture
+from bayesplate.report.fitted_modes import modes_pictures
 from bayesplate.report.health import health_picture
 from bayesplate.report.null_control import null_picture
-from bayesplate.report.percentiles import percentiles_picture
+from bayesplate.report.percentiles import percentiles_pictures
 from bayesplate.report.priors import priors_picture
 from bayesplate.report.residuals import predictive_picture, residuals_picture
 from bayesplate.report.saving import drawing, save_pictures
@@ -45,9 +38,6 @@ from bayesplate.results.exports import write_exports
 from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
 from bayesplate.results.references import references
 from bayesplate.results.summary import Summary
-
-MOST_MODES_OF_PERCENTILES = 12
-"""4017 subsets; with more modes the estimates are too many to be drawn, and take seconds."""
 
 _PIXELS_AN_INCH = 96
 
@@ -182,36 +172,6 @@ def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Pict
     before_after = before_after_picture(diagnosis)
     more = [null_picture(diagnosis), signatures_picture(diagnosis)]
     return [before_after] if before_after else [], [one for one in more if one]
-
-
-def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
-    """The picture of the percentile method; none of one estimate, of too many, or where none is positive."""
-    problem = inference.problem
-    system = paper_system(problem.board, problem.estimate, compared=False)
-    n_modes = system.psi.size
-    if n_modes > MOST_MODES_OF_PERCENTILES:
-        return []
-    found = percentile_estimate(system)
-    if found is None or found.n_subsets == 1 or not np.isfinite(list(found.mean.values())).all():
-        return []
-    return [percentiles_picture(found, n_modes, draws.moduli)]
-
-
-def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
-    """One picture a setup."""
-    problem = inference.problem
-    board = problem.board
-    shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
-    values = board.nominal()
-    found = []
-    for model in problem.posterior.models:
-        setup, system = model.setup, model.system
-        length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
-        own = [mode for mode in summary.modes if mode.setup == setup.name]
-        name = "modes" if len(board.setups) == 1 else f"modes-{setup.name}"
-        ratio, limits = float(length_x / length_y), system.limits(points(N_POINTS))
-        found.append(fitted_modes_picture(setup, own, shapes[setup.name], ratio, name, limits))
-    return found
 
 
 def _shown(picture: Picture, svg: bytes) -> Shown:

@@ -9,70 +9,46 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.estimates.percentile import PercentileEstimate
+from bayesplate.estimates.paper import paper_system
+from bayesplate.estimates.percentile import PercentileEstimate, percentile_estimate
 from bayesplate.plate.material import MODULI
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
     PAPER,
-    WORDS,
     Picture,
-    drawable,
     heading,
     hump,
     legend_below,
     limits,
-    plain_axes,
     stacked,
 )
-from bayesplate.report.symbols import in_figure
 from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-_MANY, _MANY_MODES = 200, 12
-
-
-def percentiles_figure(
-    title: str, percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, NDArray[np.float64]]
-) -> Figure:
-    """Estimates of E_x, E_y and G_xy from every subset of the modes, above the posterior.
-
-    Parameters
-    ----------
-    title : str
-    percentile : PercentileEstimate
-    n_modes : int
-        Of the board; subsets hold three of them or more.
-    moduli : dict of array, Pa
-        Draws of each modulus.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Three panels: a dot an estimate, at the height of the number of its modes, solid if the trimming keeps it. What
-        lies beyond the panel is drawn as an arrow at its side.
-    """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-    panels = figure.subplots(1, len(MODULI))
-    for panel, name in zip(panels, MODULI, strict=True):
-        plain_axes(panel)
-        _draw(panel, name, percentile, n_modes, moduli[name])
-        panel.set_title(in_figure(name))
-    panels[0].set_ylabel("modes in the subset")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=WORDS)
-    figure.suptitle(drawable(title), fontsize=11, parse_math=False)
-    return figure
+_MANY = 200
+"""Estimates from which on they are drawn as pixels."""
+MOST_MODES = 12
+"""4017 subsets; with more modes the estimates are too many to be drawn, and take seconds."""
 
 
-def percentiles_picture(
-    percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, NDArray[np.float64]]
-) -> Picture:
-    """The same below each other, for a page; parameters as of `percentiles_figure`."""
+def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
+    """The picture of the percentile method; none of one estimate, of too many, or where none is positive."""
+    problem = inference.problem
+    system = paper_system(problem.board, problem.estimate, compared=False)
+    if system.psi.size > MOST_MODES:
+        return []
+    estimate = percentile_estimate(system)
+    if estimate is None or estimate.n_subsets == 1 or not np.isfinite(list(estimate.mean.values())).all():
+        return []
+    return [_picture(estimate, system.psi.size, draws.moduli)]
+
+
+def _picture(percentile: PercentileEstimate, n_modes: int, moduli: Mapping[str, NDArray[np.float64]]) -> Picture:
+    """Estimates of each modulus, a dot for each subset, at the height of the number of its modes."""
     heights = [min(1.9, 0.5 + 0.24 * (n_modes - 2))] * len(MODULI)
     figure, panels = stacked(heights, left=0.55, top=0.3, bottom=0.95, gap=0.72)
     for panel, name in zip(panels, MODULI, strict=True):
@@ -111,7 +87,7 @@ def _draw(panel: Axes, name: str, percentile: PercentileEstimate, n_modes: int, 
         panel.axvspan(*band, color=PAPER, alpha=0.35, lw=0, label="percentile method ± its sd")
     hump(panel, draws, ends, 2.2, label="posterior")
     _arrows(panel, estimates, sizes, low, high)
-    ticks = range(3, n_modes + 1, 1 if n_modes < _MANY_MODES else 2)
+    ticks = range(3, n_modes + 1, 1 if n_modes < MOST_MODES else 2)
     panel.set(xlim=ends, ylim=(0, n_modes + 0.7), yticks=ticks, xlabel="GPa")
 
 

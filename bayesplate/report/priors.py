@@ -90,17 +90,7 @@ def input_words(parameter: Parameter, board: Board) -> tuple[str, float, str]:
 
 
 def priors_picture(problem: PosedProblem, draws: Draws) -> Picture:
-    """Draw prior and posterior of everything sampled.
-
-    Parameters
-    ----------
-    problem : PosedProblem
-    draws : Draws
-
-    Returns
-    -------
-    Picture
-    """
+    """Prior and posterior of everything sampled, as far as there is room."""
     from matplotlib.figure import Figure
 
     quantities = compared(problem, draws)

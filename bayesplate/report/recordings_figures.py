@@ -51,17 +51,7 @@ def every_picture(report: PickReport, averaged: Sequence[Averaged], paths: Seque
 
 
 def spectra_picture(report: PickReport, averaged: Sequence[Averaged]) -> Picture:
-    """The averaged response of every pair of places with the modes that were picked, and the coherence.
-
-    Parameters
-    ----------
-    report : PickReport
-    averaged : sequence of Averaged
-
-    Returns
-    -------
-    Picture
-    """
+    """The averaged response of every pair of places with the modes that were picked, and the coherence."""
     shown = averaged[:MOST_PLACES]
     coherent = [one for one in shown if one.coherence is not None]
     heights = [1.2 + 0.55 * len(shown), *([0.8] if coherent else [])]

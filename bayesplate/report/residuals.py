@@ -34,16 +34,7 @@ _QUANTILES = (0.05, 0.25, 0.75, 0.95)
 
 
 def residuals_picture(summary: Summary) -> Picture:
-    """How far the fitted model misses each reading, and a refit that has not seen it.
-
-    Parameters
-    ----------
-    summary : Summary
-
-    Returns
-    -------
-    Picture
-    """
+    """How far the fitted model misses each reading, and a refit that has not seen it."""
     modes = summary.modes
     residual = np.array([mode.residual_cents for mode in modes])
     low, high = np.array([mode.residual_interval_cents for mode in modes]).T

@@ -25,18 +25,7 @@ _ROW = 0.27
 
 
 def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Picture:
-    """Draw the energy of each mode.
-
-    Parameters
-    ----------
-    summary : Summary or CheckReport
-    found : Identifiability
-        Its shares belong to the summary's modes.
-
-    Returns
-    -------
-    Picture
-    """
+    """The energy of each mode by constant; what was found belongs to the modes of the summary."""
     modes: Sequence[ModeRow | CheckedMode] = summary.modes
     several = len({mode.setup for mode in modes}) > 1
     names = [mode_name(mode.label, short(mode.setup, 14), several=several) for mode in modes]

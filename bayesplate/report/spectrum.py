@@ -12,22 +12,11 @@ _LEAST_SEEN = 0.5
 
 def spectrum_pictures(summary: Summary) -> list[Picture]:
     """One picture per setup with peaks whose label is not sure."""
-    return [spectrum_picture(summary, one) for one in summary.spectra]
+    return [_picture(summary, one) for one in summary.spectra]
 
 
-def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
-    """Measured peaks over predicted modes of a setup.
-
-    Parameters
-    ----------
-    summary : Summary
-    spectrum : Spectrum
-        Of one of its setups.
-
-    Returns
-    -------
-    Picture
-    """
+def _picture(summary: Summary, spectrum: Spectrum) -> Picture:
+    """Measured peaks over predicted modes of a setup."""
     peaks = [peak for peak in summary.peaks if peak.setup == spectrum.setup]
     several = len(summary.spectra) > 1
     figure, (panel,) = stacked([2.6], left=0.2, right=0.2, bottom=0.4, top=0.1)

@@ -12,7 +12,6 @@ from diagnoses import DIAGNOSES
 from made_isotropic import steel
 from made_reports import fitted
 from made_summaries import spread
-from payloads import PAYLOADS
 
 from bayesplate.estimates.sheet import sheet
 from bayesplate.frequencies.system import system_of
@@ -23,10 +22,11 @@ from bayesplate.report.chladni import chladni_sheet
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.content import inputs_table
 from bayesplate.report.corner_plot import axis_label
+from bayesplate.report.fitted_modes import modes_pictures
 from bayesplate.report.health import health_picture
 from bayesplate.report.null_control import null_picture
-from bayesplate.report.page import percentiles_pictures, pictures
-from bayesplate.report.percentiles import percentiles_figure
+from bayesplate.report.page import pictures
+from bayesplate.report.percentiles import percentiles_pictures
 from bayesplate.report.priors import Compared, compared
 from bayesplate.report.residuals import predictive_picture
 from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
@@ -188,20 +188,24 @@ def test_a_board_that_is_not_flat_is_drawn_so():
 
 
 def test_a_plate_without_grain_is_drawn_and_told_so():
-    """Board, panels of the constants and printed sheet; the same board with a grain has lines and words of it."""
+    """Board, panels of the constants, fitted modes and printed sheet; with a grain it has lines and words of it."""
     told = {}
     for isotropic in (True, False):
         board = steel(isotropic=isotropic)
         picture = board_picture(board)
         panel = picture.figure.axes[0]
         words = [picture.alt, picture.caption, modulus_title("E_x", isotropic=isotropic)]
-        values = {**board.nominal(), "D_x": 13e3, "D_y": 13e3, "D_s": 18e3}
+        constants = {"D_x": np.float64(13e3), "D_y": np.float64(13e3), "D_s": np.float64(18e3)}
+        values = {**board.nominal(), **constants}
+        posed, draws = Problem.from_card(board).posed, SimpleNamespace(rigidities=constants, inputs={})
+        (modes,) = modes_pictures(SimpleNamespace(problem=posed), draws, SimpleNamespace(modes=()))
+        words.append(modes.caption)
         drawn = chladni_sheet(sheet(board, system_of(board, board.setups[0]), values, "as given")).texts
         words += [text.get_text() for text in (*panel.texts, *drawn)]
         told[isotropic] = sum("grain" in text for text in words), len(panel.lines)
 
     assert told[True][0] == 0
-    assert told[False][0] >= 5
+    assert told[False][0] >= 6
     assert told[False][1] > told[True][1], "the lines of the grain"
 
 
@@ -371,26 +375,6 @@ def test_colours_differ_in_grey():
     for one, other in ((BLUE, ORANGE), (BLUE, SKY), (ORANGE, GREEN), (BLUE, GREEN)):
         assert abs(luminance(one) - luminance(other)) > 0.08
     assert luminance(VERMILLION) < luminance(ORANGE)
-
-
-@pytest.fixture(scope="module")
-def percentile(clamped):
-    from bayesplate.estimates.paper import paper_system
-    from bayesplate.estimates.percentile import percentile_estimate
-
-    problem = clamped.inference.problem
-    return percentile_estimate(paper_system(problem.board, problem.estimate, compared=False))
-
-
-@pytest.mark.parametrize("payload", PAYLOADS, ids=range(len(PAYLOADS)))
-def test_any_title_can_be_drawn(clamped, percentile, payload):
-    """No mathematics, no warning for a sign that the font lacks: a warning is an error here."""
-    figure = percentiles_figure(payload, percentile, 6, clamped.draws.moduli)
-    for axes in figure.axes:
-        axes.set_visible(False)  # what is drawn is the title
-    figure.draw_without_rendering()
-
-    assert figure.get_suptitle() == drawable(payload)
 
 
 def test_signs_that_the_font_lacks_are_shown_as_such():
