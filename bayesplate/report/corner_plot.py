@@ -31,6 +31,8 @@ MOST = 6
 
 _HELD = (0.5, 0.9)
 _LEFT, _BOTTOM, _TOP, _RIGHT, _GAP = 0.72, 0.72, 0.08, 0.12, 0.07
+_INNER = np.array([[0.92, 0.08], [0.08, 0.92]])
+"""Where a panel has ticks, in its ends: no label runs into one of the next panel."""
 _STRONG = 0.5
 _CHARACTERS_AN_INCH = 17
 _BRIEF = {
@@ -63,37 +65,41 @@ def corner_figure(
     matplotlib.figure.Figure
         No state of pyplot is touched.
     """
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     marks = [(marked or {}).get(name) for name in columns]
+    ends = [
+        limits(values, () if mark is None else [mark]) for values, mark in zip(columns.values(), marks, strict=True)
+    ]
     side = panel_side(len(columns))
     width = _LEFT + len(columns) * (side + _GAP) - _GAP + _RIGHT
     height = width - _LEFT - _RIGHT + _BOTTOM + _TOP
     figure = Figure(figsize=(width, height))
-    load_corner().corner(
-        np.column_stack([np.ravel(values) for values in columns.values()]),
-        fig=figure,
-        labels=list(labels or columns),
-        label_kwargs={"fontsize": SMALL - 1},
-        labelpad=0.42 / side - 0.3,  # of corner's own 0.3 sides
-        range=[
-            limits(values, () if mark is None else [mark]) for values, mark in zip(columns.values(), marks, strict=True)
-        ],
-        bins=40,
-        smooth=1.6,
-        levels=_HELD,
-        color=POSTERIOR,
-        fill_contours=True,
-        no_fill_contours=True,
-        plot_datapoints=False,
-        plot_density=False,
-        contour_kwargs={"colors": BLACK, "linewidths": 0.7},
-        hist_kwargs={"histtype": "stepfilled", "alpha": 0.4},
-        truths=marks if len(marks) > 1 and any(marks) else None,
-        truth_color=ORANGE,
-        max_n_ticks=int(np.clip(4 * side, 2, 5)),
-        quiet=True,
-    )
+    corner = load_corner()
+    with rc_context({"axes.formatter.useoffset": False}):
+        corner.corner(
+            np.column_stack([np.ravel(values) for values in columns.values()]),
+            fig=figure,
+            labels=list(labels or columns),
+            label_kwargs={"fontsize": SMALL - 1},
+            labelpad=0.42 / side - 0.3,  # of corner's own 0.3 sides
+            range=ends,
+            bins=40,
+            smooth=1.6,
+            levels=_HELD,
+            color=POSTERIOR,
+            fill_contours=True,
+            no_fill_contours=True,
+            plot_datapoints=False,
+            plot_density=False,
+            contour_kwargs={"colors": BLACK, "linewidths": 0.7},
+            hist_kwargs={"histtype": "stepfilled", "alpha": 0.4},
+            truths=marks if len(marks) > 1 else None,
+            truth_color=ORANGE,
+            max_n_ticks=int(np.clip(4 * side, 3, 5)),
+            quiet=True,
+        )
     figure.subplots_adjust(
         left=_LEFT / width, right=1 - _RIGHT / width, bottom=_BOTTOM / height, top=1 - _TOP / height,
         wspace=_GAP / side, hspace=_GAP / side,
@@ -101,6 +107,10 @@ def corner_figure(
     for panel in figure.axes:
         panel.spines[["top", "right"]].set_visible(False)
         panel.tick_params(labelsize=SMALL - 1.5, labelrotation=45, length=3)
+        for axis in (panel.xaxis, panel.yaxis):
+            low, high = np.sort(axis.get_view_interval()) @ _INNER
+            ticks = axis.get_major_locator().tick_values(low, high)
+            axis.set_ticks([tick for tick in ticks if low <= tick <= high])
     if len(marks) == 1 and marks[0] is not None:  # which corner marks in pairs only
         figure.axes[0].axvline(marks[0], color=ORANGE)
     return figure
@@ -117,9 +127,7 @@ def write_corner_plot(
 def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
     """The constants, the noise and the inputs that matter most against each other."""
     columns = chosen(problem, draws)
-    strong = _strong(columns)
-    told = _told(strong) if strong else "No pair hangs together strongly."
-    alt = f"Draws in pairs of {', '.join(name.partition(',')[0] for name in columns)}. {told}"
+    alt = f"Draws in pairs of {', '.join(name.partition(',')[0] for name in columns)}. {_correlated(columns)}"
     caption = (
         "Each square shows two quantities at once; the lines hold half and nine tenths of the probability. A slanted "
         "shape means that an error in one would be made up for by the other."
@@ -189,17 +197,10 @@ def words_and_factor(name: str, board: Board) -> tuple[str, float]:
     return f"{words}, {unit}" if unit else words, factor
 
 
-def _strong(columns: dict[str, Floats]) -> list[tuple[str, str, float]]:
-    """Pairs whose correlation is strong."""
+def _correlated(columns: Mapping[str, Floats]) -> str:
+    """The pairs whose correlation is strong, in words."""
     names = [name.partition(",")[0] for name in columns]
     matrix = np.corrcoef([values.ravel() for values in columns.values()])
-    return [
-        (names[j], names[i], float(matrix[i, j]))
-        for i in range(len(names))
-        for j in range(i)
-        if abs(matrix[i, j]) > _STRONG
-    ]
-
-
-def _told(pairs: list[tuple[str, str, float]]) -> str:
-    return "Correlated: " + "; ".join(f"{one} with {other} ({value:+.2f})" for one, other, value in pairs) + "."
+    strong = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > _STRONG]
+    told = "; ".join(f"{names[j]} with {names[i]} ({matrix[i, j]:+.2f})" for i, j in strong)
+    return f"Correlated: {told}." if strong else "No pair hangs together strongly."

@@ -78,10 +78,11 @@ def _draw(panel: Axes, name: str, percentile: PercentileEstimate, n_modes: int, 
     mean, sd = percentile.mean[name] * GPA, percentile.sd[name] * GPA
     band = [mean - sd, mean + sd]
     low, high = ends = limits(draws, [*estimates[kept], mean - 2 * sd, mean + 2 * sd], reach=np.inf)
-    for inside, face, label in ((kept, "black", "estimate, kept"), (~kept, "white", "estimate, trimmed")):
+    inside = (low <= estimates) & (estimates <= high)
+    for which, face, label in ((kept, "black", "estimate, kept"), (~kept, "white", "estimate, trimmed")):
         panel.scatter(
-            estimates[inside], sizes[inside], s=18, facecolor=face, edgecolor="black", lw=0.8, zorder=3, label=label,
-            rasterized=len(sizes) > _MANY,
+            estimates[inside & which], sizes[inside & which], s=18, facecolor=face, edgecolor="black", lw=0.8, zorder=3,
+            label=label, clip_on=False, rasterized=len(sizes) > _MANY,
         )  # fmt: skip
     if np.isfinite(band).all():
         panel.axvspan(*band, color=PAPER, alpha=0.35, lw=0, label="percentile method ± its sd")

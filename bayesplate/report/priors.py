@@ -28,7 +28,7 @@ _LEFT, _TOP, _BOTTOM, _GAP = 0.15, 0.42, 0.12, 0.3
 _N_POINTS = 240
 _MARGIN = 0.6
 _AS_BEFORE, _MOVED = 1.1, 0.25
-_LONGEST = 30
+_LONGEST = 28
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +122,8 @@ def _draw(panel: Axes, one: Compared) -> None:
     panel.set(xlim=ends, ylim=(0, 1.08), yticks=[])
     panel.spines["left"].set_visible(False)
     panel.locator_params(axis="x", nbins=4)
-    title = short(f"{one.name}, {one.unit}" if one.unit else one.name, _LONGEST)
     is_ours = one.name in (*MODULI, *RIGIDITIES)
-    title = in_figure(title) if is_ours else title
+    name = in_figure(one.name) if is_ours else short(one.name, _LONGEST - len(one.unit))
+    title = f"{name}, {one.unit}" if one.unit else name
     panel.set_title(title, fontsize=SMALL, loc="left", weight="bold", pad=12, parse_math=is_ours)
     panel.text(0.0, 1.04, one.told, transform=panel.transAxes, va="bottom", fontsize=SMALL - 0.5)
