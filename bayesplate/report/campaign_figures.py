@@ -13,16 +13,10 @@ from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import shared_name
 from bayesplate.plate.material import MODULI
 from bayesplate.plate.parameter import unit_of_people
+from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREY,
-    LIGHT,
-    ORANGE,
     ROW,
-    SKY,
-    VERMILLION,
     Picture,
     drawable,
     heading,

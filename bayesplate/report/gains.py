@@ -11,21 +11,8 @@ import numpy as np
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
 from bayesplate.plate.material import MODULI
-from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREEN,
-    LIGHT,
-    ORANGE,
-    SKY,
-    SMALL,
-    VERMILLION,
-    Picture,
-    drawable,
-    heading,
-    legend_below,
-    placed,
-)
+from bayesplate.report.colours import BLUE, DARK, GREEN, LIGHT, ORANGE, SKY, VERMILLION
+from bayesplate.report.style import SMALL, Picture, drawable, heading, legend_below, placed
 from bayesplate.report.symbols import in_figure
 
 if TYPE_CHECKING:

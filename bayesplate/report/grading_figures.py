@@ -9,17 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
+from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREEN,
-    GREY,
-    LIGHT,
-    ORANGE,
-    SKY,
     SMALL,
-    VERMILLION,
     Picture,
     drawable,
     heading,

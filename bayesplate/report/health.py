@@ -6,18 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.posterior.inference import Inference
-from bayesplate.report.style import (
-    BLUE,
-    GREEN,
-    LIGHT,
-    ORANGE,
-    SMALL,
-    VERMILLION,
-    Picture,
-    legend_below,
-    limits,
-    stacked,
-)
+from bayesplate.report.colours import BLUE, GREEN, LIGHT, ORANGE, VERMILLION
+from bayesplate.report.style import SMALL, Picture, legend_below, limits, stacked
 from bayesplate.report.symbols import in_figure
 
 _COLOURS = (BLUE, ORANGE, GREEN, VERMILLION)

@@ -9,19 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import cents
-from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREY,
-    LIGHT,
-    ORANGE,
-    SMALL,
-    WORDS,
-    Picture,
-    in_rows,
-    legend_below,
-    short,
-)
+from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE
+from bayesplate.report.style import SMALL, WORDS, Picture, in_rows, legend_below, short
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import noise_cents

@@ -1,4 +1,4 @@
-"""What the figures of a report share: width, colours told apart by every eye and in grey, panels placed in inches."""
+"""What the figures of a report share: width, panels placed in inches, rows with names, humps, whiskers, legends."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayesplate.report.colours import DARK, POSTERIOR
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -31,11 +33,6 @@ _SHOWN = (0.002, 0.998)
 _BINS = 60
 _APART = 0.026
 """Share of the width that two upright names need."""
-
-# Okabe and Ito's colours.
-BLUE, ORANGE, GREEN, VERMILLION, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
-BLACK, DARK, GREY, LIGHT = "#000000", "0.30", "0.55", "0.88"
-POSTERIOR, PAPER, WEIGHTED = BLUE, ORANGE, BLACK
 
 NO_GLYPH = "\N{REPLACEMENT CHARACTER}"
 

@@ -19,6 +19,7 @@ from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
 from bayesplate.report.board import board_picture
 from bayesplate.report.chladni import chladni_sheet
+from bayesplate.report.colours import BLUE, GREEN, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.content import inputs_table
 from bayesplate.report.corner_plot import axis_label
@@ -29,7 +30,7 @@ from bayesplate.report.page import pictures
 from bayesplate.report.percentiles import percentiles_pictures
 from bayesplate.report.priors import Compared, compared
 from bayesplate.report.residuals import predictive_picture
-from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
+from bayesplate.report.style import NO_GLYPH, drawable
 from bayesplate.results.words import MISSING
 from bayesplate.workflow.prepare import prepare
 from bayesplate.workflow.problem import Problem
