@@ -10,7 +10,6 @@
     pick(files)      recordings of hits, taps or sweeps to frequencies
     batch(folder)    many boards to one table, on all cores or on a cluster
     new(path)        a first card, to be completed
-    repeat(summary)  a fit once more, from what its summary.json says
 
 `card` is the name of a shipped board, the path of a card, a `Board` made from numbers, or a `Problem`, which has the
 densities and the frequencies that other samplers ask for; `fit`, `check`, `diagnose` and `plan` take a `Campaign` or
@@ -80,7 +79,6 @@ if TYPE_CHECKING:
     from bayesplate.workflow.pick import PickResult, pick
     from bayesplate.workflow.plan import PlanResult, plan
     from bayesplate.workflow.problem import Problem
-    from bayesplate.workflow.repeat import RepeatResult, repeat
 
 __all__ = [
     "AttachedItem",
@@ -122,7 +120,6 @@ __all__ = [
     "Problem",
     "Quantity",
     "Reading",
-    "RepeatResult",
     "Setup",
     "Summary",
     "batch",
@@ -136,7 +133,6 @@ __all__ = [
     "new",
     "pick",
     "plan",
-    "repeat",
 ]
 
 _HOMES = {
@@ -179,7 +175,6 @@ _HOMES = {
     "Problem": "bayesplate.workflow.problem",
     "Quantity": "bayesplate.quantities",
     "Reading": "bayesplate.plate.measured",
-    "RepeatResult": "bayesplate.workflow.repeat",
     "Setup": "bayesplate.plate.setup",
     "Summary": "bayesplate.results.summary",
     "batch": "bayesplate.workflow.batch",
@@ -192,7 +187,6 @@ _HOMES = {
     "new": "bayesplate.workflow.new",
     "pick": "bayesplate.workflow.pick",
     "plan": "bayesplate.workflow.plan",
-    "repeat": "bayesplate.workflow.repeat",
 }
 """Where each name is defined. `modes` is the folder of that name, which can be called: see `bayesplate.modes`."""
 

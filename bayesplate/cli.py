@@ -15,7 +15,6 @@ from bayesplate.options import (
     mass_kg,
     names,
     places,
-    refuse_beside_repeat,
     refuse_both,
     sand_pictures,
     shared_options,
@@ -70,20 +69,16 @@ def check(card: str, effects: list[str] | None, setup: str | None, as_json: bool
 
 
 @main.command()
-@click.argument("card", required=False)
+@click.argument("card")
 @shared_options(
-    "out", "seed", "effects", "setup", "linear", "exact", "robust", "report", "force", "resume", "repeat", "json",
-    "quiet", "debug",
+    "out", "seed", "effects", "setup", "linear", "exact", "robust", "report", "force", "resume", "json", "quiet",
+    "debug",
 )  # fmt: skip
-@click.pass_context
 def fit(
-    context: click.Context,
-    /,
-    card: str | None,
+    card: str,
     out: str | None,
     linear: bool,
     exact: bool,
-    repeat: str | None,
     as_json: bool,
     quiet: bool,
     debug: bool,
@@ -95,20 +90,22 @@ def fit(
     """
     refuse_both(asked["force"], asked["resume"], "--force starts anew and --resume continues")
     refuse_both(linear, exact, "--linear and --exact force different laws")
-    refuse_beside_repeat(context, card, repeat)
     with reporting(as_json=as_json, debug=debug):
         with progress_line(shown=not quiet and not as_json) as tell:
-            from bayesplate.workflow.repeat import fit_or_repeat as run
+            from bayesplate.workflow.fit import fit as run
+            from bayesplate.workflow.prepare import default_folder
 
-            law = "linear" if linear else "exact" if exact else None
-            result, told = run(card, repeat, out=out, law=law, progress=tell, **asked)
+            folder = default_folder(card) if out is None else out
+            result = run(
+                card, out=folder, law="linear" if linear else "exact" if exact else None, progress=tell, **asked
+            )
         if as_json:
             print_json(result.summary)
         elif not quiet:
             from bayesplate.workflow.shown import show_fit
 
             print_shown(show_fit(result.summary))
-            say(f"{told}written to {result.folder}")
+            say(f"written to {result.folder}")
 
 
 @main.command()

@@ -39,9 +39,6 @@ def shared_options(*wanted: str) -> Callable[[Callable[..., None]], Callable[...
             "--no-report", "report", is_flag=True, default=True, flag_value=False, help="Write no page and no figures."
         ),
         "resume": click.option("--resume", is_flag=True, help="Continue an interrupted run."),
-        "repeat": click.option(
-            "--repeat", type=PATH, metavar="SUMMARY", help="Fit again what this summary.json is of."
-        ),
         "json": click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables."),
         "quiet": click.option("--quiet", is_flag=True, help="Print nothing but errors."),
         "debug": click.option("--debug", is_flag=True, help="Show the traceback of an error."),
@@ -58,22 +55,6 @@ def shared_options(*wanted: str) -> Callable[[Callable[..., None]], Callable[...
 def refuse_both(one: bool, other: bool, why: str) -> None:
     if one and other:
         raise click.UsageError(f"{why}: give one of them.")
-
-
-STATED = ("seed", "effects", "setup", "linear", "exact", "robust")
-"""What a summary that is repeated states itself."""
-
-
-def refuse_beside_repeat(context: click.Context, card: str | None, summary: str | None) -> None:
-    """A fit has a card or repeats a summary, which states the rest."""
-    if summary is None:
-        if card is None:
-            raise click.UsageError("Missing argument 'CARD'; only --repeat SUMMARY does without.")
-        return
-    given = [name for name in STATED if context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE]
-    if given:
-        told = ", ".join(f"--{name}" for name in given)
-        raise click.UsageError(f"--repeat takes {told} from the summary: leave it out.")
 
 
 def names(context: click.Context, option: click.Parameter, effects: str | None) -> list[str] | None:

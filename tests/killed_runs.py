@@ -29,12 +29,14 @@ SAMPLING = ("compare", "fitting", "campaign_fit")
 
 
 def quickly() -> None:
-    """A sampler whose first judgement passes, and a search among two candidates: for tests of files."""
+    """A sampler whose first judgement passes and that saves every chunk, and a search among two candidates."""
     from bayesplate.diagnosis.evidence.joint import full_search
+    from bayesplate.posterior import checkpoint
     from bayesplate.posterior.convergence import Gate
     from bayesplate.posterior.sampling import SamplerSettings
     from bayesplate.workflow import diagnose
 
+    checkpoint.EVERY_SECONDS = checkpoint._LEAST_PAUSE = 0.0
     loose = Gate(rhat_max=10.0, tau_count_min=1.0, ess_min=1.0)
     for name in SAMPLING:
         workflow = import_module(f"bayesplate.workflow.{name}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from bayesplate.posterior.certificate import Certificate
 from bayesplate.results.contract import Elastic, Rigidity, Spread
 from bayesplate.results.joint import JOINT, Joint
 from bayesplate.results.modes import ModeRow, Prediction, over
@@ -17,7 +16,6 @@ from bayesplate.results.summary import (
     Percentile,
     PercentileValue,
     PointEstimate,
-    Request,
     SamplerHealth,
     Summary,
 )
@@ -107,8 +105,6 @@ SUMMARY = Summary(
     ),
     error=ErrorFigures(7.5, 12.25, 0.5, 0.125, None, None),
     sampler=SamplerHealth(4, 32, 2000, 30.5, 1.0025, 6000.0, 0.5),
-    certificate=Certificate(True, True, "", 20, "median of ln D_y", 1.5, 3000.0),
     identifiability=("the modes tell E_y least well",),
     warnings=("made by hand",),
-    request=Request('format = 1\nname = "made"\n', None, {"prior weakly-informative": "0" * 64}),
 )

@@ -8,7 +8,8 @@ import numpy as np
 
 from bayesplate.campaigns.learning import Learnt
 from bayesplate.campaigns.together import values_of
-from bayesplate.posterior.draws import MOST_DRAWS_A_CHAIN, thin_walker_major
+from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
+from bayesplate.posterior.thinning import thin_walker_major
 from bayesplate.results.archive import Archive
 
 

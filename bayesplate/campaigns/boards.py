@@ -18,6 +18,7 @@ from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS, effective_draws
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
+from bayesplate.posterior.statistics import resampled
 from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surrogate
 
 Floats = NDArray[np.float64]
@@ -249,7 +250,7 @@ class Member:
         own = self.given.own_columns
         _, covariance = moments(np.column_stack([drawn.theta[:, own], drawn.z]), drawn.weights)
         slopes = _slopes(covariance, z.shape[1])[: own.size]
-        picked = resampled(drawn.weights, len(z), rng)
+        picked = rng.permutation(resampled(drawn.weights, len(z), rng))
         theta = self.given.theta(drawn.theta[picked][:, own] + (z - drawn.z[picked]) @ slopes.T, z)
         posterior = self.given.posterior
         every = tuple(posterior.every_log_frequency(theta))
@@ -260,7 +261,7 @@ class Member:
     def _log_evidence(self, log_reference: LogDensity, theta: Floats, z: Floats, weights: Floats, seed: int) -> float:
         """ln of the integral of r(z) L(z), from weighted draws of that density."""
         rng = np.random.default_rng([seed, _LINE, 1])
-        picked = resampled(weights, len(z), rng)
+        picked = rng.permutation(resampled(weights, len(z), rng))
         draws = np.column_stack([theta[:, self.given.own_columns], z])[picked]
         return bridge_sampling(_joint(self.given, log_reference), draws, rng)
 
@@ -268,13 +269,12 @@ class Member:
         self, drawn: Sample, weights: Floats, rng: np.random.Generator, seed: int
     ) -> tuple[Inference, Draws]:
         """An inference that has the weighted draws of a sample and no others, and the draws by name."""
-        picked = resampled(weights, len(self.draws.flat), rng)
+        picked = rng.permutation(resampled(weights, len(self.draws.flat), rng))
         theta, every = drawn.theta[picked], [each[picked] for each in drawn.every]
-        n_chains, before = len(self.draws.theta), self.inference.convergence
-        as_chains = theta.reshape(n_chains, -1, 1, theta.shape[-1])
-        problem, effective = self.inference.problem, drawn.effective(weights)
+        before, problem, effective = self.inference.convergence, self.inference.problem, drawn.effective(weights)
         log_prob = problem.posterior.log_prior(theta)
         log_prob += problem.posterior.log_likelihood_of(every, theta).sum(axis=1)
+        as_chains = theta.reshape(self.draws.theta.shape)
         convergence = replace(
             before,
             tau=np.ones_like(before.tau),
@@ -283,9 +283,10 @@ class Member:
             ess_min=effective,
             n_kept_steps=as_chains.shape[1],
         )
-        chains = Chains(as_chains, log_prob.reshape(n_chains, -1, 1), 0)
-        inference = Inference(problem, chains, convergence, self.inference.surrogate)
-        return inference, named_draws(inference, seed, every)
+        by_chain = log_prob.reshape(as_chains.shape[:2])
+        chains = Chains(as_chains[:, :, None], by_chain[:, :, None], 0)
+        inference = Inference(problem, chains, convergence, as_chains, by_chain, tuple(every), self.inference.surrogate)
+        return inference, named_draws(inference, seed)
 
 
 def _joint(given: GivenShared, log_reference: LogDensity) -> LogDensity:
@@ -299,13 +300,6 @@ def _joint(given: GivenShared, log_reference: LogDensity) -> LogDensity:
         return total
 
     return log_density
-
-
-def resampled(weights: Floats, n: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Indices drawn by weight with the least scatter (systematic), in random order: (n,) array."""
-    places = (np.arange(n) + rng.random()) / n
-    picked = np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)
-    return np.asarray(rng.permutation(picked), dtype=np.intp)
 
 
 def _slopes(covariance: Floats, n_last: int) -> Floats:

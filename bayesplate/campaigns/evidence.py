@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.terms import log_sum
-from bayesplate.posterior.proposals import Proposal
+from bayesplate.posterior.mixture import Mixture
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def bridge_sampling(
     float
     """
     half = len(draws) // 2
-    mixture = Proposal.fitted(draws[:half])
+    mixture = Mixture.fitted(draws[:half])
     there = draws[half:][:n_points]
     beside = mixture.points(n_points, rng)
     at_draws = log_density(there) - mixture.log_density(there)

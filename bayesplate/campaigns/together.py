@@ -15,7 +15,7 @@ from bayesplate.campaigns.scatter import Scatter, ScatteredLikelihood, expected_
 from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.posterior.convergence import Convergence
-from bayesplate.posterior.proposals import Proposal
+from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.reweighting import effective_draws
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
 
@@ -162,8 +162,8 @@ class Together:
             mirrored = draws.copy()
             mirrored[:, i] = 2.0 * bounds[i] - mirrored[:, i]
             draws = np.concatenate([draws, mirrored])
-        mixture = Proposal.fitted(np.random.default_rng(_LINE).permutation(draws))
-        whole = Proposal.one_fitted(draws)
+        mixture = Mixture.fitted(np.random.default_rng(_LINE).permutation(draws))
+        whole = Mixture.one_fitted(draws)
         reach = whole.squared_distances(draws).max()
 
         def log_density(z: Floats) -> Floats:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,26 +33,6 @@ class NamedCards:
     prior: PriorCard | None
     tables: Mapping[str, CoefficientCard]
     faults: tuple[Fault, ...]
-
-    @property
-    def digests(self) -> dict[str, str]:
-        """SHA-256 of the numbers of each card, by kind and name: titles and sources may change."""
-        found = {} if self.prior is None else {f"prior {self.prior.name}": _digest(_prior_numbers(self.prior))}
-        return found | {f"coefficients {one.name}": _digest(_table_numbers(one)) for one in self.tables.values()}
-
-
-def _digest(numbers: list[str]) -> str:
-    return hashlib.sha256("\n".join(numbers).encode()).hexdigest()
-
-
-def _prior_numbers(prior: PriorCard) -> list[str]:
-    others = {"noise": prior.noise_percent, "poisson_xy": prior.poisson_xy, "density": prior.density}
-    return [f"{name} {one!r}" for name, one in {**prior.constants, **others}.items()]
-
-
-def _table_numbers(table: CoefficientCard) -> list[str]:
-    first = f"{table.aspect_ratio!r} {table.edges!r} {table.first_label}"
-    return [first, *(f"{label} {row!r}" for label, row in table.table.items())]
 
 
 def load_named(

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayesplate.errors import Fault, InputError, plain
+from bayesplate.files import whole_file
 from bayesplate.quantities import Kind, Quantity
 
 if TYPE_CHECKING:
@@ -156,13 +157,9 @@ def write_card(path: Any, name: str, content: str, *, force: bool) -> None:
         raise InputError(Fault(shown, f"{name}.toml, the name of the card", plain(path.name)))
     if os.path.exists(path) and not force:
         raise InputError(Fault(shown, "a new file", "one that exists", "force=True replaces it"))
-    partial = path.with_name(path.name + ".partial")
     try:
-        try:
-            partial.write_text(content, encoding="utf-8", newline="\n")
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
+        with whole_file(path) as stream:
+            stream.write(content.encode("utf-8"))
     except OSError as error:
         raise InputError(Fault(shown, "a place for the card", error.strerror or str(error))) from None
 

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+
+from bayesplate.posterior.statistics import effective_sizes, rhat
+from bayesplate.posterior.thinning import thinning, walker_major
 
 FloatArray = NDArray[np.float64]
 
-_WINDOW = 5.0  # autocorrelation times summed over, Sokal's rule
 _TARGET_TAUS = 100  # what a suggestion aims at: twice the least, so that the next run does not end just short
 
 
@@ -59,9 +59,9 @@ class Convergence:
     tau : (n_dim,) array, steps
         Integrated autocorrelation time, the largest of the ensembles.
     rhat : (n_dim,) array
-        Split R-hat of the ensembles.
+        Rank-normalised split R-hat of the ensembles, by ArviZ.
     ess : (n_dim,) array
-        Effective sample size, summed over the ensembles.
+        Effective sample size, the smaller of that of the bulk and of the tails.
     tau_max, rhat_max, ess_min : float
         The worst of each.
     acceptance : float
@@ -91,20 +91,16 @@ class Convergence:
 
 
 def burn_in_steps(n_steps: int) -> int:
-    """Return how many of `n_steps` are discarded: a sixth, and at least 100 (or half of a very short run).
+    """Return how many of `n_steps` are discarded: a sixth, and at least 50 (or half of a very short run).
 
     A sixth depends on the count alone, yet it is long enough whenever the gate passes: if the other five sixths hold
-    50 autocorrelation times, the discarded one holds 10, twice what is asked for, and the start three times too wide
-    is forgotten.
+    50 autocorrelation times, the discarded one holds 10, twice what is asked for.
     """
-    return min(max(100, -(-n_steps // 6)), n_steps // 2)
+    return min(max(50, -(-n_steps // 6)), n_steps // 2)
 
 
-def autocorrelation_time(draws: FloatArray) -> FloatArray:
-    """Return the integrated autocorrelation time of one ensemble.
-
-    The autocovariance is averaged over the walkers, about the mean of the whole ensemble (not each walker's own, so
-    that a walker which stays apart lengthens the time), and summed up to five autocorrelation times.
+def autocorrelation_times(draws: FloatArray) -> FloatArray:
+    """Integrated autocorrelation time of each parameter in one ensemble, by emcee.
 
     Parameters
     ----------
@@ -114,102 +110,21 @@ def autocorrelation_time(draws: FloatArray) -> FloatArray:
     Returns
     -------
     (n_dim,) array, steps
-        Infinite where a parameter never moves.
-
-    References
-    ----------
-    A. Sokal, Monte Carlo Methods in Statistical Mechanics (1996); J. Goodman and J. Weare, Ensemble samplers with
-    affine invariance (2010).
+        At least 1, for less would claim more than independent draws; infinite where a walker never moves.
     """
-    return np.array([_time_of(draws[:, :, dim]) for dim in range(draws.shape[2])])
+    from emcee.autocorr import integrated_time
+
+    with np.errstate(invalid="ignore"):
+        times = np.asarray(integrated_time(draws, tol=0, quiet=True))
+    return np.where(np.isnan(times), np.inf, np.maximum(times, 1.0))
 
 
-def _time_of(series: FloatArray) -> float:
-    """Integrated autocorrelation time of one parameter in one ensemble, from its (n_steps, n_walkers) draws."""
-    n_steps = len(series)
-    series = np.ascontiguousarray(series.T)
-    if np.ptp(series) == 0.0:
-        return float(np.inf)
-    length = next_fast_len(2 * n_steps, real=True)  # padded, or the far end would wrap round
-    spectrum = rfft(series - series.mean(), n=length, axis=-1)
-    autocovariance = irfft((spectrum.real**2 + spectrum.imag**2).sum(axis=0), n=length)[:n_steps]
-    sums = 2.0 * np.cumsum(autocovariance / autocovariance[0]) - 1.0
-    outside = np.flatnonzero(np.arange(n_steps) >= _WINDOW * sums)
-    return float(max(sums[outside[0] if outside.size else -1], 1.0))  # below 1 would claim more than independent draws
+def length_in_taus(draws: FloatArray) -> float:
+    """Length of (n_ensembles, n_steps, n_walkers, n_dim) draws in autocorrelation times of the slowest parameter.
 
-
-@dataclass
-class Length:
-    """How long growing ensembles are in autocorrelation times, looked at as far as it takes to say: not long enough.
-
-    The parameter that was too slow last time is looked at first, for mostly it is still.
-
-    Attributes
-    ----------
-    slow : (int, int)
-        Ensemble and parameter of the last one that was too slow.
+    By every fourth walker, for a quick look.
     """
-
-    slow: tuple[int, int] = (0, 0)
-
-    def in_taus(self, parts: Sequence[FloatArray], wanted: float) -> float:
-        """Return the length in autocorrelation times of a parameter that is too slow; of the slowest if none is.
-
-        Parameters
-        ----------
-        parts : sequence of (n_ensembles, n_steps, n_walkers, n_dim) arrays
-            Draws after burn-in, one part behind the other.
-        wanted : float
-            Autocorrelation times that are long enough.
-        """
-        n_ensembles, _, _, n_dim = parts[0].shape
-        shortest = np.inf
-        for ensemble, dim in (self.slow, *product(range(n_ensembles), range(n_dim))):
-            series = np.concatenate([part[ensemble, :, :, dim] for part in parts])
-            shortest = min(shortest, len(series) / _time_of(series))
-            if shortest < wanted:
-                self.slow = ensemble, dim
-                break
-        return float(shortest)
-
-
-def split_rhat(draws: FloatArray) -> FloatArray:
-    """Return the split R-hat with one chain an ensemble, the larger of that of the draws and of their spread.
-
-    Each ensemble is cut in two halves of time and each half, all its walkers together, is one chain.  The spread is
-    the distance from the common median: it tells ensembles that agree in the mean but not in the width.
-
-    Parameters
-    ----------
-    draws : (n_ensembles, n_steps, n_walkers, n_dim) array
-        After burn-in.
-
-    Returns
-    -------
-    (n_dim,) array
-        1 for perfect agreement; infinite where a parameter never moves within the ensembles.
-
-    References
-    ----------
-    A. Gelman et al., Bayesian Data Analysis (2013), 11.4; A. Vehtari et al., Rank-normalization, folding, and
-    localization (2021), doi:10.1214/20-BA1221.
-    """
-    n_ensembles, n_steps, n_walkers, n_dim = draws.shape
-    half = n_steps // 2
-    chains = draws[:, : 2 * half].reshape(2 * n_ensembles, half * n_walkers, n_dim)
-    folded = np.abs(chains - np.median(chains, axis=(0, 1)))
-    return np.maximum(_rhat(chains), _rhat(folded))
-
-
-def _rhat(chains: FloatArray) -> FloatArray:
-    """R-hat of (n_chains, n_draws, n_dim) chains."""
-    n_draws = chains.shape[1]
-    within = chains.var(axis=1, ddof=1).mean(axis=0)
-    between = chains.mean(axis=1).var(axis=0, ddof=1)
-    moving = within > 0.0
-    ratio = np.divide(between, within, out=np.full_like(within, np.inf), where=moving)
-    rhat: FloatArray = np.sqrt((n_draws - 1) / n_draws + ratio)
-    return rhat
+    return float(draws.shape[1] / max(autocorrelation_times(one[:, ::4]).max() for one in draws))
 
 
 def acceptance_by_walker(draws: FloatArray) -> FloatArray:
@@ -247,28 +162,28 @@ def assess(draws: FloatArray, gate: Gate | None = None, *, names: Sequence[str] 
     Convergence
     """
     gate = Gate() if gate is None else gate
-    _, n_steps, n_walkers, n_dim = draws.shape
-    taus = np.array([autocorrelation_time(ensemble) for ensemble in draws])
-    tau = taus.max(axis=0)
-    rhat = split_rhat(draws)
-    ess = (n_steps * n_walkers / taus).sum(axis=0)
+    _, n_steps, _, n_dim = draws.shape
+    tau = np.array([autocorrelation_times(ensemble) for ensemble in draws]).max(axis=0)
+    thinned = draws[:, :: thinning(float(tau.max()))]
+    largest = rhat(thinned.reshape(len(draws), -1, n_dim))
+    never_moves = np.any(np.ptp(draws, axis=(1, 2)) == 0.0, axis=0)
+    smallest = np.where(never_moves, 0.0, effective_sizes(walker_major(thinned)))
     by_walker = acceptance_by_walker(draws)
     needed = int(np.ceil(_TARGET_TAUS * tau.max())) if np.isfinite(tau.max()) else 2 * n_steps
     unjudged = Convergence(
         passed=False,
         reasons=(),
         tau=tau,
-        rhat=rhat,
-        ess=ess,
+        rhat=largest,
+        ess=smallest,
         tau_max=float(tau.max()),
-        rhat_max=float(rhat.max()),
-        ess_min=float(ess.min()),
+        rhat_max=float(largest.max()),
+        ess_min=float(smallest.min()),
         acceptance=float(by_walker.mean()),
         n_kept_steps=n_steps,
         suggested_steps=max(n_steps, needed),
     )
     names = tuple(names) or tuple(f"parameter {dim + 1}" for dim in range(n_dim))
-    never_moves = np.any(np.ptp(draws, axis=(1, 2)) == 0.0, axis=0)
     reasons = (*_faults_of_parameters(unjudged, gate, names, never_moves), *_faults_of_walkers(by_walker, gate))
     return replace(unjudged, passed=not reasons, reasons=reasons)
 

@@ -14,7 +14,6 @@ from bayesplate.posterior.inference import Inference, PosedProblem, columns_of_e
 
 Floats = NDArray[np.float64]
 
-MOST_DRAWS_A_CHAIN = 4000
 MOST_DRAWS_OF_LABELS = 2000
 """From which the probabilities of labels are taken."""
 _LINE_OF_PREDICTIVE_DRAWS = 1
@@ -61,7 +60,7 @@ class Draws:
 
 
 def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[Floats] | None = None) -> Draws:
-    """Thin the chains of an inference and name what they mean.
+    """Name what the draws of an inference mean.
 
     Parameters
     ----------
@@ -75,20 +74,16 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
     -------
     Draws
     """
-    problem, chains = inference.problem, inference.chains
-    tau = inference.convergence.tau_max
-    theta = thin_walker_major(chains.draws, chains.burn_in, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
-    log_posterior = thin_walker_major(chains.log_prob, chains.burn_in, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
-    shape = theta.shape[:2]
-    flat = theta.reshape(-1, theta.shape[-1])
+    problem = inference.problem
+    shape = inference.theta.shape[:2]
+    flat = inference.theta.reshape(-1, inference.theta.shape[-1])
     posterior = problem.posterior
     values = problem.parameters.values(flat)
     constants = moduli(values["D_x"], values["D_y"], values["D_s"], values["thickness"], values["poisson_xy"])
     noise = np.exp(problem.parameters.log_noise(flat))
-    if every_log_frequency is None and chains.blobs is not None:
-        found = thin_walker_major(chains.blobs, 0, tau, n_draws_max=MOST_DRAWS_A_CHAIN)
-        every_log_frequency = posterior.by_setup(found.reshape(len(flat), -1))
-    elif every_log_frequency is None:
+    if every_log_frequency is None:
+        every_log_frequency = inference.every_log_frequency
+    if every_log_frequency is None:
         distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
         every_log_frequency = [part[which.ravel()] for part in posterior.every_log_frequency(distinct)]
     by_setup = list(every_log_frequency)
@@ -104,8 +99,8 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
 
     derived = derived_quantities(constants, density(values))
     return Draws(
-        theta=theta,
-        log_posterior=log_posterior,
+        theta=inference.theta,
+        log_posterior=inference.log_posterior,
         rigidities={name: shaped(values[name]) for name in RIGIDITIES},
         moduli={name: shaped(array) for name, array in zip(MODULI, constants, strict=True)},
         inputs={name: shaped(values[name]) for name in problem.parameters.inputs},
@@ -142,35 +137,3 @@ def posterior_mean_values(problem: PosedProblem, draws: Draws) -> dict[str, Floa
     """Constants and inputs at their posterior means."""
     means = {name: np.asarray(v.mean()) for name, v in {**draws.rigidities, **draws.inputs}.items()}
     return {**problem.board.nominal(), **means}
-
-
-def thin_walker_major(
-    draws: NDArray[np.float64], burn_in: int, tau_max: float, *, n_draws_max: int | None = None
-) -> NDArray[np.float64]:
-    """Thin the draws to half an autocorrelation time and order them for ArviZ: chain = ensemble.
-
-    Within a chain come all steps of the first walker, then all of the second, and so on.  In this order neighbours are
-    steps of one walker, so that ArviZ's effective sizes see the true autocorrelation; step by step across walkers it
-    would take the walkers of a step for consecutive draws.
-
-    Parameters
-    ----------
-    draws : (n_ensembles, n_steps, n_walkers, ...) array
-        Draws, or anything else with these first axes, as the log posterior.
-    burn_in : int
-        Steps to drop first.
-    tau_max : float, steps
-        Largest autocorrelation time.
-    n_draws_max : int, optional
-        Thin further until a chain holds at most so many draws (but at least one per walker).
-
-    Returns
-    -------
-    (n_ensembles, n_draws, ...) array
-    """
-    n_ensembles, n_steps, n_walkers = draws.shape[:3]
-    every = max(1, int(tau_max / 2.0)) if np.isfinite(tau_max) else 1
-    if n_draws_max is not None:
-        every = max(every, -(-(n_steps - burn_in) // max(1, n_draws_max // n_walkers)))
-    walkers_first = np.swapaxes(draws[:, burn_in::every], 1, 2)
-    return walkers_first.reshape(n_ensembles, -1, *draws.shape[3:])

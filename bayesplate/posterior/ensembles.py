@@ -1,139 +1,174 @@
-"""Several ensembles in lock-step: one emcee sampler for the walkers of all, each ensemble as if it were alone.
-
-Arrays here are (n_ensembles, n_walkers, ...); emcee sees the walkers of all ensembles in one row. Its own check that
-walkers span the space is left out: the starts were made positive definite on purpose, and the check depends on the
-units of the parameters.
-"""
+"""Walkers: ensembles of emcee with random streams of their own, and the pilot that shows them where to begin."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from itertools import cycle, islice
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.posterior.checkpoint import Chunk
-from bayesplate.posterior.moves import ORDERS, CorrectedSteps, Generators, Steps, order_for, walk_order
-from bayesplate.posterior.proposals import Proposal
-from bayesplate.posterior.starting import Evaluate, LogPosterior
+from bayesplate.posterior.checkpoint import Snapshot
+from bayesplate.posterior.mixture import Mixture
+from bayesplate.posterior.moves import moves
+from bayesplate.posterior.starts import LogDensity, finite_starts
+from bayesplate.streams import stream
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
-_N_ARCHIVED = 128
-
-
-@dataclass(frozen=True, eq=False)
-class Learnt:
-    """What the next steps propose from.
-
-    Attributes
-    ----------
-    proposal : Proposal
-        Common to all ensembles.
-    archives : (n_ensembles, n_archived, n_dim) array
-        Each ensemble's own.
-    order : str
-        Of independent and differential steps.
-    """
-
-    proposal: Proposal
-    archives: FloatArray
-    order: str = ORDERS[0][1]
-
-    @classmethod
-    def of(
-        cls, lesson: Sequence[Chunk], centre: FloatArray, covariance: FloatArray, rngs: Generators, is_over: bool
-    ) -> Learnt:
-        """From some chunks of the warm-up.
-
-        Before the first chunk there is the estimate alone; on the way each chunk teaches the next; those at the end of
-        the warm-up, once it is over, teach all that is kept.
-        """
-        if not lesson:
-            proposal = Proposal.with_covariance(centre, covariance)
-            return cls(proposal, np.stack([proposal.points(_N_ARCHIVED, rng) for rng in rngs]))
-        draws = np.concatenate([chunk.draws for chunk in lesson], axis=1)
-        log_prob = np.concatenate([chunk.log_prob for chunk in lesson], axis=1)
-        proposal = Proposal.fitted(draws) if is_over else Proposal.one_fitted(draws)
-        flat = draws.reshape(len(draws), -1, draws.shape[-1])
-        archives = flat[:, :: max(1, flat.shape[1] // _N_ARCHIVED)]
-        return cls(proposal, archives, order_for((log_prob - proposal.log_density(draws)).ravel()))
+_PILOT_STEPS = 40
+FEWEST_ROUNDS, _MOST_ROUNDS = 3, 24
+"""Of a pilot. One that teaches proposals makes as many as there are parameters: the longer, the better they are."""
+_RISE = 1.0
+"""Of the mean log density from one round of the pilot to the next, from which on it is still on its way."""
 
 
-def stepping(density: LogPosterior, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators) -> Steps:
-    """The steps of a chunk under one density."""
-    order = "".join(islice(cycle(learnt.order), n_steps))
-    return Steps(density, learnt.proposal, learnt.archives, order, n_walkers, rngs)
-
-
-def correcting(
-    surrogate: LogPosterior, evaluate: Evaluate, learnt: Learnt, n_steps: int, n_walkers: int, rngs: Generators
-) -> CorrectedSteps:
-    """The steps of a chunk under a density whose surrogate the walkers walk on."""
-    walk = walk_order(learnt.order, learnt.archives.shape[-1])
-    walks = Steps(surrogate, learnt.proposal, learnt.archives, walk * n_steps, n_walkers, rngs, len(walk))
-    return CorrectedSteps(walks, evaluate, n_steps, rngs)
-
-
-def crossed(evaluate: Evaluate, coords: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Walkers that come from a surrogate, under the density itself; who has none there joins one that has."""
-    flat = coords.reshape(-1, coords.shape[-1])
-    log_prob, blobs = evaluate(flat)
-    lost = np.flatnonzero(log_prob == -np.inf)
-    found = np.flatnonzero(log_prob > -np.inf)
-    if found.size:
-        taken = found[np.arange(lost.size) % found.size]
-        flat, log_prob, blobs = flat.copy(), log_prob.copy(), blobs.copy()
-        flat[lost], log_prob[lost], blobs[lost] = flat[taken], log_prob[taken], blobs[taken]
-    apart = coords.shape[:-1]
-    return flat.reshape(coords.shape), log_prob.reshape(apart), blobs.reshape(*apart, blobs.shape[1])
-
-
-def advance(
-    move: Steps | CorrectedSteps,
-    coords: FloatArray,
-    log_prob: FloatArray,
-    n_steps: int,
-    blobs: FloatArray | None = None,
-) -> Chunk:
-    """Advance all ensembles together.
+class Ensembles:
+    """Walkers of several emcee samplers, each with its own random state.
 
     Parameters
     ----------
-    move : Steps or CorrectedSteps
-        Made for these walkers and so many steps.
-    coords : (n_ensembles, n_walkers, n_dim) array
-    log_prob : (n_ensembles, n_walkers) array
-    n_steps : int
-    blobs : (n_ensembles, n_walkers, n_blobs) array, optional
-        What the density has found where they are; for corrected steps.
+    log_density : callable, (n_points, n_dim) -> (n_points,) array
+    centre : (n_dim,) array
+    factor : (n_dim, n_dim) array
+        Lower Cholesky factor of the estimate's covariance.
+    seed : int
+    shape : (int, int)
+        Ensembles, and walkers of each.
+    """
 
-    Returns
-    -------
-    Chunk
+    def __init__(
+        self, log_density: LogDensity, centre: Floats, factor: Floats, seed: int, shape: tuple[int, int]
+    ) -> None:
+        self.log_density, self.centre, self.factor, self.seed, self.shape = log_density, centre, factor, seed, shape
+        self.n_steps = 0
+        self._backends: list[Any] = []
+
+    def begin(self, saved: Snapshot | None) -> None:
+        """Take up a run that was saved, or begin a new one."""
+        from emcee.backends import Backend
+
+        if saved is None:
+            self._backends = [Backend() for _ in range(self.shape[0])]
+        else:
+            self._backends, self.n_steps = list(saved.backends), saved.n_steps
+
+    @cached_property
+    def pilot(self) -> Pilot:
+        """The walk from the starts to where the ensembles begin."""
+        rng, n_walkers = stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
+        return pilot(self.log_density, self.centre, self.factor, rng, n_walkers, len(self.centre))
+
+    @property
+    def chain(self) -> Floats:
+        """(n_ensembles, n_steps, n_walkers, n_dim) array."""
+        return np.stack([one.chain for one in self._backends])
+
+    @property
+    def log_prob(self) -> Floats:
+        """(n_ensembles, n_steps, n_walkers) array."""
+        return np.stack([one.log_prob for one in self._backends])
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """Where the run stands."""
+        states = [one.random_state for one in self._backends]
+        return Snapshot(tuple(self._backends), states, self.n_steps)
+
+    @cached_property
+    def mixture(self) -> Mixture:
+        """What independent proposals are drawn from."""
+        return Mixture.fitted(self.pilot.draws)
+
+    def advance(self, n_steps: int) -> None:
+        """Let all ensembles make so many steps."""
+        for i, backend in enumerate(self._backends):
+            start = None if self.n_steps else self._start(i)
+            walk(self.log_density, self.mixture, backend, start, n_steps)
+        self.n_steps += n_steps
+
+    def _start(self, ensemble: int) -> Any:
+        """Where an ensemble begins: with every so many of the pilot's walkers, and random numbers of its own."""
+        import emcee
+
+        own = slice(ensemble, None, self.shape[0])
+        state = random_state(stream(self.seed, "ensemble", ensemble))
+        return emcee.State(self.pilot.points[own], log_prob=self.pilot.log_prob[own], random_state=state)
+
+
+def walk(log_density: LogDensity, mixture: Mixture, backend: Any, start: Any, n_steps: int) -> None:
+    """Let the walkers of one ensemble make so many steps; from where its backend ends unless a start is given.
+
+    emcee's own check that walkers span the space depends on the units of the parameters, and is left out.
     """
     import emcee
 
-    n_ensembles, n_walkers, n_dim = coords.shape
-    n_together = n_ensembles * n_walkers
-    # The moves have the density, and know it wherever a walker is: emcee has none to evaluate.
-    sampler = _sampler_type()(n_together, n_dim, None, moves=move, vectorize=True)
-    found = None if blobs is None else blobs.reshape(n_together, blobs.shape[-1])
-    start = emcee.State(coords.reshape(-1, n_dim), log_prob=log_prob.ravel(), blobs=found)
+    n_walkers, n_dim = backend.shape if start is None else start.coords.shape
+    sampler = emcee.EnsembleSampler(
+        n_walkers, n_dim, log_density, moves=moves(mixture), vectorize=True, backend=backend
+    )
+    sampler.log_prob_fn = log_density  # emcee's own wrapper prints what it raises
     sampler.run_mcmc(start, n_steps, skip_initial_state_check=True)
-    chain, densities, kept = sampler.get_chain(), sampler.get_log_prob(), sampler.get_blobs()
-    parts = chain, densities, np.empty((*densities.shape, 0)) if kept is None else kept
-    shape = (n_steps, n_ensembles, n_walkers)
-    return Chunk(*(np.moveaxis(part.reshape(*shape, *part.shape[2:]), 1, 0) for part in parts))
 
 
-@cache
-def _sampler_type() -> Any:
-    """emcee's sampler without the random numbers whose state it writes down at every step: the moves have their own."""
+def random_state(rng: np.random.Generator) -> Any:
+    """A state of the generator that emcee uses, drawn from a stream."""
+    return np.random.RandomState(rng.integers(2**32, size=8)).get_state()
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """What an ensemble walked that nobody keeps.
+
+    Attributes
+    ----------
+    draws : (n_draws, n_dim) array
+        Of its last rounds, a third of them: near the posterior.
+    points : (n_walkers, n_dim) array
+        Where it ended.
+    log_prob : (n_walkers,) array
+    """
+
+    draws: Floats
+    points: Floats
+    log_prob: Floats
+
+
+def pilot(
+    log_density: LogDensity,
+    centre: Floats,
+    factor: Floats,
+    rng: np.random.Generator,
+    n_walkers: int = 128,
+    fewest_rounds: int = FEWEST_ROUNDS,
+) -> Pilot:
+    """Walk from three standard errors around the estimate, in rounds each of which teaches the next, until arrived.
+
+    Parameters
+    ----------
+    log_density : callable, (n_points, n_dim) -> (n_points,) array
+    centre : (n_dim,) array
+    factor : (n_dim, n_dim) array
+        Lower Cholesky factor of the estimate's covariance.
+    rng : numpy.random.Generator
+    n_walkers, fewest_rounds : int, optional
+
+    Returns
+    -------
+    Pilot
+    """
     import emcee
 
-    return type("Sampler", (emcee.EnsembleSampler,), {"random_state": None})
+    points, log_prob = finite_starts(log_density, centre, factor, n_walkers, rng)
+    start: Any = emcee.State(points, log_prob=log_prob, random_state=random_state(rng))
+    backend, mixture, before = emcee.backends.Backend(), Mixture.with_covariance(centre, factor @ factor.T), -np.inf
+    fewest_rounds = min(max(fewest_rounds, FEWEST_ROUNDS), _MOST_ROUNDS)
+    for n_rounds in range(1, _MOST_ROUNDS + 1):
+        walk(log_density, mixture, backend, start, _PILOT_STEPS)
+        start, draws = None, backend.chain[-_PILOT_STEPS * -(-n_rounds // 3) :]
+        now = float(backend.log_prob[-_PILOT_STEPS:].mean())
+        if n_rounds >= fewest_rounds and now - before < _RISE:
+            break
+        mixture, before = Mixture.fitted(draws), now
+    return Pilot(draws.reshape(-1, len(centre)), backend.chain[-1], backend.log_prob[-1])

@@ -33,13 +33,17 @@ from bayesplate.posterior.first_labels import propose_labels
 from bayesplate.posterior.laplace import LaplaceApproximation, laplace_approximation, linearisation_errors
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
+from bayesplate.posterior.statistics import effective_share, may_stand, resampled, smoothed
 from bayesplate.posterior.surrogate import Surrogate, find_surrogate, with_surrogate
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior, linear_suffices
+from bayesplate.posterior.thinning import thin_walker_major
 from bayesplate.posterior.veerings import veering_remarks, with_doubts
+from bayesplate.streams import stream
 
 Floats = NDArray[np.float64]
 
+MOST_DRAWS_A_CHAIN, MOST_WEIGHTED_A_CHAIN = 4000, 1000
 _N_CHECKS = 256
 _N_NAMED = 64
 """Of these checks, on which modes are named."""
@@ -60,7 +64,7 @@ class PosedProblem:
     centre, covariance : (n_dim,) and (n_dim, n_dim) arrays
         Normal approximation of the posterior, for the starts.
     is_forced : bool
-        Whether the law was asked for: then no surrogate stands for it between its evaluations.
+        Whether the law was asked for: then it is sampled itself, and no surrogate of it.
     veerings : tuple of str
         What is in doubt about labels near a veering, a sentence per setup.
     """
@@ -116,16 +120,27 @@ class Inference:
     ----------
     problem : PosedProblem
     chains : Chains
-        Where the walkers walked on a surrogate, with ln f of all modes that the law found at the draws kept.
+        All that was walked: under the law of the problem, or under a surrogate of it.
     convergence : Convergence
+    theta : (n_chains, n_draws, n_dim) array
+        Draws of the posterior, thinned, chain = ensemble; those of a surrogate are drawn again by their weights.
+    log_posterior : (n_chains, n_draws) array
+    every_log_frequency : tuple of (n_chains * n_draws, n_every) array or None
+        ln f (Hz) of all modes of each setup at these draws, where it is known.
     surrogate : Surrogate or None
-        What the walkers walked on between two evaluations of the exact law.
+        What the walkers walked on in place of the exact law.
+    pareto_k : float or None
+        k-hat of the weights from the surrogate to the exact law.
     """
 
     problem: PosedProblem
     chains: Chains
     convergence: Convergence
+    theta: Floats
+    log_posterior: Floats
+    every_log_frequency: tuple[Floats, ...] | None = None
     surrogate: Surrogate | None = None
+    pareto_k: float | None = None
 
 
 def replace_law(posterior: Posterior, law: LawName) -> Posterior:
@@ -290,6 +305,9 @@ def infer(
 ) -> Inference:
     """Sample the posterior of a problem in coordinates that shorten its tails.
 
+    Under the exact law the walkers walk on a surrogate of it, unless the law was asked for, and the draws are weighted
+    to the law by Pareto-smoothed importance sampling; where too few count, the law itself is sampled.
+
     Parameters
     ----------
     problem : PosedProblem
@@ -300,26 +318,74 @@ def infer(
     Returns
     -------
     Inference
-        Its chains are theta, the columns of `Parameters`, and the log posterior density of theta.
+        Its chains are theta, the columns of `Parameters`, and the log density of theta under what was walked on.
+
+    References
+    ----------
+    A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importance sampling, Journal of Machine
+    Learning Research 25 (2024).
     """
     coordinates = TailCoordinates.around(
         problem.centre, problem.covariance, range(problem.parameters.n_constants), problem.parameters.effect_columns
     )
+    posterior = problem.posterior
+
+    def walked(density: Posterior, saved: Checkpoint | None) -> tuple[Chains, Convergence]:
+        chains, convergence = sample(
+            coordinates.density(density),
+            coordinates.start,
+            coordinates.start_covariance(problem.covariance),
+            settings,
+            names=problem.parameters.names,
+            checkpoint=saved,
+            progress=progress,
+        )
+        log_density = chains.log_prob - coordinates.log_jacobian(chains.draws)
+        return Chains(coordinates.theta(chains.draws), log_density, chains.burn_in), convergence
+
     surrogate = None
-    if problem.posterior.law == "exact" and not problem.is_forced:
-        surrogate = find_surrogate(problem.posterior, problem.centre, problem.covariance, coordinates)
-    cheap = None if surrogate is None else coordinates.density(with_surrogate(problem.posterior, surrogate))
-    chains, convergence = sample(
-        coordinates.density(problem.posterior),
-        coordinates.start,
-        coordinates.start_covariance(problem.covariance),
-        settings,
-        surrogate=cheap,
-        evaluate=coordinates.evaluation(problem.posterior.evaluate, sum(problem.posterior.n_every)),
-        names=problem.parameters.names,
-        checkpoint=checkpoint,
-        progress=progress,
+    if posterior.law == "exact" and not problem.is_forced:
+        surrogate = find_surrogate(posterior, problem.centre, problem.covariance, coordinates)
+    if surrogate is not None:
+        quick = with_surrogate(posterior, surrogate)
+        found = walked(quick, None if checkpoint is None else checkpoint.part("polynomial"))
+        weighted = _weighted(problem, surrogate, *found, stream(settings.seed, "weights"))
+        if weighted is not None and (weighted.convergence.ess_min >= settings.gate.ess_min or not found[1].passed):
+            return weighted
+    chains, convergence = walked(posterior, checkpoint)
+    theta, log_posterior = (
+        thin_walker_major(part, chains.burn_in, convergence.tau_max, n_draws_max=MOST_DRAWS_A_CHAIN)
+        for part in (chains.draws, chains.log_prob)
     )
-    log_posterior = chains.log_prob - coordinates.log_jacobian(chains.draws)
-    theta = Chains(coordinates.theta(chains.draws), log_posterior, chains.burn_in, chains.blobs)
-    return Inference(problem, theta, convergence, surrogate)
+    return Inference(problem, chains, convergence, theta, log_posterior)
+
+
+def _weighted(
+    problem: PosedProblem, surrogate: Surrogate, chains: Chains, convergence: Convergence, rng: np.random.Generator
+) -> Inference | None:
+    """Draws of a surrogate's posterior, drawn again by their weights under the law; None where too few count."""
+    posterior = problem.posterior
+    thinned, log_walked = (
+        thin_walker_major(part, chains.burn_in, convergence.tau_max, n_draws_max=MOST_WEIGHTED_A_CHAIN)
+        for part in (chains.draws, chains.log_prob)
+    )
+    n_chains, n_draws, n_dim = thinned.shape
+    log_posterior, log_frequency = posterior.evaluate(thinned.reshape(-1, n_dim))
+    weights, pareto_k = smoothed(log_posterior - log_walked.ravel())
+    if not may_stand(weights, pareto_k):
+        return None
+    picked = np.concatenate(
+        [i * n_draws + resampled(part, n_draws, rng) for i, part in enumerate(weights.reshape(n_chains, -1))]
+    )
+    share = effective_share(weights)
+    ess = np.minimum(convergence.ess, thinned[..., 0].size) * share
+    return Inference(
+        problem,
+        chains,
+        replace(convergence, ess=ess, ess_min=float(ess.min())),
+        thinned.reshape(-1, n_dim)[picked].reshape(thinned.shape),
+        log_posterior[picked].reshape(n_chains, n_draws),
+        tuple(posterior.by_setup(log_frequency[picked])),
+        surrogate,
+        pareto_k,
+    )

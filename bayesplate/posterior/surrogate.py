@@ -3,10 +3,8 @@
 It is of second order in all of them, and of up to fifth along the few directions in which ln f is bent most: of the
 hundreds of terms of third order few matter, and fitted to a thousand points the others follow chance.
 
-It is fitted by least squares to the exact law where the posterior is: first at draws of the normal approximation, then
-at draws of its own posterior, until it holds at draws that it was not fitted to. It costs microseconds per draw,
-however many effects the board has. The walkers walk on it and the exact law accepts or rejects where they end
-(`bayesplate.posterior.moves.CorrectedSteps`), so that its error costs steps and never moves the posterior.
+It is fitted by least squares to the exact law where the posterior is, and costs microseconds a draw, however many
+effects the board has. Draws from its posterior are weighted to the exact law, so that its error never moves a result.
 """
 
 from __future__ import annotations
@@ -21,12 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.board import Values
-from bayesplate.posterior.ensembles import advance
-from bayesplate.posterior.moves import Steps
-from bayesplate.posterior.proposals import Proposal
-from bayesplate.posterior.starting import LogPosterior
+from bayesplate.posterior.ensembles import pilot
+from bayesplate.posterior.mixture import Mixture
+from bayesplate.posterior.starts import cholesky_factor
+from bayesplate.posterior.statistics import effective_share, may_stand, smoothed
 from bayesplate.posterior.tails import TailCoordinates
 from bayesplate.posterior.target import Posterior
+from bayesplate.streams import stream
 
 Floats = NDArray[np.float64]
 
@@ -38,21 +37,15 @@ ALONG_BENT = {3: 6, 4: 4, 5: 3}
 """Orders above the second, and along how many of the directions in which ln f is bent most."""
 _POINTS_PER_TERM = 3
 _FEWEST_POINTS = 512
-_FEWEST_ROUNDS, _MOST_ROUNDS = 3, 8
+_MOST_ROUNDS = 6
 _TEMPERATURE, _LOWEST = 4.0, -200.0
-"""Of the weights in a fit, and of the walk to points far out. Lower differences of log densities than the second count
-as that: a law that is wild out there must not bend the polynomial here."""
-_FAR = 15.0
-"""Points whose log density is lower than the highest by this and the number of parameters are no part of the posterior:
-of a normal one less than a millionth lies there."""
-_N_STEPS, _N_TAKEN = 40, 4
-_N_ARCHIVED = 128
+"""Of the weights in a fit. Lower differences of log densities than the second count as that: a law that is wild far out
+must not bend the polynomial here."""
 _BATCH = 2048
-LEAST_ACCEPTANCE = 0.5
-"""Of walks on a surrogate that serves. Below, most evaluations of the exact law would be for steps that are refused."""
-_LEAST_ANYWHERE = 0.25
-"""Of walks from any one point, below which the surrogate is taught on: where it is far too low a walker stays, and a
-few that stay for a hundred steps make the autocorrelation time of all."""
+_GOOD_SHARE = 0.5
+"""Of the draws that count under the law, from which on a surrogate is taught no further."""
+_FARTHER, _MAY_LACK = 2.0, 0.02
+"""Times the width of its draws, where it is looked for probability that it lacks; and how much it may lack."""
 
 
 class Solved(NamedTuple):
@@ -195,40 +188,13 @@ def with_surrogate(posterior: Posterior, surrogate: Surrogate) -> SurrogatePoste
     )
 
 
-def acceptance(log_ratios: Floats) -> float:
-    """How often the end of a walk on a surrogate will be accepted under the law, where walks forget their start.
-
-    Modes that belong to no peak may be wrong at no cost, and where two modes that cross by a hair are sorted by
-    frequency no polynomial follows either; so a surrogate is judged by what its errors do to the density.
-
-    Parameters
-    ----------
-    log_ratios : (n_draws,) array
-        ln of the posterior's density less that of the surrogate's, at draws of the latter. Weighted with their ratio
-        these are draws of the former, where walks begin. Infinite where one of them is zero: such ends are refused.
-    """
-    finite = log_ratios[np.isfinite(log_ratios)]
-    if not finite.size:
-        return 0.0
-    starts = np.exp(finite - finite.max())
-    return float(starts @ accepted_from(log_ratios) / starts.sum())
-
-
-def accepted_from(log_ratios: Floats) -> Floats:
-    """The same for walks from each of the draws where both densities are above zero: (n_finite,) array."""
-    finite = log_ratios[np.isfinite(log_ratios)]
-    gains = np.minimum(finite[None, :] - finite[:, None], 0.0)
-    return np.asarray(np.exp(gains).sum(axis=1) / log_ratios.size)
-
-
 def find_surrogate(
     posterior: Posterior, centre: Floats, covariance: Floats, coordinates: TailCoordinates
 ) -> Surrogate | None:
     """Fit a surrogate to the law of a posterior, or find that none serves.
 
-    Each round fits it anew, walks on it, and compares it with the law where the walkers then are. Those places join the
-    points of the next rounds, and so do others from a walk that is tempered, and such as steps of the chain will
-    propose: a surrogate that is too low in a tail of the posterior would hold a walker there for long.
+    Each round fits it anew, walks on it, weights the draws to the law, and looks around them for probability that it
+    lacks. All points of a round join those of the next.
 
     Parameters
     ----------
@@ -241,30 +207,47 @@ def find_surrogate(
     Returns
     -------
     Surrogate or None
-        None if no walk on one would be accepted half of the time, within a few rounds.
+        None if after a few rounds too few draws of it would count under the law, or it lacks a part of the posterior.
     """
     columns, bounds = posterior.parameters.fitted_columns, posterior.parameters.fitted_bounds
     n_points = max(_FEWEST_POINTS, _POINTS_PER_TERM * n_terms(columns.size))
-    rng = np.random.default_rng(0)
+    rng = stream(0, "surrogate")
+    factor = cholesky_factor(coordinates.start_covariance(covariance))
     theta = rng.multivariate_normal(centre, _WIDER**2 * covariance, n_points)
     theta[:, columns] = np.clip(theta[:, columns], bounds.lower, bounds.upper)
-    points, found = _solved(posterior, coordinates, theta), None
-    for n_rounds in range(1, _MOST_ROUNDS + 1):
+    points = _solved(posterior, coordinates, theta)
+    for _ in range(_MOST_ROUNDS):
         surrogate = Surrogate.fitted(points, columns)
         density = coordinates.density(with_surrogate(posterior, surrogate))
-        walked = _solved(posterior, coordinates, _walked(density, 1.0, coordinates, theta, rng))
-        held_out = walked.where(walked.log_density > points.log_density.max() - _FAR - theta.shape[1])
-        log_ratios = held_out.log_density - density(coordinates.y(held_out.theta))
-        if 2 * len(log_ratios) > n_points and acceptance(log_ratios) >= LEAST_ACCEPTANCE:
-            found = surrogate
-            if n_rounds >= _FEWEST_ROUNDS and accepted_from(log_ratios).min() >= _LEAST_ANYWHERE:
-                return found
-        further_out = _solved(posterior, coordinates, _walked(density, _TEMPERATURE, coordinates, theta, rng))
-        proposal = Proposal.fitted(coordinates.y(walked.theta))
-        proposed = _solved(posterior, coordinates, coordinates.theta(proposal.points(n_points, rng)))
-        points = Solved(*(np.concatenate(parts) for parts in zip(points, walked, further_out, proposed, strict=True)))
-        theta = walked.theta
-    return found
+        walked = pilot(density, coordinates.start, factor, rng).draws
+        y = walked[rng.choice(len(walked), n_points, replace=False)]
+        solved = _solved(posterior, coordinates, coordinates.theta(y))
+        weights, pareto_k = smoothed(solved.log_density - density(y))
+        proposal = Mixture.fitted(walked).widened(_FARTHER)
+        y = proposal.points(n_points, rng)
+        y = y[coordinates.is_near(y)]
+        further_out = _solved(posterior, coordinates, coordinates.theta(y))
+        lacks = share_lacking(further_out.log_density, density(y), proposal.log_density(y))
+        if may_stand(weights, pareto_k) and effective_share(weights) >= _GOOD_SHARE and lacks <= _MAY_LACK:
+            return surrogate
+        points = Solved(*(np.concatenate(parts) for parts in zip(points, solved, further_out, strict=True)))
+    return None
+
+
+def share_lacking(log_law: Floats, log_surrogate: Floats, log_proposal: Floats) -> float:
+    """Share of the probability under a law that lies where a surrogate has less than half of it.
+
+    Draws of the surrogate do not tell, for none comes there: draws of a wider density do.
+
+    Parameters
+    ----------
+    log_law, log_surrogate, log_proposal : (n_draws,) arrays
+        ln of the densities at draws of the proposal; the first two but for a constant each.
+    """
+    weights, of_surrogate = (
+        np.exp(log - np.logaddexp.reduce(log)) for log in (log_law - log_proposal, log_surrogate - log_proposal)
+    )
+    return float(weights[of_surrogate < 0.5 * weights].sum())
 
 
 def _solved(posterior: Posterior, coordinates: TailCoordinates, theta: Floats) -> Solved:
@@ -273,21 +256,3 @@ def _solved(posterior: Posterior, coordinates: TailCoordinates, theta: Floats) -
     likelihood = posterior.log_likelihood_of(by_setup, theta).sum(axis=1)
     log_density = posterior.log_prior(theta) + likelihood + coordinates.log_jacobian(coordinates.y(theta))
     return Solved(theta, np.concatenate(by_setup, axis=1), log_density)
-
-
-def _walked(
-    density: LogPosterior, temperature: float, coordinates: TailCoordinates, theta: Floats, rng: np.random.Generator
-) -> Floats:
-    """As many points, walked to where a surrogate's posterior is, which has that density in the walk's coordinates."""
-
-    def tempered(points: Floats) -> Floats:
-        return density(points) / temperature
-
-    n_walkers = -(-len(theta) // _N_TAKEN)
-    coords = coordinates.y(theta)
-    start = coords[:n_walkers]
-    archive, proposal = coords[None, :_N_ARCHIVED], Proposal.one_fitted(coords)
-    steps = Steps(tempered, proposal, archive, "ID" * (_N_STEPS // 2), n_walkers, [rng])
-    draws = advance(steps, start[None], tempered(start)[None], _N_STEPS).draws
-    taken = draws[0, -1 :: -(_N_STEPS // (2 * _N_TAKEN))][:_N_TAKEN]
-    return coordinates.theta(taken.reshape(-1, coords.shape[1])[: len(theta)])

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.posterior.starting import Evaluate, LogPosterior
+from bayesplate.posterior.starts import LogDensity
 
 Floats = NDArray[np.float64]
 
@@ -93,21 +93,18 @@ class TailCoordinates:
         """ln |d theta / d y| of (..., n_dim) y: (...) array."""
         return np.asarray(np.log(self.scale * np.cosh(y[..., self.columns])).sum(axis=-1))
 
-    def density(self, log_density: LogPosterior) -> LogPosterior:
+    def is_near(self, y: Floats) -> NDArray[np.bool_]:
+        """Whether (n_draws, n_dim) y are so near that the map does not overflow; beyond is outside every prior."""
+        return np.asarray(np.all(np.abs(y[:, self.columns]) < np.arcsinh(_FARTHEST / self.scale), axis=1))
+
+    def density(self, log_density: LogDensity) -> LogDensity:
         """Log density of y from that of theta, both vectorised: (n_draws, n_dim) -> (n_draws,)."""
-        alone = self.evaluation(lambda theta: (log_density(theta), np.empty((len(theta), 0))), 0)
-        return lambda y: alone(y)[0]
 
-    def evaluation(self, evaluate: Evaluate, n_blobs: int) -> Evaluate:
-        """The same with what is found on the way, `n_blobs` numbers at each point."""
-        limit = np.arcsinh(_FARTHEST / self.scale)
-
-        def transformed(y: Floats) -> tuple[Floats, Floats]:
-            near = np.all(np.abs(y[:, self.columns]) < limit, axis=1)
-            result, blobs = np.full(y.shape[0], -np.inf), np.full((y.shape[0], n_blobs), np.nan)
+        def transformed(y: Floats) -> Floats:
+            near = self.is_near(y)
+            result = np.full(len(y), -np.inf)
             if near.any():
-                log_density, blobs[near] = evaluate(self.theta(y[near]))
-                result[near] = log_density + self.log_jacobian(y[near])
-            return result, blobs
+                result[near] = log_density(self.theta(y[near])) + self.log_jacobian(y[near])
+            return result
 
         return transformed

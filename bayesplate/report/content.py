@@ -13,7 +13,6 @@ from bayesplate.quantities import Quantity
 from bayesplate.report.priors import input_words
 from bayesplate.report.words import effect_sentence
 from bayesplate.results.budget import budget, row_words
-from bayesplate.results.certified import CHECK, certificate_words
 from bayesplate.results.contract import Spread
 from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Percentile, Summary
 from bayesplate.results.tables import Table, modes_table, peaks_table
@@ -253,7 +252,7 @@ def sampler_rows(summary: Summary) -> list[tuple[str, str]]:
         (f"smallest effective size (at least {limits.ess_min:g})", number(one.ess_min, 0)),
         ("largest autocorrelation time, steps", number(one.tau_max, 1)),
         ("accepted proposals", percent(one.acceptance)),
-        (CHECK, certificate_words(summary.certificate)),
+        *([] if one.pareto_k is None else [("Pareto k-hat of the weights to the exact law", number(one.pareto_k, 2))]),
     ]
 
 

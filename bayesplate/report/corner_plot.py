@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.libraries import load_arviz
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
@@ -18,7 +19,6 @@ from bayesplate.report.priors import input_words
 from bayesplate.report.saving import drawing, save_figure
 from bayesplate.report.style import SMALL, WIDTH, Picture, limits, short
 from bayesplate.report.symbols import in_figure, is_symbol
-from bayesplate.results.archive import load_arviz
 from bayesplate.results.budget import input_shares
 from bayesplate.results.words import GPA
 

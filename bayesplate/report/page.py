@@ -15,6 +15,7 @@ from typing import Any
 from bayesplate.cards import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.exports import write_before_after, write_known
+from bayesplate.files import make_folder, write_text
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
@@ -35,7 +36,7 @@ from bayesplate.report.style import Picture, visible
 from bayesplate.report.symbols import in_page
 from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, quoted_constants, short_sentences
 from bayesplate.results.exports import write_exports
-from bayesplate.results.folder import FIGURES, PAGE, make_folder, write_text
+from bayesplate.results.folder import FIGURES, PAGE
 from bayesplate.results.references import references
 from bayesplate.results.summary import Summary
 

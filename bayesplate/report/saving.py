@@ -9,8 +9,8 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Literal
 
+from bayesplate.files import write_bytes
 from bayesplate.report.style import Picture
-from bayesplate.results.folder import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,20 +7,18 @@ ArviZ.
 
 from __future__ import annotations
 
-import os
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.results.folder import write_bytes
+from bayesplate.files import write_bytes
+from bayesplate.libraries import load_arviz
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -126,19 +124,6 @@ def to_arviz(archive: Archive) -> Any:
     return xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=dict(archive.attributes)), **datasets})
 
 
-def load_arviz() -> Any:
-    """ArviZ. Once a day 0.23 announces version 1, and notes the day in a cache of the user, which may be read-only."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)
-        try:
-            return import_module("arviz")
-        except OSError:
-            from unittest.mock import patch
-
-            with TemporaryDirectory() as folder, patch.dict(os.environ, XDG_CACHE_HOME=folder):
-                return import_module("arviz")
-
-
 def _place(
     name: str, value: NDArray[Any], extra: Sequence[str], axes: Arrays, may_be_sampled: bool
 ) -> tuple[tuple[str, ...], NDArray[Any]]:
@@ -186,8 +171,7 @@ def read_archive(path: Path) -> Archive:
     Archive
         Plain arrays; nothing of ArviZ or xarray leaves this module.
     """
-    arviz: Any = import_module("arviz")  # typed in 1.x, not in 0.23
-    tree = arviz.from_netcdf(str(path), engine="h5netcdf")
+    tree = load_arviz().from_netcdf(str(path), engine="h5netcdf")
     groups: dict[str, dict[str, NDArray[Any]]] = {}
     coords: dict[str, NDArray[Any]] = {}
     dims: dict[str, tuple[str, ...]] = {}

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bayesplate.files import whole_file, writing
 from bayesplate.results.board_rows import BoardRow
-from bayesplate.results.folder import writing
 
 
 class Journal:
@@ -71,16 +71,8 @@ class Journal:
 
     def keep(self, places: Iterable[int]) -> None:
         """Write the journal anew with these rows alone, in this order; it is closed then."""
-        partial = self.path.with_name(self.path.name + ".partial")
-        with writing(self.path):
-            try:
-                with partial.open("wb") as stream:
-                    stream.writelines(self._line(place) for place in places)
-                    stream.flush()
-                    os.fsync(stream.fileno())
-                os.replace(partial, self.path)
-            finally:
-                partial.unlink(missing_ok=True)
+        with writing(self.path), whole_file(self.path) as stream:
+            stream.writelines(self._line(place) for place in places)
         self.close()
 
     def close(self) -> None:

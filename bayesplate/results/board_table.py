@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal
 
 from bayesplate.errors import Fault, InputError
+from bayesplate.files import whole_file, writing
 from bayesplate.results.board_rows import NUMBERS, WORDS, BoardRow
 from bayesplate.results.exports import csv_text
-from bayesplate.results.folder import writing
 
 TableKind = Literal["csv", "parquet"]
 _AT_ONCE = 1000
@@ -62,30 +60,27 @@ def write_table(folder: Path, kind: TableKind, rows: Iterable[BoardRow]) -> Path
     Path
     """
     path = folder / table_name(kind)
-    with _complete(path) as partial:
-        (_write_csv if kind == "csv" else _write_parquet)(partial, rows)
+    with writing(path), whole_file(path) as stream:
+        (_write_csv if kind == "csv" else _write_parquet)(stream, rows)
     return path
 
 
-def _write_csv(path: Path, rows: Iterable[BoardRow]) -> None:
-    write_rows(path, [*WORDS, *NUMBERS], (row.cells() for row in rows))
+def _write_csv(stream: BinaryIO, rows: Iterable[BoardRow]) -> None:
+    write_rows(stream, [*WORDS, *NUMBERS], (row.cells() for row in rows))
 
 
-def write_rows(path: Path, header: list[Any], rows: Iterable[list[Any]]) -> None:
+def write_rows(stream: BinaryIO, header: list[Any], rows: Iterable[list[Any]]) -> None:
     """Write CSV row after row; a text that looks like a formula begins with an apostrophe."""
-    with path.open("w", encoding="utf-8", newline="\n") as stream:
-        stream.write(csv_text([header]))
-        for row in rows:
-            stream.write(csv_text([row]))
-        stream.flush()
-        os.fsync(stream.fileno())
+    stream.write(csv_text([header]).encode())
+    for row in rows:
+        stream.write(csv_text([row]).encode())
 
 
-def _write_parquet(path: Path, rows: Iterable[BoardRow]) -> None:
+def _write_parquet(stream: BinaryIO, rows: Iterable[BoardRow]) -> None:
     arrow = parquet_library("--table parquet")
     texts = [(word, arrow.int64() if word == _WHOLE else arrow.string()) for word in WORDS]
     schema = arrow.schema([*texts, *((name, arrow.float64()) for name in NUMBERS)])
-    with arrow.parquet.ParquetWriter(path, schema) as writer:
+    with arrow.parquet.ParquetWriter(stream, schema) as writer:
         for some in _in_parts(rows, _AT_ONCE):
             columns = list(zip(*(row.cells() for row in some), strict=True))
             writer.write_table(arrow.table(dict(zip(schema.names, map(list, columns), strict=True)), schema=schema))
@@ -95,15 +90,3 @@ def _in_parts(rows: Iterable[BoardRow], n: int) -> Iterator[list[BoardRow]]:
     source = iter(rows)
     while some := list(islice(source, n)):
         yield some
-
-
-@contextmanager
-def _complete(path: Path) -> Iterator[Path]:
-    """A file beside the wanted one, which takes its place when it is complete."""
-    partial = path.with_name(path.name + ".partial")
-    with writing(path):
-        try:
-            yield partial
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)

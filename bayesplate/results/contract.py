@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, ClassVar, Generic, TypeVar
@@ -116,6 +117,11 @@ def as_json(value: Any) -> Any:
     if isinstance(value, tuple | list):
         return [as_json(one) for one in value]
     return value
+
+
+def json_text(content: Any) -> str:
+    """JSON of a result, as it is written and printed; refuses numbers that JSON does not have."""
+    return json.dumps(as_json(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def finite(value: float) -> float | None:

@@ -7,8 +7,9 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
+from bayesplate.files import write_text
 from bayesplate.results.contract import ByConstant, Spread
-from bayesplate.results.folder import CONSTANTS, write_text
+from bayesplate.results.folder import CONSTANTS
 from bayesplate.results.summary import Percentile, Summary
 from bayesplate.results.words import GPA, decimals, interval
 

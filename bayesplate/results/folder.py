@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from bayesplate.errors import CheckpointError, Fault, InputError, RunInterrupted, UnwritableError
-from bayesplate.posterior.checkpoint import Checkpoint, take
-from bayesplate.results.contract import as_json
+from bayesplate.files import make_folder, names_in
+from bayesplate.locks import take
+from bayesplate.posterior.checkpoint import CHAINS, Checkpoint
 
 SUMMARY = "summary.json"
 ARCHIVE = "posterior.nc"
@@ -56,7 +56,7 @@ class OutputFolder:
 
     @property
     def checkpoint(self) -> Path:
-        """Folder of the unfinished run's chunks."""
+        """Folder of the unfinished run's chains."""
         return self.path / CHECKPOINT
 
     @property
@@ -74,7 +74,7 @@ class OutputFolder:
         CheckpointError
             If there is nothing to resume.
         """
-        has_content = any(map(_is_of_a_run, _names_in(self.path)))
+        has_content = any(map(_is_of_a_run, names_in(self.path)))
         self._is_new = not force and not resume
         if resume:
             if not os.path.isdir(self.checkpoint):
@@ -150,19 +150,15 @@ class OutputFolder:
 
     @property
     def has_checkpoint(self) -> bool:
-        """Whether there are chunks of a run, sound or set aside as damaged."""
-        return any(self.checkpoint.rglob("chunk-*.npz*"))
+        """Whether there are chains of a run to go on from."""
+        return any(self.checkpoint.rglob(CHAINS))
 
     def close(self) -> None:
-        """Remove the checkpoint of a run that is done, and what it replaces; chunks found damaged stay to be looked at.
-
-        Chunks first, the last of them before the first: a run that is killed at it can be resumed.
-        """
+        """Remove the checkpoint of a run that is done, and what it replaces."""
         shutil.rmtree(self.earlier, ignore_errors=True)
-        for manifest in sorted(self.checkpoint.rglob("manifest.json"), reverse=True):
-            Checkpoint(manifest.parent, "").discard()
-        if not any(self.checkpoint.rglob("*.damaged")):
-            shutil.rmtree(self.checkpoint, ignore_errors=True)
+        for chains in sorted(self.checkpoint.rglob(CHAINS), reverse=True):
+            Checkpoint(chains.parent, "").discard()
+        shutil.rmtree(self.checkpoint, ignore_errors=True)
 
     def release(self) -> None:
         """Let others use the folder, and leave none behind that holds nothing."""
@@ -219,24 +215,6 @@ def _where_the_earlier_are(held: list[OutputFolder]) -> str:
     return "".join(f"\nwhat was there before is in {folder.earlier}" for folder in held if folder.earlier.is_dir())
 
 
-def _names_in(folder: Path) -> list[str]:
-    """What a folder of outputs holds; nothing where there is none yet.
-
-    Raises
-    ------
-    InputError
-        If it is no folder, or the system does not let us look.
-    """
-    try:
-        return os.listdir(folder)
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        is_file = os.path.exists(folder) and not os.path.isdir(folder)
-        got = "a file" if is_file else error.strerror or str(error)
-        raise InputError(Fault(f"--out {folder}", "a folder", got, "choose another place")) from None
-
-
 def _remove_empty(folder: Path, above: Path) -> None:
     """Remove a folder that is empty now, and those that it leaves empty; all of them lie below another one."""
     with suppress(OSError):  # not there, or not empty
@@ -247,82 +225,3 @@ def _remove_empty(folder: Path, above: Path) -> None:
 
 def _is_of_a_run(name: str) -> bool:
     return name not in BESIDE and not (name.startswith(_DRAWN_BESIDE) and name.endswith((".png", ".svg")))
-
-
-def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:
-    """The files that a command will write beside others, checked before any work and without writing.
-
-    Raises
-    ------
-    InputError
-        If one is there and `force` is not given, or if the folder is no folder.
-    """
-    found = set(_names_in(folder))
-    paths = tuple(folder / name for name in names)
-    there = [path.name for path in paths if path.name in found]
-    if there and not force:
-        wanted, remedy = "new files", "--force replaces them, --out takes another place"
-        raise InputError(Fault(f"--out {folder}", wanted, f"{', '.join(there)} already there", remedy))
-    return paths
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Writing a file or a folder's files: what the system refuses is told with the place.
-
-    Raises
-    ------
-    UnwritableError
-        In place of an OSError.
-    """
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        wanted, remedy = "a file that can be written", "make room, or take another place with --out"
-        raise UnwritableError(Fault(str(path), wanted, reason, remedy)) from error
-
-
-def make_folder(folder: Path) -> None:
-    """Make the folder of an output.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        fault = Fault(f"--out {folder}", "a folder that can be written", error.strerror or str(error))
-        raise UnwritableError(fault) from error
-
-
-def json_text(content: Any) -> str:
-    """JSON of a result, as it is written and printed; refuses numbers that JSON does not have."""
-    return json.dumps(as_json(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file completely or not at all; raises as `write_bytes`."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all.
-
-    Raises
-    ------
-    UnwritableError
-        If the disk is full or the place is not ours.
-    """
-    partial = path.with_name(path.name + ".partial")
-    with writing(path):
-        try:
-            with partial.open("wb") as stream:
-                stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)

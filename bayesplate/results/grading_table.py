@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from bayesplate.files import whole_file, writing
 from bayesplate.plate.material import MODULI
 from bayesplate.results.board_table import write_rows
 from bayesplate.results.exports import Cell
-from bayesplate.results.folder import writing
 from bayesplate.results.grading import Grading
 from bayesplate.results.log_figures import FIGURES, LogFigure, limit_told
 from bayesplate.results.tables import Table
@@ -141,13 +140,8 @@ def _apart(graded: Grading, first: int, second: int, name: str) -> str:
 def write_grading(folder: Path, graded: Grading) -> Path:
     """Write the table of the grading, SI units, completely or not at all."""
     path = folder / GRADING
-    partial = path.with_name(path.name + ".partial")
-    with writing(path):
-        try:
-            write_rows(partial, _header(graded), _rows(graded))
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
+    with writing(path), whole_file(path) as stream:
+        write_rows(stream, _header(graded), _rows(graded))
     return path
 
 

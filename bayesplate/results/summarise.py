@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +15,12 @@ from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.estimates.undeclared_air import air_sentence
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.assessment import Assessment
-from bayesplate.posterior.certificate import Certificate, does_not_apply
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks
-from bayesplate.results.certified import contradiction
 from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import foretold, mode_rows
@@ -34,7 +33,6 @@ from bayesplate.results.summary import (
     Percentile,
     PercentileValue,
     PointEstimate,
-    Request,
     SamplerHealth,
     Summary,
     Unconverged,
@@ -42,8 +40,6 @@ from bayesplate.results.summary import (
 
 Floats = NDArray[np.float64]
 
-TAUGHT = "its draws are weighted by what other boards teach"
-"""Why a board of a campaign has no certificate of its own: that of the board alone has."""
 HIGH_EXACT_ERROR = 0.5
 """Cents by which the exact law may miss full solves before a summary warns."""
 
@@ -55,7 +51,6 @@ def unconverged_summary(
     seed: int,
     versions: Mapping[str, str],
     sha256: str,
-    request: Request,
 ) -> Unconverged:
     """The summary of a run that failed the gate."""
     return Unconverged(
@@ -68,7 +63,6 @@ def unconverged_summary(
         converged=False,
         sampler=sampler_health(chains, convergence),
         warnings=(*convergence.reasons, f"suggested steps: {convergence.suggested_steps}", *problem.doubts),
-        request=request,
     )
 
 
@@ -79,8 +73,6 @@ def summarise(
     seed: int,
     versions: Mapping[str, str],
     card_sha256: str,
-    certificate: Certificate | None = None,
-    request: Request | None = None,
 ) -> Summary:
     """The summary of a converged fit.
 
@@ -93,16 +85,11 @@ def summarise(
     seed : int
     versions : dict of str
     card_sha256 : str
-    certificate : Certificate, optional
-        Of the draws of the fit; those that other boards teach have none.
-    request : Request, optional
-        Of the fit; a board of a campaign has none.
 
     Returns
     -------
     Summary
     """
-    certificate = does_not_apply(TAUGHT) if certificate is None else certificate
     problem = inference.problem
     board = problem.board
     system = paper_system(board, problem.estimate, compared=False)
@@ -143,17 +130,19 @@ def summarise(
             surrogate_rms_cents=rms(assessment.surrogate_errors),
             surrogate_worst_cents=finite(_worst(assessment.surrogate_errors)),
         ),
-        sampler=sampler_health(inference.chains, inference.convergence),
-        certificate=certificate,
+        sampler=replace(
+            sampler_health(inference.chains, inference.convergence),
+            drawn_from="law" if inference.surrogate is None else "polynomial",
+            pareto_k=inference.pareto_k,
+        ),
         identifiability=(
             *remarks(board, problem.identifiability, carrying_sentence(assessment.carrying)),
             *prior_remarks(draws, problem.prior),
             *input_remarks(draws, board),
             *filter(None, [air_sentence(board, problem.estimate)]),
         ),
-        warnings=(*warnings_of(problem, assessment), *contradiction(certificate)),
-        doubts=doubts_of(problem, assessment, certificate),
-        request=request,
+        warnings=tuple(warnings_of(problem, assessment)),
+        doubts=doubts_of(problem, assessment),
         carrying_modes=assessment.carrying,
     )
 
@@ -256,10 +245,10 @@ def warnings_of(problem: PosedProblem, assessment: Assessment) -> list[str]:
     return sentences
 
 
-def doubts_of(problem: PosedProblem, assessment: Assessment, certificate: Certificate) -> tuple[str, ...]:
+def doubts_of(problem: PosedProblem, assessment: Assessment) -> tuple[str, ...]:
     """Those of the warnings that are reasons not to trust the constants.
 
     A label that a veering leaves open is none: the fit counts with both modes.
     """
     of_readings = (one for one in problem.doubts if one not in problem.veerings)
-    return (*of_readings, *assessment.doubts, *contradiction(certificate))
+    return (*of_readings, *assessment.doubts)

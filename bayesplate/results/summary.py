@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
+from typing import Literal
 
 from bayesplate.estimates.leave_one_out import CarryingMode
-from bayesplate.posterior.certificate import Certificate
 from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import ModeRow
@@ -36,7 +36,15 @@ class ModelHeader:
 
 @dataclass(frozen=True)
 class SamplerHealth:
-    """How the sampler fared; None where a number does not exist yet."""
+    """How the sampler fared; None where a number does not exist, or not yet.
+
+    Attributes
+    ----------
+    drawn_from : "law" or "polynomial"
+        The frequency law of the model, or a polynomial of it whose draws are weighted to the law.
+    pareto_k : float or None
+        k-hat of these weights.
+    """
 
     ensembles: int
     walkers: int
@@ -45,6 +53,8 @@ class SamplerHealth:
     rhat_max: float | None
     ess_min: float | None
     acceptance: float | None
+    drawn_from: Literal["law", "polynomial"] = "law"
+    pareto_k: float | None = None
 
 
 @dataclass(frozen=True)
@@ -127,32 +137,12 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Request:
-    """What a fit was asked for, so that its summary alone can repeat it.
-
-    Attributes
-    ----------
-    card : str
-        Text of the board card, with what a --setup put in its place.
-    law : "linear", "exact" or None
-        As asked; None leaves the choice to the fit.
-    named : dict of str
-        SHA-256 of the numbers of the prior and the tables that the card names, by kind and name.
-    """
-
-    card: str
-    law: str | None
-    named: Mapping[str, str]
-
-
-@dataclass(frozen=True)
 class Unconverged(Run):
     """The summary of a run that failed the convergence gate: its diagnostics, and no constants."""
 
     converged: bool
     sampler: SamplerHealth
     warnings: tuple[str, ...]
-    request: Request | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -190,13 +180,9 @@ class Summary(Run):
         Of the setups that have such peaks: all modes that they may be.
     error : ErrorFigures
     sampler : SamplerHealth
-    certificate : Certificate
-        Whether the draws agree with an answer in closed form on the same readings.
     identifiability, warnings : tuple of str
     doubts : tuple of str
         Those of the warnings that are reasons not to trust the constants.
-    request : Request or None
-        None for a board of a campaign, whose draws follow from all boards.
     carrying_modes : tuple of CarryingMode
         Modes that alone carry a constant or a size: they count in no error of modes left out.
     """
@@ -219,11 +205,9 @@ class Summary(Run):
     spectra: tuple[Spectrum, ...]
     error: ErrorFigures
     sampler: SamplerHealth
-    certificate: Certificate
     identifiability: tuple[str, ...]
     warnings: tuple[str, ...]
     doubts: tuple[str, ...] = ()
-    request: Request | None = None
     carrying_modes: tuple[CarryingMode, ...] = ()
 
     @property

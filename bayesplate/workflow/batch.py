@@ -13,13 +13,15 @@ from bayesplate.errors import (
     CheckpointError,
     RunInterrupted,
 )
+from bayesplate.files import write_text
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.batch_summary import FORMAT, BatchSummary, Doubt, Failure
 from bayesplate.results.board_journal import Journal
 from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.board_table import TableKind, require_table_kind, write_table
-from bayesplate.results.folder import OutputFolder, json_text, run_of_its_own, write_text
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import OutputFolder, run_of_its_own
 from bayesplate.results.grading import Grading, GradingRequest, grade
 from bayesplate.results.told_rows import told_rows
 from bayesplate.workflow.arguments import require_arguments

@@ -30,10 +30,11 @@ from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.errors import InputError
+from bayesplate.files import make_folder, write_text
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import CampaignPlots
-from bayesplate.results.contract import as_json
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder, json_text, make_folder, write_text
+from bayesplate.results.contract import as_json, json_text
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, OutputFolder
 from bayesplate.workflow.campaign import Campaign
 from bayesplate.workflow.campaign_fit import (
     boards_of,

@@ -24,17 +24,13 @@ from bayesplate.campaigns.summary import (
     shared_numbers,
 )
 from bayesplate.errors import CheckpointError, NotConvergedError
+from bayesplate.files import write_text
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress, SamplerSettings
-from bayesplate.results.folder import (
-    BOARDS,
-    SUMMARY,
-    OutputFolder,
-    json_text,
-    write_text,
-)
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import BOARDS, SUMMARY, OutputFolder
 from bayesplate.results.summarise import sampler_health, summarise
 from bayesplate.results.versions import versions
 from bayesplate.workflow.campaign import Campaign

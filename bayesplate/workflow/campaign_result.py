@@ -20,20 +20,11 @@ from bayesplate.campaigns.summary import (
 )
 from bayesplate.cards import PriorCard
 from bayesplate.errors import Fault, InputError
+from bayesplate.files import make_folder, write_text, writing
 from bayesplate.report.plots import CampaignPlots
 from bayesplate.results.archive import to_arviz, write_archive
-from bayesplate.results.contract import as_json
-from bayesplate.results.folder import (
-    ARCHIVE,
-    BOARDS,
-    OF_POPULATION,
-    PAGE,
-    SUMMARY,
-    json_text,
-    make_folder,
-    write_text,
-    writing,
-)
+from bayesplate.results.contract import as_json, json_text
+from bayesplate.results.folder import ARCHIVE, BOARDS, OF_POPULATION, PAGE, SUMMARY
 from bayesplate.workflow.campaign import Campaign
 from bayesplate.workflow.fit import write_fit, write_page
 from bayesplate.workflow.fitting import Fitted

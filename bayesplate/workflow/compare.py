@@ -12,6 +12,7 @@ from bayesplate.effects import EFFECTS
 from bayesplate.estimates.coefficients import CoefficientSource, named_table
 from bayesplate.estimates.leave_one_out import CarryingMode, united
 from bayesplate.estimates.paper import paper_system
+from bayesplate.files import make_folder, require_new, write_text
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws, with_likely_labels
 from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
@@ -22,8 +23,7 @@ from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.report.plots import ComparePlots
 from bayesplate.results.archive import to_arviz
 from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, judged_alike, theory_row
-from bayesplate.results.contract import NOT_IN_JSON
-from bayesplate.results.folder import json_text, make_folder, require_new, write_text
+from bayesplate.results.contract import NOT_IN_JSON, json_text
 from bayesplate.results.store import posterior_archive
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments

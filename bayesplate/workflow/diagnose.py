@@ -31,6 +31,7 @@ from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
 from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, indices_of, united
+from bayesplate.files import make_folder, write_text
 from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.survivors import survivors
 from bayesplate.plate.material import MODULI
@@ -38,7 +39,8 @@ from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots
 from bayesplate.results.archive import to_arviz
-from bayesplate.results.folder import BEFORE, DIAGNOSIS, json_text, make_folder, run_of_its_own, write_text
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
 from bayesplate.results.store import attributes_of, posterior_archive
 from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments

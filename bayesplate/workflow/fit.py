@@ -10,20 +10,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.files import write_text, writing
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import FitPlots
 from bayesplate.results.archive import to_arviz
-from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, json_text, run_of_its_own, write_text, writing
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, run_of_its_own
 from bayesplate.results.store import attributes_of, posterior_archive, write_posterior
 from bayesplate.results.summarise import unconverged_summary
 from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
-from bayesplate.workflow.fitting import Fitted, fitted, not_converged, opened, request_of
+from bayesplate.workflow.fitting import Fitted, fitted, not_converged, opened
 from bayesplate.workflow.one_thread import one_thread_each
 from bayesplate.workflow.prepare import Card
 from bayesplate.workflow.problem import Problem
@@ -186,9 +188,6 @@ def refuse_unconverged(inference: Inference, seed: int, problem: Problem, folder
     convergence = inference.convergence
     if folder is not None:
         sha256 = problem.prepared.card.sha256
-        request = request_of(problem)
-        summary = unconverged_summary(
-            inference.problem, inference.chains, convergence, seed, versions(), sha256, request
-        )
+        summary = unconverged_summary(inference.problem, inference.chains, convergence, seed, versions(), sha256)
         write_text(folder / SUMMARY, json_text(summary))
     raise not_converged(convergence, inference.problem.doubts)

@@ -12,7 +12,6 @@ from pathlib import Path
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
-from bayesplate.posterior.certificate import certify
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws, with_likely_labels
@@ -21,7 +20,7 @@ from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import OutputFolder
 from bayesplate.results.summarise import summarise
-from bayesplate.results.summary import Request, Summary
+from bayesplate.results.summary import Summary
 from bayesplate.results.versions import versions
 from bayesplate.workflow.problem import Problem
 
@@ -165,9 +164,7 @@ def fitted(
         inference, draws = sampled(problem.posed.under("exact"))
         errors = linearisation(inference, draws)
     assessment = assess(inference, draws, errors)
-    certificate = certify(inference, seed)
-    sha256 = problem.prepared.card.sha256
-    summary = summarise(inference, draws, assessment, seed, versions(), sha256, certificate, request_of(problem))
+    summary = summarise(inference, draws, assessment, seed, versions(), problem.prepared.card.sha256)
     return Fitted(problem, inference, draws, summary)
 
 
@@ -188,12 +185,6 @@ def not_converged(
     """
     what = f"the sampler did not converge{f' for {of}' if of else ''}, so {so}:"
     return NotConvergedError("\n".join((what, *convergence.reasons, *(f"A likely cause: {doubt}" for doubt in doubts))))
-
-
-def request_of(problem: Problem) -> Request:
-    """What a problem was asked for, as its summary keeps it."""
-    prepared = problem.prepared
-    return Request(prepared.card_text, problem.asked_law, prepared.named.digests)
 
 
 def checkpoint_in(folder: Path, problem: Problem, posed: PosedProblem) -> Checkpoint:

@@ -14,13 +14,13 @@ from bayesplate.estimates.identifiability import identifiability, require_identi
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.proposals import proposals
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Precision, Sheet, sheet
+from bayesplate.files import make_folder, require_new
 from bayesplate.frequencies.prior_bands import prior_bands, prior_medians
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.posterior.laplace import noise_widenings
 from bayesplate.report.plots import ModesPlots
-from bayesplate.results.folder import make_folder, require_new
 from bayesplate.results.sheets import ModesReport, proposed_labels, sheet_report
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.one_thread import one_thread_each

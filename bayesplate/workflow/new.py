@@ -12,10 +12,10 @@ from bayesplate.cards.starter import HALF_TOP, Starter, starter_text
 from bayesplate.cards.values import Number, Refusal
 from bayesplate.cards.words import did_you_mean, name_complaint, shown
 from bayesplate.errors import Fault, InputError, plain
+from bayesplate.files import write_text, writing
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
 from bayesplate.plate.from_card import board_from_card
-from bayesplate.results.folder import write_text, writing
 
 _EDGES_WANTED = (
     '"free", "cantilever", "clamped", "supported", or four letters of C, S and F for x0, y0, x1, y1, like "CFFF"'

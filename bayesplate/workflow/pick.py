@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bayesplate.errors import Fault, InputError, NotIdentifiableError, plain
+from bayesplate.files import make_folder, require_new, write_text
 from bayesplate.recordings.contract import PickReport, rows
 from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
 from bayesplate.recordings.reading import read_recordings
@@ -16,7 +17,8 @@ from bayesplate.recordings.sand import read_picture
 from bayesplate.recordings.signals import Motion, Recording
 from bayesplate.recordings.sweeps import impulse_response, read_sweep
 from bayesplate.recordings.taking import Heard, take, take_impulses
-from bayesplate.results.folder import FIGURES, make_folder, require_new, write_text
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import FIGURES
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.fragment import fragment_text
 from bayesplate.workflow.pick_sand import pictures_of, upright
@@ -249,7 +251,6 @@ def _each_once(named: Mapping[int, tuple[str, float]]) -> dict[int, tuple[str, f
 
 def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked, heard: Heard) -> None:
     from bayesplate.report.recordings_page import write_recordings_page
-    from bayesplate.results.folder import json_text
 
     make_folder(folder / FIGURES)
     fragment, _, numbers = targets

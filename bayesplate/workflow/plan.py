@@ -20,6 +20,7 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
+from bayesplate.files import make_folder, require_new, write_text
 from bayesplate.planning.assembled import (
     Bench,
     benches,
@@ -34,7 +35,8 @@ from bayesplate.planning.survivors import asked, surviving
 from bayesplate.plate.board import Board
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import PlanPlots
-from bayesplate.results.folder import DIAGNOSIS, json_text, make_folder, require_new, write_text
+from bayesplate.results.contract import json_text
+from bayesplate.results.folder import DIAGNOSIS
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.one_thread import one_thread_each

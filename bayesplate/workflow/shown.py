@@ -24,7 +24,6 @@ from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
 from bayesplate.results.batch_summary import BatchSummary
-from bayesplate.results.certified import certificate_sentence, contradiction
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.command_tables import (
     METHODS_REMARK,
@@ -35,7 +34,7 @@ from bayesplate.results.command_tables import (
     sheet_tables,
 )
 from bayesplate.results.comparison import Comparison
-from bayesplate.results.folder import json_text
+from bayesplate.results.contract import json_text
 from bayesplate.results.grading import Grading
 from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables
 from bayesplate.results.notebook import html
@@ -122,9 +121,7 @@ def show_fit(summary: Summary | CampaignSummary) -> Shown:
         + (f"{left_out:.1f} left out" if left_out is not None else summary.why_no_left_out)
         + f"; noise {noise}; the linear law is off by {two_digits(error.linearisation_rms_cents)} cents."
     )
-    checked = summary.certificate
-    remarks = () if contradiction(checked) else (certificate_sentence(checked),)
-    return Shown(tables, (*summary.identifiability, *remarks), summary.warnings, closing)
+    return Shown(tables, summary.identifiability, summary.warnings, closing)
 
 
 def _show_campaign_fit(summary: CampaignSummary) -> Shown:

@@ -27,7 +27,7 @@ from bayesplate.modes.solve import solve, solve_classes
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.setup import Ends
-from bayesplate.posterior.convergence import autocorrelation_time, burn_in_steps
+from bayesplate.posterior.convergence import autocorrelation_times, burn_in_steps
 from bayesplate.posterior.inference import PosedProblem, infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.workflow.prepare import prepare, prepared_card
@@ -103,7 +103,7 @@ def plain_emcee(problem: PosedProblem, seed: int) -> float:
 
     seconds = best(run, 1)
     kept = sampler.get_chain(discard=burn_in_steps(PLAIN_STEPS))
-    return float(kept.shape[0] * n_walkers / autocorrelation_time(kept).max() / seconds)
+    return float(kept.shape[0] * n_walkers / autocorrelation_times(kept).max() / seconds)
 
 
 def our_sampling(problem: PosedProblem, seed: int) -> float:

@@ -150,10 +150,14 @@ CONVERGENCE = (
         ),
     ),
     Row(
-        "certificate",
-        "Draws against the closed form on the user's own data, where there is one",
+        "normal case",
+        "Draws of fits, weighted to the normal case of their boards, against its closed form",
         "within 4 Monte Carlo errors",
-        tests=("posterior/test_certificate.py::test_right_draws", "posterior/test_certificate.py::test_control"),
+        tests=(
+            "posterior/test_closed_form.py::test_right_draws",
+            "posterior/test_closed_form.py::test_control",
+            "posterior/test_sessions.py::test_draws_of_constants",
+        ),
     ),
 )
 
@@ -254,7 +258,6 @@ SECURITY = (
         tests=(
             "workflow/test_batch.py::test_a_link_out",
             "workflow/test_batch.py::test_bad_rows_are_rows",
-            "workflow/test_repeat.py::test_a_summary_cannot_name",
         ),
     ),
     Row(

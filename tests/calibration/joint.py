@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,15 +26,15 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.posterior.moves import Steps
-from bayesplate.posterior.proposals import Proposal
+from bayesplate.posterior.mixture import Mixture
+from bayesplate.posterior.moves import IndependentMove
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 
 N_CHAINS, N_STEPS = 20, 2000
 N_INDEPENDENT = 100_000
-N_ARCHIVED = 128
-ORDER = "DIDD"
+N_UPDATES = 16
+"""Of each chain between two drawings of its readings: emcee's own moves look at other walkers, with other readings."""
 NOISE = Quantity.from_median(0.15, 1.5)
 """So large that a step of the constants is no small part of their prior's width, and 2000 of them cross it often."""
 DESIGN = Design(law="fixed-linear", resolution=1.0)
@@ -140,7 +141,7 @@ def run_chains(n_chains: int, n_steps: int, seed: int, mutant: str = "") -> Floa
     """
     rng = np.random.default_rng(seed)
     spread = prior_draws(1000, rng)
-    proposal, archive = Proposal.fitted(spread), spread[:N_ARCHIVED][None]
+    mixture, random = Mixture.fitted(spread), np.random.RandomState(rng.integers(2**32, size=8))
     theta = prior_draws(n_chains, rng)
     base = reference_posterior()
     error = 0.5 if mutant == MUTANTS[1] else 1.0
@@ -149,10 +150,12 @@ def run_chains(n_chains: int, n_steps: int, seed: int, mutant: str = "") -> Floa
         hertz = readings(theta, rng, error)
         posterior = ByRow(base.board, base.prior, base.models, "linear", hertz=hertz,
                           is_counted_twice=mutant == MUTANTS[0])  # fmt: skip
-        steps = Steps(lambda points, one=posterior: density(one, points), proposal, archive, ORDER, n_chains, [rng])
-        log_prob = density(posterior, theta)
-        for _ in ORDER:
-            theta, log_prob, _ = steps.walked(theta, log_prob)
+        move = IndependentMove(mixture)
+        model: Any = SimpleNamespace(log_prob_fn=lambda points, one=posterior: density(one, points), random=random)
+        state: Any = SimpleNamespace(coords=theta, log_prob=density(posterior, theta))
+        for _ in range(N_UPDATES):
+            state, _ = move.propose(model, state)
+        theta = state.coords
         total += moments(theta, hertz)
     return total / n_steps
 
@@ -188,7 +191,7 @@ def agrees(z: Sequence[float]) -> bool:
 
 def identity() -> dict[str, Any]:
     """What a file of these records must agree in."""
-    return {"format": 1, "part": "joint", "noise": repr(NOISE), "design": repr(DESIGN), "order": ORDER}
+    return {"format": 1, "part": "joint", "noise": repr(NOISE), "design": repr(DESIGN), "updates": N_UPDATES}
 
 
 def judge(records: Sequence[Record]) -> tuple[list[str], bool]:

@@ -107,7 +107,7 @@ def posterior_draws(problem: PosedProblem, design: Design, rng: np.random.Genera
         )
         inference = infer(problem, settings)
         if inference.convergence.passed:
-            return ranked_draws(inference.chains.pooled, rng), attempt
+            return ranked_draws(inference.theta.reshape(-1, inference.theta.shape[-1]), rng), attempt
     raise BayesplateError("; ".join(inference.convergence.reasons))
 
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import emcee
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bayesplate.posterior import convergence
 from bayesplate.posterior.convergence import (
     Gate,
-    Length,
     acceptance_by_walker,
     assess,
-    autocorrelation_time,
+    autocorrelation_times,
     burn_in_steps,
-    split_rhat,
+    length_in_taus,
 )
+from bayesplate.posterior.statistics import rhat
 
 RHO = 0.8  # kept with probability RHO, otherwise drawn anew: autocorrelation RHO**lag, acceptance 1 - RHO
 TAU = (1 + RHO) / (1 - RHO)
@@ -37,53 +35,44 @@ def test_good_draws_pass_with_the_known_autocorrelation_time():
     assert convergence.passed
     assert convergence.reasons == ()
     assert convergence.tau == pytest.approx(TAU, rel=0.2)
-    assert convergence.ess == pytest.approx(4 * 1000 * 16 / TAU, rel=0.2)
+    assert np.all(convergence.ess < 1.2 * 4 * 1000 * 16 / TAU)
+    assert np.all(convergence.ess > 0.5 * 4 * 1000 * 16 / TAU)  # that of the tails is smaller
     assert convergence.acceptance == pytest.approx(1 - RHO, abs=0.01)
     assert convergence.n_kept_steps == 1000
 
 
-def test_the_autocorrelation_time_is_that_of_emcee():
-    draws = renewal_draws(n_ensembles=1, n_steps=3000)[0]
-    assert autocorrelation_time(draws) == pytest.approx(emcee.autocorr.integrated_time(draws, tol=0), rel=0.03)
-    assert autocorrelation_time(draws) == pytest.approx(TAU, rel=0.1)
+def test_the_autocorrelation_time_is_the_known_one():
+    assert autocorrelation_times(renewal_draws(n_ensembles=1, n_steps=3000)[0]) == pytest.approx(TAU, rel=0.1)
 
 
-def test_the_length_that_a_run_waits_for_is_the_one_that_is_judged():
-    draws = renewal_draws(n_steps=200)
-    parts = draws[:, :70], draws[:, 70:]
-    assert Length().in_taus(parts, wanted=0.0) == assess(draws).n_taus < Gate().tau_count_min
+def test_independent_draws_have_a_time_of_one():
+    assert autocorrelation_times(np.random.default_rng(0).standard_normal((500, 16, 3))).min() >= 1.0
 
 
-def test_one_slow_parameter_keeps_a_run_waiting_and_is_looked_at_first_again(monkeypatch):
+def test_the_length_is_that_of_the_slowest_parameter_of_the_slowest_ensemble():
     draws = renewal_draws(n_steps=200, n_dim=3)
+    quick = length_in_taus(draws)
+    assert quick == pytest.approx(200 / TAU, rel=0.3)
     draws[2, :, :, 1] = np.cumsum(draws[2, :, :, 1], axis=0)
-    looked_at: list[int] = []
-    time_of = convergence._time_of
-    monkeypatch.setattr(convergence, "_time_of", lambda series: looked_at.append(1) or time_of(series))
-    told = assess(draws).n_taus
-    looked_at.clear()
-
-    length = Length()
-    assert length.in_taus([draws], 1.5 * told) == told
-    assert len(looked_at) == 1 + 2 * 3 + 2  # the first twice, two ensembles of three, and two of the third
-    assert length.slow == (2, 1)
-    assert length.in_taus([draws], 1.5 * told) == told
-    assert len(looked_at) == 1 + 2 * 3 + 2 + 1
+    assert length_in_taus(draws) < 0.5 * quick
 
 
-def test_a_walker_that_stays_apart_lengthens_the_time():
-    draws = renewal_draws(n_ensembles=1)[0]
-    draws[:, 0] += 20.0
-    assert autocorrelation_time(draws).min() > 100
+def test_a_walker_that_stays_apart_does_not_pass():
+    """Its mean is another one than that of the others, at any length: the effective size sees it."""
+    draws = renewal_draws()
+    draws[:, :, 0] += 20.0
+    found = assess(draws)
+    assert not found.passed
+    assert found.ess_min < Gate().ess_min
 
 
-def test_a_stuck_ensemble_fails_rhat_only():
+def test_a_stuck_ensemble_fails():
     draws = renewal_draws()
     draws[2] += 3.0
     convergence = assess(draws, names=("D_x", "D_y"))
     assert not convergence.passed
-    assert len(convergence.reasons) == 1
     assert "disagree about D_" in convergence.reasons[0]
+    assert "The effective sample size" in convergence.reasons[1]
 
 
 def test_ensembles_of_unlike_width_fail_rhat():
@@ -94,13 +83,12 @@ def test_ensembles_of_unlike_width_fail_rhat():
 
 def test_a_drift_fails_rhat():
     draws = renewal_draws() + np.linspace(0, 1, 1000)[:, None, None]
-    assert split_rhat(draws).min() > 1.01
+    assert assess(draws).rhat.min() > 1.01
 
 
 def test_rhat_is_not_taken_over_single_walkers():
     draws = renewal_draws(n_steps=650)
-    walkers = np.moveaxis(draws, 2, 1).reshape(-1, 650, 1, 2)
-    assert split_rhat(walkers).max() > 1.01
+    assert rhat(np.moveaxis(draws, 2, 1).reshape(-1, 650, 2)).max() > 1.01
     convergence = assess(draws)
     assert convergence.passed, convergence.reasons
     assert convergence.rhat_max < 1.005
@@ -175,11 +163,11 @@ def moving(fractions):
     return draws
 
 
-def apart(rhat):
+def apart(rhat_max):
     """Draws whose ensembles disagree so much that the split R-hat has this value."""
     draws = renewal_draws(n_dim=1)
     shift = np.array([0.0, 0.0, 1.0, 0.0])[:, None, None, None]
-    return draws + shift * brentq(lambda s: split_rhat(draws + s * shift)[0] - rhat, 0.0, 1.0, xtol=1e-12)
+    return draws + shift * brentq(lambda s: assess(draws + s * shift).rhat_max - rhat_max, 0.0, 1.0, xtol=1e-9)
 
 
 def cut_where(value, limit, draws):

@@ -12,10 +12,10 @@ from scipy import stats
 
 from bayesplate.cards import load_prior
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.draws import thin_walker_major
 from bayesplate.posterior.inference import infer, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
+from bayesplate.posterior.thinning import thin_walker_major
 from bayesplate.quantities import Quantity
 
 
@@ -39,7 +39,7 @@ def drawn():
     prior = posterior.prior_transform(np.random.default_rng(1).random((20_000, problem.parameters.n_dim)))
     prior = prior[np.isfinite(posterior.log_prior(prior))]
     problem = replace(problem, posterior=silent, centre=prior.mean(axis=0), covariance=np.cov(prior.T), is_forced=True)
-    inference = infer(problem, SamplerSettings(seed=3, gate=Gate(ess_min=2500.0)))
+    inference = infer(problem, SamplerSettings(seed=3, gate=Gate(tau_count_min=400.0)))
     assert inference.convergence.passed, inference.convergence.reasons
     chains = inference.chains
     apart = thin_walker_major(chains.draws, chains.burn_in, 6.0 * inference.convergence.tau_max)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, NARROW, board_of, models_at, peaks_of, setup_of
+from normal_case import NormalCase, differences, draws_of
 
 from bayesplate.cards import load_prior
 from bayesplate.diagnosis.evidence.search import prepare_search, search
@@ -27,8 +28,8 @@ from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.sessions import discrepancy_names, sessions, with_discrepancies
 from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid
-from bayesplate.posterior.inference import PosedProblem, pose
-from bayesplate.posterior.normal_case import NormalCase
+from bayesplate.posterior.inference import PosedProblem, infer, pose
+from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 
 SCATTER, DISCREPANCY, N_SESSIONS, N_BOARDS = 0.003, 0.006, 4, 400
@@ -116,6 +117,17 @@ def test_constants_of_boards_with_a_discrepancy_are_covered(believed):
 
     assert (np.abs(held / N_BOARDS - 0.9) < tolerance).all() == (believed == DISCREPANCY), held / N_BOARDS
     assert believed == DISCREPANCY or (held / N_BOARDS).max() < 0.6
+
+
+def test_draws_of_constants_and_discrepancies_are_those_of_the_closed_form():
+    inference = infer(posed(), SamplerSettings(seed=5))
+    case, (theta, log_posterior) = NormalCase.of(posed()), draws_of(inference)
+    discrepancy = case.parameters.n_constants + N_SESSIONS
+    control = theta.copy()
+    control[..., discrepancy:] *= 0.8
+
+    assert differences(case, theta, log_posterior) == []
+    assert differences(case, control, log_posterior)
 
 
 def test_a_discrepancy_moves_the_mode_in_all_sessions_and_no_other():

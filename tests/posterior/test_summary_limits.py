@@ -24,6 +24,7 @@ from bayesplate.posterior.inference import Inference, pose
 from bayesplate.posterior.reweighting import linearisation
 from bayesplate.posterior.sampling import Chains
 from bayesplate.posterior.target import linear_suffices
+from bayesplate.posterior.thinning import walker_major
 from bayesplate.results.budget import input_remarks, prior_remarks
 from bayesplate.results.summarise import summarise
 from bayesplate.workflow.prepare import prepare
@@ -42,7 +43,7 @@ def inference():
     rng = np.random.default_rng(1)
     theta = rng.multivariate_normal(problem.centre, problem.covariance, (4, 60, 10))
     log_prob = problem.posterior(theta.reshape(-1, theta.shape[-1])).reshape(theta.shape[:-1])
-    return Inference(problem, Chains(theta, log_prob, 0), assess(theta))
+    return Inference(problem, Chains(theta, log_prob, 0), assess(theta), walker_major(theta), walker_major(log_prob))
 
 
 def summary_of(inference, errors=0.0):

@@ -175,7 +175,7 @@ def test_writing_imports_neither_arviz_nor_xarray():
 def test_arviz_is_loaded_quietly_whatever_its_user_has_for_a_home(tmp_path, name):
     """On its first day 0.23 announces version 1, as a warning, and writes into the cache that it did."""
     (tmp_path / "a-file").touch()
-    program = "from bayesplate.results.archive import load_arviz\nload_arviz().ess"
+    program = "from bayesplate.libraries import load_arviz\nload_arviz().ess"
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / name)}
     root = Path(archive_module.__file__).parents[2]
     run = [sys.executable, "-W", "error::FutureWarning", "-c", program]

@@ -18,7 +18,7 @@ from made_summaries import SUMMARY
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.quantities import Quantity
 from bayesplate.report.content import summary_sentences
-from bayesplate.results.folder import json_text
+from bayesplate.results.contract import json_text
 from bayesplate.results.modes import mode_rows
 from bayesplate.workflow.shown import show_fit
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from made_summaries import SUMMARY
 
-from bayesplate.results.contract import Elastic, Spread, finite, rms
-from bayesplate.results.folder import json_text
+from bayesplate.results.contract import Elastic, Spread, finite, json_text, rms
 from bayesplate.results.summary import ModelHeader, SamplerHealth, Unconverged
 
 SPREAD = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
@@ -22,8 +21,8 @@ MEANS = [*ELASTIC, *RIGIDITY, "effective_draws"]
 CONTRACT = {
     "": ["format", "name", "seed", "versions", "card_sha256", "model", "converged", "elastic", "rigidity", "effects",
          "noise", "inputs", "derived", "joint", "least_squares", "weighted_least_squares", "percentile", "linear_means",
-         "exact_means", "modes", "peaks", "spectra", "error", "sampler", "certificate", "identifiability",
-         "warnings", "doubts", "request", "carrying_modes"],
+         "exact_means", "modes", "peaks", "spectra", "error", "sampler", "identifiability", "warnings",
+         "doubts", "carrying_modes"],
     "model": ["theory", "law", "effects", "robust", "prior", "isotropic"],
     "elastic": ELASTIC, "elastic/E_x": SPREAD,
     "rigidity": RIGIDITY, "rigidity/D_x": SPREAD,
@@ -41,9 +40,8 @@ CONTRACT = {
     "spectra/0/modes/0": ["setup", "label", "predicted_hz", "seen_probability"],
     "error": ["in_sample_rms_cents", "leave_one_out_rms_cents", "linearisation_rms_cents", "exact_law_worst_cents",
               "surrogate_rms_cents", "surrogate_worst_cents"],
-    "sampler": ["ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance"],
-    "request": ["card", "law", "named"],
-    "certificate": ["applies", "passed", "reason", "comparisons", "worst", "worst_errors", "effective_draws"],
+    "sampler": ["ensembles", "walkers", "steps", "tau_max", "rhat_max", "ess_min", "acceptance", "drawn_from",
+                "pareto_k"],
 }  # fmt: skip
 """Keys of summary.json in their order, by the place where they stand."""
 
@@ -93,7 +91,7 @@ def test_a_run_that_failed_the_gate_has_no_constants():
     failed = Unconverged(1, "made", 1, {}, "0", model, False, sampler, ("too short",))
     header = CONTRACT[""][:6]
 
-    assert list(read(failed)) == [*header, "converged", "sampler", "warnings", "request"]
+    assert list(read(failed)) == [*header, "converged", "sampler", "warnings"]
     assert (read(failed)["converged"], read(SUMMARY)["converged"]) == (False, True)
     assert read(failed)["sampler"]["rhat_max"] is None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +29,7 @@ ROAD = (
     "report",
 )
 """Each room sees the rooms before it."""
-OPEN_TO_ALL = {"errors", "quantities", "labels"}
+OPEN_TO_ALL = {"errors", "files", "quantities", "labels", "libraries"}
 ROOMS = {
     **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
     "recordings": {"recordings", "modes", *OPEN_TO_ALL},
@@ -58,7 +59,7 @@ CALLED = {Path("modes/__init__.py"): {"workflow"}}
 DOORS = {
     "emcee": "posterior",
     "skfem": "modes",
-    "arviz": "results",
+    "arviz": "libraries",
     "xarray": "results",
     "matplotlib": "report",
     "corner": "report",
@@ -70,6 +71,8 @@ DOORS = {
 """Heavy libraries and the one room that may import each."""
 ONLY_WHERE_NEEDED = {*DOORS, "scipy.stats"}
 """Imported inside functions, so that `--help` answers at once."""
+WRITERS = {Path("files.py"), Path("posterior/checkpoint.py"), Path("results/board_journal.py")}
+"""Files are written by the first; the others add to theirs while a run goes on."""
 EXECUTES_DATA = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve"}
 SEEDED_RANDOM = {"Generator", "BitGenerator", "SeedSequence", "default_rng", "MT19937", "PCG64", "Philox", "SFC64"}
 
@@ -189,6 +192,18 @@ def _one_call_faults(node: ast.Call, inside: Path) -> Iterator[tuple[int, str]]:
     if is_hidden and inside not in (Path("__init__.py"), Path("effects/__init__.py")):
         yield node.lineno, "imports a module of a computed name"
 
+    if _writes_a_file(node) and inside not in WRITERS:
+        yield node.lineno, "writes a file by itself: bayesplate.files does"
+
+
+def _writes_a_file(node: ast.Call) -> bool:
+    given = [*node.args, *(one.value for one in node.keywords)]
+    modes = [one.value for one in given if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+    if _called(node) == "open":
+        return any(re.fullmatch("[wax][bt+]*", mode) for mode in modes)
+    name = ast.unparse(node.func)
+    return name == "os.replace" or name.endswith((".write_text", ".write_bytes"))
+
 
 def _called(node: ast.Call) -> str:
     return ast.unparse(node.func).rpartition(".")[2]
@@ -268,6 +283,16 @@ BAD_FILES = [
     ("results/bad.py", "from bayesplate.modes.terms import Weights", "results takes Weights from modes"),
     ("results/bad.py", "import bayesplate.modes.solve", "results takes bayesplate.modes.solve from modes"),
     ("results/bad.py", "import numpy as np\nnp.load('x', allow_pickle=True)", "allows pickles"),
+    *(
+        ("cards/bad.py", f"import os, pathlib\n{call}", "writes a file by itself: bayesplate.files does")
+        for call in (
+            "pathlib.Path('x').write_text('')",
+            "pathlib.Path('x').write_bytes(b'')",
+            "pathlib.Path('x').open('wb')",
+            "open('x', mode='a')",
+            "os.replace('x', 'y')",
+        )
+    ),
     ("cards/bad.py", "x = eval('1')", "calls eval"),
     ("cards/bad.py", "exec('x = 1')", "calls exec"),
     ("modes/bad.py", "import numpy as np\nnp.random.seed(1)", "uses the global random state: seed"),

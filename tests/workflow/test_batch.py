@@ -29,7 +29,7 @@ import bayesplate
 from bayesplate.cards import load_named, load_prior, read_board_text
 from bayesplate.cli import main
 from bayesplate.errors import BatchError, CheckpointError, InputError
-from bayesplate.results.folder import json_text
+from bayesplate.results.contract import json_text
 from bayesplate.workflow.batch import default_batch_folder
 from bayesplate.workflow.batch_boards import boards_of
 from bayesplate.workflow.batch_pool import Call, WorkerDied, Workers, computed, processes

@@ -18,6 +18,7 @@ from runs import files_in, read_json
 from bayesplate.cli import main
 from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.errors import InputError
+from bayesplate.posterior.checkpoint import CHAINS
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.results.folder import OutputFolder
@@ -327,9 +328,9 @@ def test_a_signal_while_sampling_is_heeded_and_the_run_resumes(tmp_path, stop):
     program = [sys.executable, "-m", "bayesplate", "diagnose", CALM, "--out", str(folder), "--quiet"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(program, **pipes, text=True, env=dict(os.environ), preexec_fn=heed_interrupts) as process:
-        chunk = folder / "checkpoint" / "before" / "linear" / "chunk-0000.npz"
+        chains = folder / "checkpoint" / "before" / "linear" / CHAINS
         deadline = time.monotonic() + 120
-        while not chunk.exists() and process.poll() is None:
+        while not chains.exists() and process.poll() is None:
             assert time.monotonic() < deadline
             time.sleep(0.01)
         process.send_signal(stop)

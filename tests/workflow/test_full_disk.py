@@ -17,6 +17,7 @@ from made_batches import write_cards
 from made_recordings import hits, write_wav
 
 from bayesplate.cli import main
+from bayesplate.posterior.checkpoint import CHAINS
 
 BOARD = "fiemme-spruce-clamped"
 REASON = "No space left on device"
@@ -37,7 +38,7 @@ def full_at(monkeypatch):
     return fill
 
 
-@pytest.mark.parametrize("name", ["chunk-0001.npz", "posterior.nc", "summary.json", "report.html", "sampler.png"])
+@pytest.mark.parametrize("name", ["posterior.nc", "summary.json", "report.html", "sampler.png"])
 @pytest.mark.usefixtures("quickly")
 def test_a_fit_keeps_what_it_sampled_and_what_it_was_to_replace(name, full_at, tmp_path):
     full_at(name)
@@ -56,8 +57,20 @@ def test_a_fit_keeps_what_it_sampled_and_what_it_was_to_replace(name, full_at, t
     assert "internal error" not in run.stderr
     assert name in run.stderr or (name == "sampler.png" and "report.html" in run.stderr)
     assert "resume" in run.stderr
-    assert "checkpoint/linear/chunk-0000.npz" in left
+    assert f"checkpoint/linear/{CHAINS}" in left
     assert [path for path in left if path.endswith((".partial", name))] == []
+
+
+@pytest.mark.usefixtures("quickly")
+def test_a_fit_that_can_save_nothing_leaves_what_it_was_to_replace(full_at, tmp_path):
+    full_at(CHAINS)
+    (tmp_path / "summary.json").write_bytes(b"earlier")
+    run = runs.fit(tmp_path, BOARD, "--force")
+
+    assert run.exit_code == 6
+    assert REASON in run.stderr
+    assert CHAINS in run.stderr
+    assert run.files == {"summary.json": b"earlier"}
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,9 @@ from runs import files_in
 
 from bayesplate.cli import main
 from bayesplate.errors import InputError
-from bayesplate.posterior.checkpoint import take
+from bayesplate.locks import take
+from bayesplate.posterior import checkpoint
+from bayesplate.posterior.checkpoint import CHAINS
 from bayesplate.results.folder import OutputFolder
 from bayesplate.workflow import campaign_fit
 from bayesplate.workflow.stages import Stages
@@ -36,6 +39,8 @@ def arguments(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytes
         home, name = place.split(".")
         module = __import__(f"bayesplate.workflow.{home}", fromlist=[name])
         monkeypatch.setattr(module, name, getattr(module, name))  # to be put back at the end
+    for name in ("EVERY_SECONDS", "_LEAST_PAUSE"):
+        monkeypatch.setattr(checkpoint, name, getattr(checkpoint, name))
     quickly()
     if request.param == "batch":
         return ("batch", str(write_cards(tmp_path / "cards", "abcd")), "--workers", "1", "--quiet", "--no-report")
@@ -52,7 +57,7 @@ def run(folder: Path, *arguments: str):
 def is_saved(folder: Path) -> bool:
     """Whether a run left something to go on from."""
     journals = [path.read_bytes() for path in folder.glob("boards.jsonl")]
-    return any(folder.rglob("chunk-*.npz")) or b"\n" in b"".join(journals)
+    return any(folder.rglob(CHAINS)) or b"\n" in b"".join(journals)
 
 
 def go_on(folder: Path, *arguments: str) -> None:
@@ -107,8 +112,8 @@ def test_killed_at_any_moment_and_resumed_the_files_are_the_same(tmp_path, argum
         assert files_in(folder) == whole, moment
 
 
-def test_a_checkpoint_that_is_removed_is_that_of_a_shorter_run_until_it_is_none(tmp_path, monkeypatch):
-    """Results are there by then; killed meanwhile a run can be resumed, for its first chunks are the last to go."""
+def test_a_checkpoint_that_is_removed_goes_part_by_part_and_the_first_last(tmp_path, monkeypatch):
+    """Results are there by then; killed meanwhile a run can be resumed from what is left."""
     folder, remove, n_left = OutputFolder(tmp_path / "out"), os.unlink, 0
 
     def stops(*where, **how):
@@ -119,28 +124,19 @@ def test_a_checkpoint_that_is_removed_is_that_of_a_shorter_run_until_it_is_none(
         remove(*where, **how)
 
     monkeypatch.setattr(os, "unlink", stops)
-    for n_removed in range(100):
-        for stage in ("before", "after"):
-            inner = folder.checkpoint / stage / "linear"
-            inner.mkdir(parents=True, exist_ok=True)
-            for chunk in (f"chunk-000{i}.npz" for i in range(4)):
-                (inner / chunk).touch()
-                (inner / f"{chunk}.sha256").touch()
-            (inner / "manifest.json").touch()
+    parts, found = ("before", "refit"), []
+    for n_removed in range(20):
+        for part in parts:
+            (folder.checkpoint / part / "linear").mkdir(parents=True, exist_ok=True)
+            (folder.checkpoint / part / "linear" / CHAINS).touch()
         n_left = n_removed
-        try:
+        with suppress(KeyboardInterrupt):
             folder.close()
-        except KeyboardInterrupt:
-            for stage in ("before", "after"):
-                left = {path.name for path in (folder.checkpoint / stage / "linear").glob("*")}
-                chunks = sorted(name for name in left if name.endswith(".npz"))
-                assert chunks == [f"chunk-000{i}.npz" for i in range(len(chunks))]
-                assert not chunks or {"manifest.json", *(f"{name}.sha256" for name in chunks)} <= left
-        else:
+        found.append([part for part in parts if (folder.checkpoint / part / "linear" / CHAINS).exists()])
+        if not folder.checkpoint.exists():
             break
 
-    assert n_removed >= 18
-    assert not folder.checkpoint.exists()
+    assert [list(one) for one in dict.fromkeys(map(tuple, found))] == [["before", "refit"], ["before"], []]
 
 
 @pytest.mark.parametrize("arguments", ["fit", "diagnose", "batch"], indirect=True)

@@ -13,7 +13,7 @@ def blas_threads():
     return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
 
 
-@pytest.mark.parametrize("name", ["fit", "diagnose", "check", "compare", "plan", "modes", "repeat"])
+@pytest.mark.parametrize("name", ["fit", "diagnose", "check", "compare", "plan", "modes"])
 def test_no_call_leaves_linear_algebra_to_several_threads(name, monkeypatch):
     """Several threads for thousands of small matrices only wait for one another: a diagnosis was twice as slow."""
     assert scipy.linalg

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -261,6 +262,16 @@ def test_the_prior_and_the_law_can_be_given(clamped):
     assert (other.prior.name, other.law, other.posed.posterior.robust) == ("spruce", "exact", True)
     assert (clamped.prior.name, clamped.law) == ("weakly-informative", "linear")
     assert other.log_prior(theta) != pytest.approx(clamped.log_prior(theta), abs=0.1)
+
+
+def test_a_setup_that_took_the_place_of_the_card_s_is_in_the_text_and_in_its_digest(tmp_path, clamped):
+    """posterior.nc and summary.json have them: nothing else has to be kept for a run to be repeated."""
+    fragment = tmp_path / "setup.toml"
+    fragment.write_text('[setup.frequencies_hz]\n"(0,0)" = 53\n', encoding="utf-8")
+    card = bayesplate.Problem.from_card(BOARD, setup=fragment).prepared.card
+
+    assert "= 53" in card.text
+    assert hashlib.sha256(card.text.encode()).hexdigest() == card.sha256 != clamped.prepared.card.sha256
 
 
 @pytest.mark.usefixtures("quickly")

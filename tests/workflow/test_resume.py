@@ -13,9 +13,10 @@ import pytest
 import runs
 from runs import files_in, read_json
 
+from bayesplate.posterior.checkpoint import CHAINS
+
 BOARD = "fiemme-spruce-clamped"
-UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings",
-               "request"}  # fmt: skip
+UNCONVERGED = {"format", "name", "seed", "versions", "card_sha256", "model", "converged", "sampler", "warnings"}
 RESULTS = {"summary.json", "posterior.nc"}
 """What a fit without a report leaves; that a report is the same too is shown where threads are counted."""
 
@@ -36,12 +37,12 @@ def start(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen
     return subprocess.Popen(program, **pipes, text=True, env=variables, preexec_fn=heed_interrupts)
 
 
-def stop_while_sampling(folder: Path, *stops: signal.Signals, n_chunks: int) -> tuple[int, str]:
-    """Send a signal once so many chunks are saved; the exit code and what was said. The first of two only holds it."""
+def stop_while_sampling(folder: Path, *stops: signal.Signals) -> tuple[int, str]:
+    """Send a signal once a chunk is saved; the exit code and what was said. The first of two only holds it."""
     with start(folder, BOARD, "--no-report") as process:
-        last = folder / "checkpoint" / "linear" / f"chunk-{n_chunks - 1:04d}.npz"
+        saved = folder / "checkpoint" / "linear" / CHAINS
         deadline = time.monotonic() + 600
-        while not last.exists() and process.poll() is None:
+        while not saved.exists() and process.poll() is None:
             assert time.monotonic() < deadline
             time.sleep(0.01)
         for stop in stops:
@@ -65,7 +66,7 @@ def assert_taken(folder: Path, option: str, owner: int) -> None:
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files, stop):
-    exit_code, stderr = stop_while_sampling(tmp_path / "out", stop, n_chunks=1)
+    exit_code, stderr = stop_while_sampling(tmp_path / "out", stop)
 
     assert exit_code == 130
     assert stderr == "interrupted; --resume continues from the last checkpoint\n"
@@ -77,12 +78,12 @@ def test_an_interrupted_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files, st
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs a signal that cannot be caught")
 def test_a_killed_fit_resumes_to_the_same_bytes(tmp_path, fiemme_files):
     """And while it was alive, though it did nothing, no other run could take its folder."""
-    exit_code, _ = stop_while_sampling(tmp_path / "out", signal.SIGSTOP, signal.SIGKILL, n_chunks=2)
+    exit_code, _ = stop_while_sampling(tmp_path / "out", signal.SIGSTOP, signal.SIGKILL)
 
     assert exit_code == -signal.SIGKILL
     left = files_in(tmp_path / "out")
     assert RESULTS & set(left) == set()
-    assert "checkpoint/linear/chunk-0001.npz" in left
+    assert f"checkpoint/linear/{CHAINS}" in left
     assert runs.fit(tmp_path / "out", BOARD, "--resume", "--no-report").exit_code == 0
     assert files_in(tmp_path / "out") == results_of(fiemme_files)
 
@@ -130,14 +131,15 @@ def test_a_run_that_did_not_converge_is_continued_where_more_steps_are_allowed(s
     assert stopped.files == results_of(fiemme_files)
 
 
-def test_a_damaged_chunk_shortens_the_run_and_the_draws_are_the_same(stopped, fiemme_files):
-    chunk = stopped.folder / "checkpoint" / "linear" / "chunk-0001.npz"
-    chunk.write_bytes(chunk.read_bytes()[:1000])
+def test_a_damaged_checkpoint_is_refused_and_stays(stopped):
+    chains = stopped.folder / "checkpoint" / "linear" / CHAINS
+    chains.write_bytes(chains.read_bytes()[:1000])
+    before = stopped.files
+    again = runs.fit(stopped.folder, BOARD, "--resume", "--quiet", "--no-report")
 
-    assert runs.fit(stopped.folder, BOARD, "--resume", "--quiet", "--no-report").exit_code == 0
-    left = stopped.files
-    assert {name: left.pop(name) for name in RESULTS} == results_of(fiemme_files)
-    assert len(left["checkpoint/linear/chunk-0001.npz.damaged"]) == 1000
+    assert again.exit_code == 6
+    assert "got a damaged one; start anew with --force" in again.stderr
+    assert again.files == {**before, "checkpoint/linear/lock": again.files["checkpoint/linear/lock"]}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from benchmarks.peers.density import Density
 
-from bayesplate.posterior.convergence import autocorrelation_time
+from bayesplate.posterior.convergence import autocorrelation_times
 
 N_SCALED, N_SHEAR, N_NOISE = 41, 161, 41
 
@@ -59,7 +59,7 @@ def effective_draws(draws: np.ndarray, weights: np.ndarray | None) -> np.ndarray
         Of draws that are no chains; None where all count alike.
     """
     if draws.ndim == 3:
-        return np.asarray(draws.shape[0] * draws.shape[1] / autocorrelation_time(draws))
+        return np.asarray(draws.shape[0] * draws.shape[1] / autocorrelation_times(draws))
     each = np.ones(len(draws)) if weights is None else weights
     return np.full(draws.shape[-1], each.sum() ** 2 / np.sum(each**2))
 

@@ -32,8 +32,7 @@ from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.parameter import BOARD, Parameter
 from bayesplate.quantities import Quantity
 from bayesplate.report.verdict import diagnosis_section, quoted
-from bayesplate.results.contract import Elastic
-from bayesplate.results.folder import json_text
+from bayesplate.results.contract import Elastic, json_text
 from bayesplate.workflow.shown import show_diagnosis
 
 SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "fluid_loading", "grain_angle")

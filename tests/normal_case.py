@@ -1,12 +1,20 @@
 """The linear normal case of a board: a tangent law, normal errors and a normal prior, whose posterior is known exactly.
 
-With the logarithms of the frequencies linear in the fitted columns, errors of a reading that are normal, and a prior of
-the same slope and curvature as the board's own at the same point, the columns given the noise are normal: mean and
-covariance follow from the normal equations. The noise given the columns has a density of one variable.
+A board's own posterior has no closed form: a frequency is the root of a sum of stiffnesses, the noise is unknown and a
+reading may be rounded. With the logarithms of the frequencies linear in the fitted columns, errors of a reading that
+are normal, and a prior of the same slope and curvature as the board's own at the same point, the columns given the
+noise are normal: mean and covariance follow from the normal equations. The noise given the columns has a density of
+one variable.
+
+Draws of the posterior that are weighted by the ratio of the two densities are draws of that case, exactly, whatever
+their distance; only how many of them count depends on it. So each constant and each noise, as weighted, has the mean,
+the standard deviation and the quantiles of the closed form within Monte Carlo errors, or the draws are not of the
+density that was asked for. Whether the density itself is right is for other tests.
 
 References
 ----------
-A. Gelman et al., Bayesian Data Analysis, 3rd ed., 2013, section 14.2.
+A. Gelman et al., Bayesian Data Analysis, 3rd ed., 2013, section 14.2; A. B. Owen, Monte Carlo theory, methods and
+examples, 2013, sections 9.2 and 9.3.
 """
 
 from __future__ import annotations
@@ -15,20 +23,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
+import arviz
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
+from statistics_checks import QUANTILES
 
 from bayesplate.estimates.least_squares import log_measured
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.inference import Inference, PosedProblem
 from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]
 
+ALLOWED_ERRORS = 4.0
+"""Monte Carlo errors by which draws may differ from the closed form."""
+FEWEST_EFFECTIVE = 400.0
+"""Draws of equal weight that must be left: as many as the convergence gate asks for."""
+
+_MOST_DRAWS = 10_000
 _STEP = 1e-4
 _PRIOR_STEP = 1e-3
 _GRID_SDS, _N_GRID = 8.0, 201
-_N_SWEEPS = 8
 _EDGE = 1e-12
 
 
@@ -93,12 +108,6 @@ class NormalCase:
             prior_precision=_without_negative(-curvature),
         )
 
-    @property
-    def is_known(self) -> bool:
-        """Whether there is such a case: every derivative exists."""
-        parts = (self.slopes, self.misfit, self.prior_slope, self.prior_precision)
-        return all(bool(np.isfinite(part).all()) for part in parts)
-
     def log_density(self, theta: Floats) -> Floats:
         """Log density but for a constant: (n_draws,) array from (n_draws, n_dim)."""
         away = self._away(theta)
@@ -150,24 +159,6 @@ class NormalCase:
             found[:, i] = ndtri(np.clip(probability, _EDGE, 1.0 - _EDGE))
         return found
 
-    def draws(self, n_draws: int, rng: np.random.Generator) -> Floats:
-        """Independent draws, each the end of a chain that takes columns and noise in turn: (n_draws, n_dim) array."""
-        theta = np.tile(self.at, (n_draws, 1))
-        columns = self.parameters.fitted_columns
-        rows = np.arange(n_draws)
-        for _ in range(_N_SWEEPS):
-            for i in range(self.parameters.n_setups):
-                grid, below = self._noise_given_columns(theta, i)
-                u = rng.random(n_draws)
-                right = np.clip(np.sum(below < u[:, None], axis=1), 1, len(grid) - 1)
-                low, high = below[rows, right - 1], below[rows, right]
-                share = np.divide(u - low, high - low, out=np.full(n_draws, 0.5), where=high > low)
-                theta[:, self.parameters.n_constants + i] = grid[right - 1] + share * (grid[1] - grid[0])
-            mean, covariance = self.given_noise(self.parameters.log_noise(theta))
-            normal = rng.standard_normal(mean.shape)
-            theta[:, columns] = mean + np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), normal)
-        return theta
-
     def _away(self, theta: Floats) -> Floats:
         columns = self.parameters.fitted_columns
         return np.asarray(theta[:, columns] - self.at[columns])
@@ -193,6 +184,66 @@ class NormalCase:
         return grid, below
 
 
+def draws_of(inference: Inference) -> tuple[Floats, Floats]:
+    """Draws after burn-in and their log posterior, every so many steps that there are not too many of them.
+
+    Returns
+    -------
+    (n_ensembles, n_steps, n_walkers, n_dim) and (n_ensembles, n_steps, n_walkers) arrays
+    """
+    chains = inference.chains
+    log_posterior = chains.log_prob[:, chains.burn_in :]
+    every = max(1, -(-log_posterior.size // _MOST_DRAWS))
+    return chains.kept[:, ::every], log_posterior[:, ::every]
+
+
+def differences(case: NormalCase, theta: Floats, log_posterior: Floats) -> list[str]:
+    """List in what draws, weighted to the normal case, differ from its closed form.
+
+    Compared are the mean, the standard deviation and the 5, 50 and 95 % quantiles of every column and noise.
+
+    Parameters
+    ----------
+    case : NormalCase
+    theta : (n_ensembles, n_steps, n_walkers, n_dim) array
+    log_posterior : (n_ensembles, n_steps, n_walkers) array
+        But for a constant.
+
+    Returns
+    -------
+    list of str
+        One sentence a difference, or that too few draws count for any; empty if the draws agree.
+    """
+    flat = theta.reshape(-1, theta.shape[-1])
+    log_weights = case.log_density(flat) - log_posterior.ravel()
+    if not np.isfinite(log_weights).all():  # draws from where the posterior has nothing
+        log_weights = np.where(np.isposinf(log_weights), 0.0, -np.inf)
+    weights = np.exp(log_weights - log_weights.max())
+    weights /= weights.mean()
+    names = [f"ln {name}" for name in case.parameters.board.symmetry.free]
+    names += [*case.parameters.inputs, *(f"ln noise of {setup.name}" for setup in case.parameters.board.setups)]
+    deviates = np.concatenate([case.column_deviates(flat), case.noise_deviates(flat)], axis=1)
+    found = []
+    for name, one in zip(names, deviates.T, strict=True):
+        terms = {"mean": one, "standard deviation": one**2 - 1.0}
+        terms |= {f"{100 * p:g} % quantile": (one < ndtri(p)) - p for p in QUANTILES}
+        for what, term in terms.items():
+            mean, error = _mean((weights * term).reshape(log_posterior.shape))
+            if not abs(mean) <= ALLOWED_ERRORS * error:
+                found.append(f"{what} of {name}: off by {mean:.3g}, allowed {ALLOWED_ERRORS:g} times {error:.2g}")
+            if what == "mean" and not error <= FEWEST_EFFECTIVE**-0.5:
+                found.append(f"{what} of {name}: {error**-2:.0f} draws count, wanted {FEWEST_EFFECTIVE:.0f}")
+    return found
+
+
+def _mean(series: Floats) -> tuple[float, float]:
+    """Mean of an (n_ensembles, n_steps, n_walkers) array and its Monte Carlo error.
+
+    The walkers of one ensemble depend on each other, so that their mean is one series.
+    """
+    return float(series.mean()), float(arviz.mcse(series.mean(axis=2), method="mean"))
+
+
 def _derivatives(function: Callable[[Floats], Floats], n: int) -> tuple[Floats, Floats]:
     """First and second derivatives at zero of a function of rows, by differences: (n,) and (n, n) arrays."""
     steps = _PRIOR_STEP * np.eye(n)
@@ -206,7 +257,5 @@ def _derivatives(function: Callable[[Floats], Floats], n: int) -> tuple[Floats, 
 
 def _without_negative(precision: Floats) -> Floats:
     """A symmetric matrix without its negative eigenvalues, which no normal density has."""
-    if not np.isfinite(precision).all():
-        return precision
     values, vectors = np.linalg.eigh(precision)
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)

@@ -1,4 +1,4 @@
-"""What independent proposals are drawn from: a mixture of Student distributions, fitted to draws.
+"""A mixture of Student distributions, fitted to draws: what independent proposals are drawn from.
 
 A posterior of a plate is nearly normal given its noise, and the wider the larger the noise is: one ellipsoid fits it
 but roughly, a few of them fit it well. Proposals from a mixture of four are accepted seven times out of ten where those
@@ -32,8 +32,8 @@ _FLOOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
-    """A mixture of Student distributions to propose from.
+class Mixture:
+    """A mixture of Student distributions.
 
     Attributes
     ----------
@@ -49,19 +49,19 @@ class Proposal:
     factors: FloatArray
 
     @classmethod
-    def with_covariance(cls, centre: FloatArray, covariance: FloatArray) -> Proposal:
+    def with_covariance(cls, centre: FloatArray, covariance: FloatArray) -> Mixture:
         """One Student distribution of that mean and covariance."""
         shrink = (DEGREES_OF_FREEDOM - 2.0) / DEGREES_OF_FREEDOM
         return cls(np.ones(1), centre[None], _cholesky(shrink * covariance)[None])
 
     @classmethod
-    def one_fitted(cls, draws: FloatArray) -> Proposal:
+    def one_fitted(cls, draws: FloatArray) -> Mixture:
         """The Student distribution with the mean and covariance of (..., n_dim) draws."""
         flat = draws.reshape(-1, draws.shape[-1])
         return cls.with_covariance(flat.mean(axis=0), np.cov(flat.T).reshape(flat.shape[1], flat.shape[1]))
 
     @classmethod
-    def fitted(cls, draws: FloatArray) -> Proposal:
+    def fitted(cls, draws: FloatArray) -> Mixture:
         """The mixture of greatest likelihood, nearly, for (..., n_dim) draws; fewer parts where the draws are few.
 
         Started from the draws in order of their distance from the mean, in as many shells as there are parts: what one
@@ -87,7 +87,7 @@ class Proposal:
         return mixture
 
     @classmethod
-    def _of_shares(cls, flat: FloatArray, shares: FloatArray, pulls: FloatArray, floor: FloatArray) -> Proposal:
+    def _of_shares(cls, flat: FloatArray, shares: FloatArray, pulls: FloatArray, floor: FloatArray) -> Mixture:
         """The mixture of greatest likelihood given which part each draw belongs to, in (n_parts, n_draws) shares."""
         centres, factors = [], []
         for share, weight in zip(shares, shares * pulls, strict=True):
@@ -95,6 +95,11 @@ class Proposal:
             away = flat - centres[-1]
             factors.append(_cholesky((weight[:, None] * away).T @ away / share.sum() + floor))
         return cls(shares.mean(axis=1), np.stack(centres), np.stack(factors))
+
+    def widened(self, factor: float) -> Mixture:
+        """The same, so many times as wide, beside itself: half and half."""
+        factors = np.concatenate([self.factors, factor * self.factors])
+        return Mixture(np.tile(0.5 * self.weights, 2), np.tile(self.centres, (2, 1)), factors)
 
     @cached_property
     def _whitenings(self) -> FloatArray:
@@ -124,11 +129,11 @@ class Proposal:
         logs = self._log_shares(self.squared_distances(points.reshape(-1, points.shape[-1])))
         return np.asarray(np.logaddexp.reduce(logs, axis=0)).reshape(points.shape[:-1])
 
-    def points(self, n_points: int, rng: np.random.Generator) -> FloatArray:
+    def points(self, n_points: int, rng: np.random.Generator | np.random.RandomState) -> FloatArray:
         """Draws: (n_points, n_dim) array."""
         normal = rng.standard_normal((n_points, self.centres.shape[1]))
         normal *= np.sqrt(DEGREES_OF_FREEDOM / rng.chisquare(DEGREES_OF_FREEDOM, n_points))[:, None]
-        chosen = np.searchsorted(np.cumsum(self.weights)[:-1], rng.random(n_points), side="right")
+        chosen = np.searchsorted(np.cumsum(self.weights)[:-1], rng.uniform(size=n_points), side="right")
         result = np.empty_like(normal)
         for i, (centre, factor) in enumerate(zip(self.centres, self.factors, strict=True)):
             own = chosen == i

@@ -1,0 +1,115 @@
+"""Writing files: each is whole or absent, and none is replaced unasked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from bayesplate.errors import Fault, InputError, UnwritableError
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """A stream whose content takes the place of a file when it is complete, even after a power cut.
+
+    Raises
+    ------
+    OSError
+        If the disk is full or the place is not ours; what stood there before stays.
+    """
+    partial = path.with_name(path.name + ".partial")
+    try:
+        with partial.open("wb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Writing a file or a folder's files: what the system refuses is told with the place.
+
+    Raises
+    ------
+    UnwritableError
+        In place of an OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        wanted, remedy = "a file that can be written", "make room, or take another place with --out"
+        raise UnwritableError(Fault(str(path), wanted, reason, remedy)) from error
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file completely or not at all.
+
+    Raises
+    ------
+    UnwritableError
+        If the disk is full or the place is not ours.
+    """
+    with writing(path), whole_file(path) as stream:
+        stream.write(data)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file completely or not at all; raises as `write_bytes`."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of an output.
+
+    Raises
+    ------
+    UnwritableError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fault = Fault(f"--out {folder}", "a folder that can be written", error.strerror or str(error))
+        raise UnwritableError(fault) from error
+
+
+def names_in(folder: Path) -> list[str]:
+    """What a folder of outputs holds; nothing where there is none yet.
+
+    Raises
+    ------
+    InputError
+        If it is no folder, or the system does not let us look.
+    """
+    try:
+        return os.listdir(folder)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        is_file = os.path.exists(folder) and not os.path.isdir(folder)
+        got = "a file" if is_file else error.strerror or str(error)
+        raise InputError(Fault(f"--out {folder}", "a folder", got, "choose another place")) from None
+
+
+def require_new(folder: Path, names: Iterable[str], *, force: bool) -> tuple[Path, ...]:
+    """The files that a command will write beside others, checked before any work and without writing.
+
+    Raises
+    ------
+    InputError
+        If one is there and `force` is not given, or if the folder is no folder.
+    """
+    found = set(names_in(folder))
+    paths = tuple(folder / name for name in names)
+    there = [path.name for path in paths if path.name in found]
+    if there and not force:
+        wanted, remedy = "new files", "--force replaces them, --out takes another place"
+        raise InputError(Fault(f"--out {folder}", wanted, f"{', '.join(there)} already there", remedy))
+    return paths

@@ -1,0 +1,92 @@
+"""Where the walkers start: three standard errors around the estimate, on points that the posterior allows.
+
+Ensembles that agree after starting so far apart have forgotten where they came from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.errors import BayesplateError, NotConvergedError, NotIdentifiableError
+
+Floats = NDArray[np.float64]
+LogDensity = Callable[[Floats], Floats]
+"""Vectorised: (n_points, n_dim) to (n_points,); minus infinity outside the support."""
+
+_SPREAD = 3.0  # standard errors
+_TRIES = 1000
+
+
+def guarded(log_density: LogDensity, names: Sequence[str]) -> LogDensity:
+    """A log density that refuses every value which would be accepted without being one; `names` for the message.
+
+    Raises
+    ------
+    BayesplateError
+        Where it is called, if a value is not a number or plus infinity.
+    """
+
+    def checked(points: Floats) -> Floats:
+        values = np.asarray(log_density(points), dtype=np.float64)
+        if values.shape != points.shape[:1]:
+            raise BayesplateError(f"log posterior: wanted shape {points.shape[:1]}, got {values.shape}")
+        wrong = np.isnan(values) | (values == np.inf)
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            point = ", ".join(f"{name} = {float(value)!r}" for name, value in zip(names, points[i], strict=True))
+            raise BayesplateError(
+                f"log posterior: wanted a finite number or -inf, got {values[i]} at {point}; "
+                "this is a fault of the program, please report it with this line"
+            )
+        return values
+
+    return checked
+
+
+def cholesky_factor(covariance: Floats) -> Floats:
+    """Lower Cholesky factor of the estimate's covariance, whatever the units of the parameters.
+
+    Raises
+    ------
+    NotIdentifiableError
+        If it is not positive definite.
+    """
+    covariance = np.asarray(covariance, dtype=np.float64)
+    scale = np.sqrt(np.diag(covariance))
+    try:
+        if not (np.isfinite(covariance).all() and (scale > 0.0).all()):
+            raise np.linalg.LinAlgError
+        return np.asarray(scale[:, None] * np.linalg.cholesky(covariance / np.outer(scale, scale)))
+    except np.linalg.LinAlgError:
+        raise NotIdentifiableError(
+            "covariance of the starting estimate: wanted a positive definite matrix, got one that is not; "
+            "the data and priors leave a direction undetermined"
+        ) from None
+
+
+def finite_starts(
+    log_density: LogDensity, centre: Floats, factor: Floats, n_walkers: int, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Points around the estimate, drawn again and again those outside the support, and their log densities.
+
+    Raises
+    ------
+    NotConvergedError
+        If there are too few points of finite log density.
+    """
+    points = np.empty((n_walkers, len(centre)))
+    log_prob = np.full(n_walkers, -np.inf)
+    for _ in range(_TRIES):
+        outside = np.flatnonzero(log_prob == -np.inf)
+        if outside.size == 0:
+            return points, log_prob
+        points[outside] = centre + _SPREAD * rng.standard_normal((outside.size, len(centre))) @ factor.T
+        log_prob[outside] = log_density(points[outside])
+    raise NotConvergedError(
+        f"start of the sampler: wanted {n_walkers} points of finite posterior around the estimate, got "
+        f"{int(np.isfinite(log_prob).sum())} in {_TRIES} tries; the estimate lies where the priors exclude it: "
+        "check the priors, the labels and the units"
+    )
