@@ -17,6 +17,8 @@ from bayesplate.plate.material import ORTHOTROPIC, Symmetry
 WITHIN_A_FACTOR = 2.0
 """A constant is identifiable if its 95 % interval at the expected noise stays within this factor of the estimate."""
 
+OTHERS_WITHIN = 10.0
+"""Factor within which the other constants of wood are taken to be known, where it is asked which of them are told."""
 LOW_SHARE_PERCENT = 60.0
 _HELD = {"clamped", "supported"}
 """Edges that do not move: where all are, the integral of w_xx w_yy is that of w_xy^2."""
@@ -44,6 +46,9 @@ class Identifiability:
         Share of D_x, D_y and D_s in each mode's energy; rows sum to 1.
     symmetry : Symmetry
         Of the board: which rigidities are free.
+    errors_beside_known : (n_constants,) array or None
+        Standard error of the logarithm of each free rigidity where the others are known within `OTHERS_WITHIN`: one
+        that hardly enters a mode does not spoil what the mode tells of another.
     """
 
     condition_number: float
@@ -51,6 +56,7 @@ class Identifiability:
     leverages: NDArray[np.float64]
     shares: NDArray[np.float64]
     symmetry: Symmetry = ORTHOTROPIC
+    errors_beside_known: NDArray[np.float64] | None = None
 
     @property
     def standard_errors(self) -> NDArray[np.float64]:
@@ -102,7 +108,21 @@ def identifiability(
     covariance = (right.T * inverse**2) @ right if np.isfinite(inverse).all() else np.diag(np.full(n, np.inf))
     condition = float(singular[0] / singular[-1]) if seen.sum() == n else float("inf")
     leverages = np.sum(left[:, seen] ** 2, axis=1)
-    return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry)
+    beside = _errors_beside_known(weighted.T @ weighted)
+    return Identifiability(condition, covariance, leverages, 2.0 * sensitivities, symmetry, beside)
+
+
+def _errors_beside_known(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of each constant, where the others have a 95 % interval of `OTHERS_WITHIN`: (n_constants,) array."""
+    precision = (1.96 / np.log(OTHERS_WITHIN)) ** 2
+    errors = []
+    for i in range(len(information)):
+        others = np.delete(np.arange(len(information)), i)
+        of_others = information[np.ix_(others, others)] + precision * np.eye(len(others))
+        across = information[i, others]
+        left = information[i, i] - across @ np.linalg.solve(of_others, across) if len(others) else information[i, i]
+        errors.append(1.0 / np.sqrt(left) if left > 0.0 else np.inf)
+    return np.array(errors)
 
 
 def require_labels(board: Board) -> None:
@@ -135,20 +155,33 @@ def require_identifiable(board: Board, found: Identifiability) -> None:
     ------
     NotIdentifiableError
     """
-    blind = found.blind()
-    if not blind:
+    if not found.blind():
         return
-    with np.errstate(over="ignore"):
-        spread = np.exp(1.96 * found.standard_errors)
+    spread = _factors(found.standard_errors)
+    beside = spread if found.errors_beside_known is None else _factors(found.errors_beside_known)
+    told = {n for n, factor in zip(found.symmetry.free, beside, strict=True) if factor <= WITHIN_A_FACTOR}
+    if len(told) == found.symmetry.n:  # each is told beside the others, and not all of them together
+        told, beside = set(), spread
     parts = []
-    for name, modulus, factor in zip(found.symmetry.free, found.symmetry.moduli, spread, strict=True):
-        if name in blind:
+    for name, modulus, factor in zip(found.symmetry.free, found.symmetry.moduli, beside, strict=True):
+        if name not in told:
             reach = f"only within a factor {factor:.3g}" if np.isfinite(factor) and factor < 1e6 else "not at all"
             parts.append(f"{name} (so {modulus}) {reach}; add {_HELP[name]}")
+    known = [
+        f"{modulus} they tell"
+        for n, modulus in zip(found.symmetry.free, found.symmetry.moduli, strict=True)
+        if n in told
+    ]
     raise NotIdentifiableError(
-        f"{board.name}: the modes {_modes(board)} determine " + "; ".join(parts) + f" (condition number "
+        f"{board.name}: the modes {_modes(board)} determine " + "; ".join([*parts, *known]) + f" (condition number "
         f"{found.condition_number:.3g})"
     )
+
+
+def _factors(errors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factor within which 95 % lie, from standard errors of logarithms."""
+    with np.errstate(over="ignore"):
+        return np.asarray(np.exp(1.96 * errors))
 
 
 def _modes(board: Board) -> str:

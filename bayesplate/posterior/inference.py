@@ -348,7 +348,7 @@ def infer(
         surrogate = find_surrogate(posterior, problem.centre, problem.covariance, coordinates)
     if surrogate is not None:
         quick = with_surrogate(posterior, surrogate)
-        found = walked(quick, None if checkpoint is None else checkpoint.part("polynomial"))
+        found = walked(quick, None if checkpoint is None else checkpoint.part("surrogate"))
         weighted = _weighted(problem, surrogate, *found, stream(settings.seed, "weights"))
         if weighted is not None and (weighted.convergence.ess_min >= settings.gate.ess_min or not found[1].passed):
             return weighted

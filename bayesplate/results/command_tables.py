@@ -54,7 +54,7 @@ def check_tables(report: CheckReport) -> tuple[Table, ...]:
             mode_name(mode.label, mode.setup, several=len(report.setups) > 1),
             f"{mode.measured_hz:.6g}",
             number(mode.residual_cents, 1, signed=True),
-            " / ".join(f"{share:.0f}" for share in mode.share_percent),
+            " / ".join(number(share, 0) for share in mode.share_percent),
             f"{mode.leverage:.2f}",
         )
         for mode in report.modes
@@ -80,7 +80,7 @@ def _effects_table(report: CheckReport) -> Table:
             one.effect,
             f"{one.raw_rms_cents:.1f}",
             f"{one.visible_rms_cents:.1f}" + (" *" if one.below_detection_limit else "  "),
-            "/".join(f"{bias:+.1f}" for _, bias in one.bias_percent.items()),
+            "/".join(number(bias, 1, signed=True) for _, bias in one.bias_percent.items()),
             "\n".join(one.look_alikes) or MISSING,
         )
         for one in report.signatures

@@ -132,7 +132,7 @@ def summarise(
         ),
         sampler=replace(
             sampler_health(inference.chains, inference.convergence),
-            drawn_from="law" if inference.surrogate is None else "polynomial",
+            drawn_from="law" if inference.surrogate is None else "surrogate",
             pareto_k=inference.pareto_k,
         ),
         identifiability=(

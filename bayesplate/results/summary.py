@@ -40,8 +40,8 @@ class SamplerHealth:
 
     Attributes
     ----------
-    drawn_from : "law" or "polynomial"
-        The frequency law of the model, or a polynomial of it whose draws are weighted to the law.
+    drawn_from : "law" or "surrogate"
+        The frequency law of the model, or a polynomial in its place whose draws are weighted to the law.
     pareto_k : float or None
         k-hat of these weights.
     """
@@ -53,7 +53,7 @@ class SamplerHealth:
     rhat_max: float | None
     ess_min: float | None
     acceptance: float | None
-    drawn_from: Literal["law", "polynomial"] = "law"
+    drawn_from: Literal["law", "surrogate"] = "law"
     pareto_k: float | None = None
 
 

@@ -74,7 +74,31 @@ def test_of_several_setups_each_is_named_with_its_modes(hertz):
     with pytest.raises(NotIdentifiableError) as caught:
         require_identifiable(replace(board, setups=(setup, replace(setup, name="again"))), unseen)
     labels = ", ".join(str(label) for label in setup.labels)
-    assert f"the modes {labels} of {setup.name} and {labels} of again determine D_x" in str(caught.value)
+    assert f"the modes {labels} of {setup.name} and {labels} of again determine D_y" in str(caught.value)
+
+
+def narrow_strip(*labels):
+    """A brace of spruce, free, read in modes that bend along the grain."""
+    strip = ritz.Plate.from_moduli(12e9, 0.8e9, 0.7e9, 0.4, rho=420.0, h=7e-3, L_x=0.5, L_y=0.02, edges=ritz.ALL_FREE)
+    return board_of(strip, [setup_of(ritz.ALL_FREE, dict(ritz.simulate(strip, labels)))])
+
+
+def test_a_brace_tells_the_constant_along_it_and_is_refused_for_the_others():
+    """Each of its modes tells E_x, though the others enter them by a millionth and are open."""
+    with pytest.raises(NotIdentifiableError, match=r"D_y \(so E_y\) not at all.*D_s \(so G_xy\) not at all") as caught:
+        posed(narrow_strip((2, 0), (3, 0), (4, 0)))
+    assert "D_x (so" not in str(caught.value)
+    assert "; E_x they tell" in str(caught.value)
+
+
+@pytest.mark.parametrize("turned", [0.2, 0.7])
+def test_of_constants_that_are_open_together_one_at_least_is_named(turned):
+    """A direction that no reading sees, whichever way it lies."""
+    unseen = np.array([np.cos(turned), np.sin(turned), 0.0])
+    seen = 0.5 * (np.eye(3) - np.outer(unseen, unseen))
+    found = identifiability(seen, np.full(3, 0.003))
+    assert found.blind()
+    assert (found.errors_beside_known > np.log(2.0) / 1.96).any()
 
 
 def test_three_modes_that_suffice_leave_nothing_to_check_with(hertz):

@@ -61,7 +61,7 @@ def test_check_shows_what_its_report_holds():
     constants, modes, effects = check_tables(REPORT)
 
     assert constants.rows[1] == ("E_y, across grain", "0.674", "± 4.2 %")
-    assert modes.rows == (("(1,0)", "52", "+20.5", "100 / -0 / 0", "0.62"),)
+    assert modes.rows == (("(1,0)", "52", "+20.5", "100 / 0 / 0", "0.62"),)
     assert effects.rows == (
         ("fluid_loading", "44.1", "10.6 *", "-7.3/-2.4/+0.1", "clamp_rotation\ntension"),
         ("grain_angle", "44.1", "10.6  ", "-7.3/-2.4/+0.1", "–"),

@@ -114,6 +114,7 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
     Returns
     -------
     tuple of Signature
+        Without an effect that at its nominal size leaves no plate with these modes, or none to fit them.
     """
     predict = constants_predictor(problem)
     start = problem.centre[: problem.parameters.n_constants]
@@ -123,14 +124,19 @@ def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tup
     result = []
     for name in candidates(problem.board) if names is None else names:
         shifted, sizes = frequencies_with(problem, name)
+        if not np.isfinite(shifted).all():
+            continue
         fitted = refit(predict, shifted, scales, start)
+        bias = _bias(problem, start, fitted)
+        if not np.isfinite([*bias.values()]).all():
+            continue
         result.append(
             Signature(
                 effect=name,
                 size={one.name: one.nominal for one in sizes},
                 raw=cents(shifted - base),
                 visible=cents(shifted - predict(fitted[None, :])[0]),
-                bias_percent=_bias(problem, start, fitted),
+                bias_percent=bias,
                 detection_limit_cents=2.0 * noise / np.sqrt(base.size),
                 scales=scales,
                 acts_both_ways=acts_both_ways(sizes),
