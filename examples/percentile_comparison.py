@@ -81,11 +81,8 @@ def _measured(card: str, folder: Path | None, seed: int) -> dict[str, Any]:
     percentile = percentile_estimate(system)
     assert percentile is not None
     if folder is not None:
-        from bayesplate.report.percentiles import percentiles_figure
-
         folder.mkdir(parents=True, exist_ok=True)
-        figure = percentiles_figure(problem.board.title, percentile, system.psi.size, result.draws.moduli)
-        figure.savefig(folder / f"percentiles-{card}.png", dpi=150)
+        result.plot.percentiles().savefig(folder / f"percentiles-{card}.png", dpi=150)
     rows: dict[str, Any] = {"n_subsets": percentile.n_subsets}
     for name, draws in result.draws.moduli.items():
         mean, sd = percentile.mean[name], percentile.sd[name]

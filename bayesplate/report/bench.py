@@ -12,16 +12,6 @@ if TYPE_CHECKING:
 
 
 def bench_sheet(bench: Bench) -> Figure:
-    """Draw the sheet of one way to hold the board.
-
-    Parameters
-    ----------
-    bench : Bench
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A4 upright, one panel a mode in the order of frequency.
-    """
+    """The sheet of one way to hold the board: A4 upright, one panel a mode in the order of frequency."""
     placing = bench.placing
     return chladni_sheet(bench.sheet, Marks(placing.sensor, placing.hammer, placing.taps, "Modes to look for"))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.system import System, system_of
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.setup import EDGES, Setup
-from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH, WORDS, Picture, short
+from bayesplate.report.colours import DARK, GREY, LIGHT, VERMILLION
+from bayesplate.report.style import SMALL, WIDTH, WORDS, Picture, placed, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,16 +34,7 @@ _MARKERS = {"accelerometer": "s", "exciter": "D", "shaker": "D", "weight": "p"}
 
 
 def board_picture(board: Board) -> Picture:
-    """Draw a board in each of its setups, from above.
-
-    Parameters
-    ----------
-    board : Board
-
-    Returns
-    -------
-    Picture
-    """
+    """A board in each of its setups, from above."""
     from matplotlib.figure import Figure
 
     values = board.nominal()
@@ -60,7 +52,7 @@ def board_picture(board: Board) -> Picture:
         size = (length * scale, width * scale)
         left = _LEFT + (WIDTH - _LEFT - 0.55 - size[0]) / 2
         bottom = height - i * row - above - size[1]
-        panel = figure.add_axes((left / WIDTH, bottom / height, size[0] / WIDTH, size[1] / height))
+        panel = placed(figure, left, bottom, *size)
         panel.set(xlim=(0, length), ylim=(0, width))
         panel.set_axis_off()
         if not board.isotropic:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,68 +13,47 @@ from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import shared_name
 from bayesplate.plate.material import MODULI
 from bayesplate.plate.parameter import unit_of_people
+from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREY,
-    LIGHT,
-    ORANGE,
-    SKY,
-    SMALL,
-    VERMILLION,
-    WORDS,
+    ROW,
     Picture,
     drawable,
+    heading,
+    in_rows,
+    key,
     legend_below,
+    name_rows,
     short,
     stacked,
+    whisker,
 )
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.contract import Spread
 from bayesplate.results.words import GPA, interval, plus_minus
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_ROW = 0.235
 _LEFT = 1.25
 _LONGEST = 16
 
 
 def shared_picture(summary: CampaignSummary, name: str) -> Picture:
-    """One shared number: each board alone, what the others teach it, and all boards together.
-
-    Parameters
-    ----------
-    summary : CampaignSummary
-    name : str
-        Of the number.
-
-    Returns
-    -------
-    Picture
-    """
+    """One shared number, by its name: each board alone, what the others teach it, and all boards together."""
     one = summary.shared[name]
     factor = unit_of_people(one.all_boards.unit)[0]
     boards = list(one.own)
-    figure, (panel,) = stacked([_ROW * len(boards) + 0.1], left=_LEFT, bottom=0.95)
-    _named_rows(panel, boards)
-    low, high = one.all_boards.q05 * factor, one.all_boards.q95 * factor
+    figure, panel = in_rows(_shown(boards), left=_LEFT, bottom=0.95)
+    low, middle, high = _ends(one.all_boards, factor)
     panel.axvspan(low, high, color=LIGHT, label="all boards, 90 %")
-    panel.axvline(one.all_boards.q50 * factor, color=BLUE, lw=1.4, label="all boards, median")
+    panel.axvline(middle, color=BLUE, lw=1.4, label="all boards, median")
+    alone, refusing, others = (BLUE, "o"), (VERMILLION, "s"), (GREY, "D")
+    refuses = [summary.left_out_boards[board].refuses for board in boards]
     for row, board in enumerate(boards):
-        left = summary.left_out_boards[board]
-        color = VERMILLION if left.refuses else BLUE
-        _bar(panel, row - 0.14, one.own[board], factor, color=color, marker="s" if left.refuses else "o")
-        _bar(panel, row + 0.18, one.others[board], factor, color=GREY, marker="D", face="white")
-    handles = panel.get_legend_handles_labels()[0]
-    handles += [_handle(BLUE, "o", "the board alone, 90 %"), _handle(GREY, "D", "the others, 90 %", face="white")]
-    if any(board.refuses for board in summary.left_out_boards.values()):
-        handles.append(_handle(VERMILLION, "s", "does not want what they teach"))
+        whisker(panel, row - 0.14, _ends(one.own[board], factor), *(refusing if refuses[row] else alone))
+        whisker(panel, row + 0.18, _ends(one.others[board], factor), *others, mfc="white")
     title = shared_name(name, one)
-    panel.set_xlabel(in_figure(title), fontsize=SMALL)
-    legend_below(figure, handles, 2)
+    panel.set(xlabel=in_figure(title))
+    keys = [key("the board alone, 90 %", *alone), key("the others, 90 %", *others, mfc="white")]
+    legend_below(figure, 2, *keys, *([key("does not want what they teach", *refusing)] if any(refuses) else []))
     told = "; ".join(f"{board} {plus_minus(own, factor)}" for board, own in one.own.items())
     alt = f"From all boards {plus_minus(one.all_boards, factor)}, 90 % {interval(one.all_boards, factor)}. {told}."
     caption = (
@@ -90,48 +69,37 @@ def shared_picture(summary: CampaignSummary, name: str) -> Picture:
 def boards_picture(summary: CampaignSummary) -> Picture:
     """The boards' constants below each other, with the band in which the next board would lie."""
     boards = list(summary.boards)
-    figure, panels = stacked([_ROW * len(boards) + 0.1] * 3, left=_LEFT, top=0.3, bottom=0.8, gap=0.62)
+    figure, panels = stacked([ROW * len(boards) + 0.1] * 3, left=_LEFT, top=0.3, bottom=0.8, gap=0.62)
     for panel, name in zip(panels, MODULI, strict=True):
-        _named_rows(panel, boards)
+        name_rows(panel, _shown(boards))
         if summary.population is not None:
-            entry = summary.population.next_board[name]
-            panel.axvspan(entry.q05 * GPA, entry.q95 * GPA, color=LIGHT, label="the next board, 90 %")
+            low, _, high = _ends(summary.population.next_board[name], GPA)
+            panel.axvspan(low, high, color=LIGHT, label="the next board, 90 %")
         for row, board in enumerate(boards):
-            _bar(panel, row, summary.boards[board].elastic[name], GPA, color=BLUE, marker="o")
-        panel.set_title(modulus_title(name), fontsize=WORDS, loc="left", weight="bold")
-        panel.set_xlabel("GPa", fontsize=SMALL)
-    handles = [*panels[0].get_legend_handles_labels()[0], _handle(BLUE, "o", "board, 90 %")]
-    legend_below(figure, handles, 2)
+            whisker(panel, row, _ends(summary.boards[board].elastic[name], GPA), BLUE)
+        heading(panel, modulus_title(name))
+        panel.set(xlabel="GPa")
+    legend_below(figure, 2, key("board, 90 %", BLUE, "o"))
     told = "; ".join(f"{board} E_x {plus_minus(one.elastic.E_x, GPA)} GPa" for board, one in summary.boards.items())
     caption = "Every board under what all of them teach of what they share."
     return Picture("boards", "The constants of all boards", f"Three rows of bars: {told}.", caption, figure)
 
 
 def common_picture(common: Mapping[str, CommonResidual]) -> Picture:
-    """What is left over, mode by mode: each board, and the mean with its error.
-
-    Parameters
-    ----------
-    common : dict of CommonResidual
-        By label.
-    """
-    labels = list(common)
-    figure, (panel,) = stacked([_ROW * len(labels) + 0.1], left=0.75, bottom=0.95)
-    _named_rows(panel, labels)
+    """What is left over, by the label of the mode: each board, and the mean with its error."""
+    figure, panel = in_rows(list(common), left=0.75, bottom=0.95)
     clear = clear_of_zero(common)
+    usual, beyond = (BLUE, "o"), (ORANGE, "D")
+    small: Any = {"mfc": "white", "ms": 3.5}
     for row, (label, one) in enumerate(common.items()):
         values = list(one.boards.values())
-        panel.plot(values, [row] * len(values), "o", mfc="white", mec="black", mew=0.6, ms=3.5, zorder=4)
-        color = ORANGE if label in clear else BLUE
-        ends = (one.mean_cents - 2.0 * one.error_cents, one.mean_cents + 2.0 * one.error_cents)
-        panel.hlines(row, *ends, color=color, lw=3)
-        panel.plot(one.mean_cents, row, "D" if color == ORANGE else "o", color=color, mec="black", mew=0.6, ms=7)
+        panel.plot(values, [row] * len(values), "o", mec="black", mew=0.6, zorder=4, **small)
+        ends = (one.mean_cents - 2.0 * one.error_cents, one.mean_cents, one.mean_cents + 2.0 * one.error_cents)
+        whisker(panel, row, ends, *(beyond if label in clear else usual), ms=7)
     panel.axvline(0, color=DARK, lw=0.8)
-    panel.set_xlabel("measured above (+) or below (-) the fit, cents", fontsize=SMALL)
-    handles = [_handle(BLUE, "o", "mean ± 2 errors"), _handle("black", "o", "a board", face="white", lw=0.0)]
-    if clear:
-        handles.append(_handle(ORANGE, "D", "mean, clear of zero"))
-    legend_below(figure, handles, 2)
+    panel.set(xlabel="measured above (+) or below (-) the fit, cents")
+    keys = [key("mean ± 2 errors", *usual), key("a board", "black", "o", lw=0.0, **small)]
+    legend_below(figure, 2, *keys, *([key("mean, clear of zero", *beyond)] if clear else []))
     told = "; ".join(f"{label} {one.mean_cents:+.0f} ± {one.error_cents:.0f}" for label, one in common.items())
     caption = (
         "What all boards have in common here is no board's own: the model lacks it on all of them, or the labels err "
@@ -143,14 +111,13 @@ def common_picture(common: Mapping[str, CommonResidual]) -> Picture:
 def left_out_picture(diagnosis: CampaignDiagnosis) -> Picture:
     """Each board left out: how much better the others predict it with what they share."""
     boards = list(diagnosis.left_out_boards)
-    figure, (panel,) = stacked([_ROW * len(boards) + 0.1], left=_LEFT, bottom=0.75)
-    _named_rows(panel, boards)
+    figure, panel = in_rows(_shown(boards), left=_LEFT, bottom=0.75)
     for row, one in enumerate(diagnosis.left_out_boards.values()):
         is_better = one.log_score_gain > 0
         panel.barh(row, one.log_score_gain, height=0.6, color=SKY if is_better else VERMILLION,
                    edgecolor="black", lw=0.6, hatch="" if is_better else "///")  # fmt: skip
     panel.axvline(0, color=DARK, lw=0.8)
-    panel.set_xlabel("gain in log score, the others teaching", fontsize=SMALL)
+    panel.set(xlabel="gain in log score, the others teaching")
     told = "; ".join(f"{board} {one.log_score_gain:+.1f}" for board, one in diagnosis.left_out_boards.items())
     caption = (
         "To the right: the board's readings are more probable with the effect as the other boards teach it than "
@@ -159,28 +126,14 @@ def left_out_picture(diagnosis: CampaignDiagnosis) -> Picture:
     return Picture("left-out", "Boards that were left out", f"Gains: {told}.", caption, figure)
 
 
-def _named_rows(panel: Axes, names: Sequence[str]) -> None:
-    """A row for each name, the first on top."""
-    panel.set(ylim=(len(names) - 0.5, -0.5))
-    shown = [short(drawable(name), _LONGEST) for name in names]
-    panel.set_yticks(range(len(names)), shown, fontsize=SMALL, parse_math=False)
-    panel.tick_params(axis="y", length=0)
-    panel.spines["left"].set_visible(False)
-    panel.grid(axis="x", color="0.9", lw=0.6)
-    panel.set_axisbelow(True)
+def _shown(names: Iterable[str]) -> list[str]:
+    """Names of boards as far as they have room."""
+    return [short(drawable(name), _LONGEST) for name in names]
 
 
-def _bar(panel: Axes, row: float, entry: Spread, factor: float, *, color: Any, marker: str, face: str = "") -> None:
-    """A 90 % interval with its median."""
-    panel.hlines(row, entry.q05 * factor, entry.q95 * factor, color=color, lw=1.8)
-    panel.plot(entry.q50 * factor, row, marker, color=color, mfc=face or color, mec="black", mew=0.6, ms=5)
-
-
-def _handle(color: Any, marker: str, label: str, *, face: str = "", lw: float = 1.8) -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], color=color, marker=marker, mfc=face or color, mec="black" if lw else color, mew=0.6, ms=5,
-                  lw=lw, label=label)  # fmt: skip
+def _ends(entry: Spread, factor: float) -> tuple[float, float, float]:
+    """Where a 90 % interval begins, its median, and where it ends."""
+    return entry.q05 * factor, entry.q50 * factor, entry.q95 * factor
 
 
 def every_picture(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None) -> dict[str, list[Picture]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
@@ -16,12 +15,11 @@ from bayesplate.campaigns.tables import (
     shared_table,
     taught_table,
 )
-from bayesplate.files import make_folder, write_text
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.report.campaign_figures import every_picture, pooled_rms_cents
-from bayesplate.report.page import policy, shown_picture, template
-from bayesplate.report.saving import drawing, save_pictures
-from bayesplate.results.folder import FIGURES, PAGE
+from bayesplate.report.page import from_template, save_page
+from bayesplate.report.saving import drawing
+from bayesplate.results.folder import PAGE
 from bayesplate.results.words import interval, plus_minus
 
 
@@ -45,33 +43,25 @@ def write_campaign_report(
     Path
         Of report.html.
     """
-    from markupsafe import Markup
-
-    make_folder(folder / FIGURES)
-    groups = every_picture(summary, diagnosis)
-    every = [one for found in groups.values() for one in found]
-    vector = save_pictures(every, folder / FIGURES, "svg")
-    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    text = template("campaign.html").render(
-        policy=policy(css),
-        css=Markup(css),  # our own file; the policy lets in nothing else
-        title=title or summary.name,
-        name=summary.name,
-        sentences=sentences(summary, diagnosis),
-        warnings=summary.warnings,
-        boards=list(summary.boards),
-        pictures={place: [shown_picture(one, vector[one.name]) for one in found] for place, found in groups.items()},
-        diagnosis_tables=() if diagnosis is None else searched_tables(diagnosis),
-        shared_tables=(shared_table(summary.shared), *(taught_table(summary, name) for name in summary.shared))
-        if summary.shared
-        else (),
-        boards_table=boards_table(summary),
-        common_table=common_table(summary.common_residual) if summary.common_residual else None,
-        population_table=None if summary.population is None else population_table(summary.population),
+    shared = summary.shared
+    return save_page(
+        folder / PAGE,
+        every_picture(summary, diagnosis),
+        lambda pictures: from_template(
+            "campaign.html",
+            title=title or summary.name,
+            name=summary.name,
+            sentences=sentences(summary, diagnosis),
+            warnings=summary.warnings,
+            boards=list(summary.boards),
+            pictures=pictures,
+            diagnosis_tables=() if diagnosis is None else searched_tables(diagnosis),
+            shared_tables=(shared_table(shared), *(taught_table(summary, name) for name in shared)) if shared else (),
+            boards_table=boards_table(summary),
+            common_table=common_table(summary.common_residual) if summary.common_residual else None,
+            population_table=None if summary.population is None else population_table(summary.population),
+        ),
     )
-    write_text(folder / PAGE, text)
-    save_pictures(every, folder / FIGURES, "png")
-    return folder / PAGE
 
 
 def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None) -> tuple[str, ...]:

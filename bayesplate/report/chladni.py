@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.frequencies.system import Limits
-from bayesplate.report.style import BLUE, GREEN, VERMILLION, drawable
+from bayesplate.report.colours import BLUE, DARK, GREEN, VERMILLION
+from bayesplate.report.style import SMALL, WORDS, drawable, placed
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.words import STIFFNESS, STIFFNESS_OF_ISOTROPIC
 
@@ -121,7 +123,7 @@ def chladni_sheet(sheet: Sheet, marks: Marks | None = None) -> Figure:
         draw_sand(panel, mode.shape, sheet.limits)
         if marks is not None:
             _draw_marks(panel, marks, sheet)
-        _caption(panel, *_mode_caption(mode))
+        caption(panel, *_mode_caption(mode))
     if sheet.combined:
         _draw_combined(figure, plan, sheet, top - plan.n_rows * plan.cell[1])
     _legend(figure, sheet, marks)
@@ -142,8 +144,7 @@ def _draw_marks(panel: Axes, marks: Marks, sheet: Sheet) -> None:
             *np.transpose([sheet.drawn_at(*tap) for tap in marks.taps]),
             ".",
             ms=4,
-            color=GREEN,
-            **{**style, "mec": GREEN},
+            **style | {"mfc": GREEN, "mec": GREEN},
         )
     panel.plot(*sheet.drawn_at(*marks.sensor), "o", ms=8, color=BLUE, mew=0.8, **style)
     panel.plot(*sheet.drawn_at(*marks.hammer), "X", ms=9, color=VERMILLION, mew=0.8, **style)
@@ -163,7 +164,7 @@ def _draw_combined(figure: Figure, plan: Layout, sheet: Sheet, top: float) -> No
     for column, one in enumerate(sheet.combined):
         panel = _panel(figure, wide, _left(wide, column, len(sheet.combined)), top - _BETWEEN + _GAP / 2, sheet)
         _draw_mixture(panel, one, sheet.limits)
-        _caption(panel, one.name, f"{names[one.modulus]}, {in_figure(one.modulus)}")
+        caption(panel, one.name, f"{names[one.modulus]}, {in_figure(one.modulus)}")
 
 
 def _left(plan: Layout, column: int, in_row: int) -> float:
@@ -172,14 +173,23 @@ def _left(plan: Layout, column: int, in_row: int) -> float:
 
 
 def _panel(figure: Figure, plan: Layout, left: float, top: float, sheet: Sheet) -> Axes:
-    """Axes of a board to scale, its edges drawn around it."""
-    width, height = plan.panel
-    box = (left / A4[0], (top - _GAP / 2 - height) / A4[1], width / A4[0], height / A4[1])
-    panel = figure.add_axes(box)
-    panel.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
-    panel.spines[:].set_visible(False)
-    for name, word in sheet.edges.items():
-        draw_edge(panel, name, word, _BAND / width if name[0] == "x" else _BAND / height, sheet.limits)
+    """A place of the sheet with the board and its edges."""
+    return board_panel(figure, (left, top - _GAP / 2 - plan.panel[1]), plan.panel, sheet.edges, sheet.limits)
+
+
+def board_panel(
+    figure: Figure,
+    corner: tuple[float, float],
+    size: tuple[float, float],
+    edges: Mapping[str, str],
+    limits: Limits | None,
+) -> Axes:
+    """Axes of a board from above, its sides from 0 to 1, with its edges drawn; corner and size in inches."""
+    panel = placed(figure, *corner, *size)
+    panel.set(xlim=(0, 1), ylim=(0, 1))
+    panel.set_axis_off()
+    for edge, word in edges.items():
+        draw_edge(panel, edge, word, _BAND / size[edge[0] == "y"], limits)
     return panel
 
 
@@ -249,11 +259,12 @@ def _hertz(value: float) -> str:
     return f"{value:.1f}" if value < 100 else f"{value:.0f}"
 
 
-def _caption(panel: Axes, first: str, second: str) -> None:
-    """Two lines below a panel, clear of a clamped edge."""
+def caption(panel: Axes, first: str, *others: str) -> None:
+    """Lines below a panel, clear of a clamped edge, the first one bold."""
     common: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
-    panel.annotate(first, (0.5, 0.0), (0, -6), fontsize=9, weight="bold", **common)
-    panel.annotate(second, (0.5, 0.0), (0, -18), fontsize=8, color="0.25", **common)
+    panel.annotate(first, (0.5, 0.0), (0, -6), fontsize=WORDS, weight="bold", **common)
+    for i, line in enumerate(others):
+        panel.annotate(line, (0.5, 0.0), (0, -18 - 10 * i), fontsize=SMALL, color=DARK, **common)
 
 
 def _legend(figure: Figure, sheet: Sheet, marks: Marks | None) -> None:

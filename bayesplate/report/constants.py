@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
-from bayesplate.report.style import PAPER, POSTERIOR, SMALL, WEIGHTED, WORDS, Picture, legend_below, plain_axes, stacked
+from bayesplate.report.colours import PAPER, POSTERIOR, WEIGHTED
+from bayesplate.report.style import WORDS, Picture, heading, hump, legend_below, limits, plain_axes, stacked
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.summary import Percentile, Summary
 from bayesplate.results.words import GPA, STIFFNESS, STIFFNESS_OF_ISOTROPIC, interval, plus_minus
@@ -17,11 +18,6 @@ from bayesplate.results.words import GPA, STIFFNESS, STIFFNESS_OF_ISOTROPIC, int
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_BINS = 60
-_SHOWN = (0.002, 0.998)
-_FARTHEST = 1.5
-"""How far beyond the posterior a panel reaches for a point estimate, in widths of the posterior."""
 
 
 def constants_figure(summary: Summary, moduli: Mapping[str, NDArray[np.float64]]) -> Figure:
@@ -56,7 +52,7 @@ def constants_picture(summary: Summary, moduli: Mapping[str, NDArray[np.float64]
     figure, panels = stacked([0.95] * 3, left=0.2, right=0.2, top=0.3, bottom=0.95, gap=0.72)
     for panel, name in zip(panels, MODULI, strict=True):
         _draw(panel, name, summary, moduli[name])
-    legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
+    legend_below(figure, 2)
     told = "; ".join(
         f"{name} {plus_minus(entry, GPA)} GPa, nine times in ten {interval(entry, GPA)}"
         for name, entry in summary.elastic.items()
@@ -77,40 +73,33 @@ def _draw(panel: Axes, name: str, summary: Summary, moduli: NDArray[np.float64])
     """One constant: its draws, its 90 % interval, and the estimates of the older methods."""
     draws = np.asarray(moduli).ravel() * GPA
     entry = summary.elastic[name]
-    low, high = np.quantile(draws, _SHOWN)
     paper, weighted = (_point(one[name]) for one in (summary.least_squares, summary.weighted_least_squares))
     band = _band(summary.percentile, name)
-    reach = _FARTHEST * (high - low)
-    others = [v for v in (paper, weighted, *(band or ())) if v is not None]
-    seen = [low, high, *(v for v in others if low - reach < v < high + reach)]
-    margin = 0.03 * (max(seen) - min(seen))
-    limits = (min(seen) - margin, max(seen) + margin)
-    density, bins = np.histogram(draws, bins=_BINS, range=(low, high))
-    panel.stairs(density / density.max(), bins, fill=True, color=POSTERIOR, alpha=0.35, lw=0)
+    ends = limits(draws, [value for value in (paper, weighted, *(band or ())) if value is not None])
+    hump(panel, draws, ends)
     panel.plot([entry.q05 * GPA, entry.q95 * GPA], [0.03] * 2, color=POSTERIOR, lw=5, solid_capstyle="butt",
                label="posterior, bar: 90 %")  # fmt: skip
     if band is not None:
-        ends = np.clip(band, *limits)
-        panel.plot(ends, [0.13] * 2, color="black", lw=6.4, solid_capstyle="butt")  # its rim, to be seen in grey
-        panel.plot(ends, [0.13] * 2, color=PAPER, lw=5, solid_capstyle="butt", label="percentile method ± its sd")
-    _mark(panel, paper, limits, "paper's least squares", color="#9A6A00", ls=":", lw=2.0)
-    _mark(panel, weighted, limits, "weighted least squares", color=WEIGHTED, ls="--", lw=1.2)
-    panel.set(xlim=limits, ylim=(0, 1.04), yticks=[])
-    panel.set_title(modulus_title(name, isotropic=summary.model.isotropic), fontsize=WORDS, loc="left", weight="bold")
-    panel.set_xlabel(f"GPa    ({plus_minus(entry, GPA)})", fontsize=SMALL)
+        inside = np.clip(band, *ends)
+        panel.plot(inside, [0.13] * 2, color="black", lw=6.4, solid_capstyle="butt")  # its rim, to be seen in grey
+        panel.plot(inside, [0.13] * 2, color=PAPER, lw=5, solid_capstyle="butt", label="percentile method ± its sd")
+    _mark(panel, paper, ends, "paper's least squares", color="#9A6A00", ls=":", lw=2.0)
+    _mark(panel, weighted, ends, "weighted least squares", color=WEIGHTED, ls="--", lw=1.2)
+    panel.set(xlim=ends, ylim=(0, 1.04), yticks=[], xlabel=f"GPa    ({plus_minus(entry, GPA)})")
+    heading(panel, modulus_title(name, isotropic=summary.model.isotropic))
     panel.spines["left"].set_visible(False)
 
 
-def _mark(panel: Axes, at: float | None, limits: tuple[float, float], label: str, **style: Any) -> None:
+def _mark(panel: Axes, at: float | None, ends: tuple[float, float], label: str, **style: Any) -> None:
     """An estimate as a line; at the side of the panel as an arrow where it lies beyond, nothing where there is none."""
     if at is None:
         return
-    if limits[0] <= at <= limits[1]:
+    if ends[0] <= at <= ends[1]:
         panel.plot([at, at], [0, 1], label=label, **style)
         return
-    is_low = at < limits[0]
+    is_low = at < ends[0]
     panel.plot([], [], label=label, **style)
-    panel.plot([limits[not is_low]], [0.5], marker="<" if is_low else ">", color=style["color"], ms=7, clip_on=False)
+    panel.plot([ends[not is_low]], [0.5], marker="<" if is_low else ">", color=style["color"], ms=7, clip_on=False)
 
 
 def _point(value: float | None) -> float | None:

@@ -1,28 +1,56 @@
-"""The corner plot of chosen draws by the `corner` package, for scripts; the report's own fits a phone."""
+"""The corner plot, by the package corner: every pair of quantities against each other, on the page and for scripts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.libraries import load_arviz
+from bayesplate.plate.board import Board
+from bayesplate.plate.material import MODULI
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import PosedProblem
+from bayesplate.report.colours import BLACK, ORANGE, POSTERIOR
+from bayesplate.report.priors import input_words
 from bayesplate.report.saving import drawing, save_figure
-from bayesplate.report.style import BLUE, ORANGE
+from bayesplate.report.style import SMALL, WIDTH, Picture, limits, short
+from bayesplate.report.symbols import in_figure, is_symbol
+from bayesplate.results.budget import input_shares
+from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_INCHES = 1.9
+Floats = NDArray[np.float64]
+
+MOST = 6
+"""Columns of the report: more cannot be read on a phone."""
+
 _HELD = (0.5, 0.9)
+_LEFT, _BOTTOM, _TOP, _RIGHT, _GAP = 0.72, 0.72, 0.08, 0.12, 0.07
+_INNER = np.array([[0.92, 0.08], [0.08, 0.92]])
+"""Where a panel has ticks, in its ends: no label runs into one of the next panel."""
+_STRONG = 0.5
+_CHARACTERS_AN_INCH = 17
+_BRIEF = {
+    "length along the grain": "length",
+    "length across the grain": "width",
+    " profile": "",
+    " of transverse shear": "",
+    "Poisson ratio ": "",
+}
 
 
 def corner_figure(
-    columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float | None] | None = None
+    columns: Mapping[str, Floats],
+    marked: Mapping[str, float | None] | None = None,
+    labels: Sequence[str] | None = None,
 ) -> Figure:
-    """Every pair of columns against each other.
+    """Every pair of columns against each other; the lines hold half and nine tenths of the draws.
 
     Parameters
     ----------
@@ -30,35 +58,150 @@ def corner_figure(
         Draws by what stands at their axis, units included; all of one size.
     marked : dict of float, optional
         Values to mark by a line, such as the least squares, by the same words.
+    labels : sequence of str, optional
+        What stands at the axes instead.
 
     Returns
     -------
     matplotlib.figure.Figure
+        No state of pyplot is touched.
     """
-    import corner
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    side = _INCHES * len(columns)
-    truths = None if marked is None else [marked.get(name) for name in columns]
-    figure = Figure(figsize=(side, side))
-    corner.corner(
-        np.column_stack([np.ravel(values) for values in columns.values()]),
-        fig=figure,
-        labels=list(columns),
-        levels=_HELD,
-        smooth=1.0,
-        color=BLUE,
-        truths=None if len(columns) == 1 else truths,
-        truth_color=ORANGE,
-    )
-    if len(columns) == 1 and truths is not None and truths[0] is not None:  # which corner marks in pairs only
-        figure.axes[0].axvline(truths[0], color=ORANGE)
+    marks = [(marked or {}).get(name) for name in columns]
+    ends = [
+        limits(values, () if mark is None else [mark]) for values, mark in zip(columns.values(), marks, strict=True)
+    ]
+    side = panel_side(len(columns))
+    width = _LEFT + len(columns) * (side + _GAP) - _GAP + _RIGHT
+    height = width - _LEFT - _RIGHT + _BOTTOM + _TOP
+    figure = Figure(figsize=(width, height))
+    corner = load_corner()
+    with rc_context({"axes.formatter.useoffset": False}):
+        corner.corner(
+            np.column_stack([np.ravel(values) for values in columns.values()]),
+            fig=figure,
+            labels=list(labels or columns),
+            label_kwargs={"fontsize": SMALL - 1},
+            labelpad=0.42 / side - 0.3,  # of corner's own 0.3 sides
+            range=ends,
+            bins=40,
+            smooth=1.6,
+            levels=_HELD,
+            color=POSTERIOR,
+            fill_contours=True,
+            no_fill_contours=True,
+            plot_datapoints=False,
+            plot_density=False,
+            contour_kwargs={"colors": BLACK, "linewidths": 0.7},
+            hist_kwargs={"histtype": "stepfilled", "alpha": 0.4},
+            truths=marks if len(marks) > 1 else None,
+            truth_color=ORANGE,
+            max_n_ticks=int(np.clip(4 * side, 3, 5)),
+            quiet=True,
+        )
+    figure.subplots_adjust(
+        left=_LEFT / width, right=1 - _RIGHT / width, bottom=_BOTTOM / height, top=1 - _TOP / height,
+        wspace=_GAP / side, hspace=_GAP / side,
+    )  # fmt: skip
+    for panel in figure.axes:
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(labelsize=SMALL - 1.5, labelrotation=45, length=3)
+        for axis in (panel.xaxis, panel.yaxis):
+            low, high = np.sort(axis.get_view_interval()) @ _INNER
+            ticks = axis.get_major_locator().tick_values(low, high)
+            axis.set_ticks([tick for tick in ticks if low <= tick <= high])
+    if len(marks) == 1 and marks[0] is not None:  # which corner marks in pairs only
+        figure.axes[0].axvline(marks[0], color=ORANGE)
     return figure
 
 
 @drawing()
 def write_corner_plot(
-    path: Path, columns: Mapping[str, NDArray[np.float64]], marked: Mapping[str, float | None] | None = None
+    path: Path, columns: Mapping[str, Floats], marked: Mapping[str, float | None] | None = None
 ) -> None:
     """Write the figure by the ending of the path, PNG or SVG; further parameters as of `corner_figure`."""
     save_figure(corner_figure(columns, marked), path)
+
+
+def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
+    """The constants, the noise and the inputs that matter most against each other."""
+    columns = chosen(problem, draws)
+    alt = f"Draws in pairs of {', '.join(name.partition(',')[0] for name in columns)}. {_correlated(columns)}"
+    caption = (
+        "Each square shows two quantities at once; the lines hold half and nine tenths of the probability. A slanted "
+        "shape means that an error in one would be made up for by the other."
+    )
+    figure = corner_figure(columns, labels=axis_labels(list(columns)))
+    return Picture("corner", "Which quantities hang together", alt, caption, figure)
+
+
+def load_corner() -> Any:
+    """The package."""
+    load_arviz()  # which corner imports, and which has to be kept quiet
+    import corner
+
+    return corner
+
+
+def panel_side(n_columns: int) -> float:
+    """Side of a panel in inches: the figure is as wide as the others of the report, wider beyond its columns."""
+    n = min(n_columns, MOST)
+    return (WIDTH - _LEFT - _RIGHT - (n - 1) * _GAP) / n
+
+
+def axis_labels(names: Sequence[str]) -> list[str]:
+    """What stands at the axes of columns, in two lines where there is no room for one."""
+    return [axis_label(name, panel_side(len(names))) for name in names]
+
+
+def axis_label(name: str, side: float) -> str:
+    """A name and its unit, in lines no longer than the panel, as matplotlib sets them.
+
+    Parameters
+    ----------
+    name : str
+        A symbol of ours becomes mathematics; nothing else does.
+    side : float
+        Of the panel, inches.
+    """
+    for words, brief in _BRIEF.items():
+        name = name.replace(words, brief)
+    longest = int(_CHARACTERS_AN_INCH * side)
+    first, comma, below = name.rpartition(", ") if ", " in name else name.partition(" of ")
+    if len(name) > longest:
+        name = f"{short(first, longest)}{',' if comma else ''}\n{short(below, longest)}".strip()
+    return in_figure(name) if is_symbol(first) else name.replace("$", r"\$")
+
+
+def chosen(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:
+    """Moduli in GPa, the noise of each setup in %, and the inputs with the largest share in the moduli's variance."""
+    columns = {f"{name}, GPa": values * GPA for name, values in draws.moduli.items()}
+    setups = problem.board.setups
+    for i, setup in enumerate(setups[: MOST - len(columns) - 1]):
+        columns["noise, %" if len(setups) == 1 else f"noise {setup.name}, %"] = 100.0 * draws.noise[..., i]
+    shares = input_shares(draws)
+    largest = {name: max(by_input[name] for by_input in shares.values()) for name in draws.inputs}
+    listed = [one.name for one in problem.board.uncertain if one.is_listed]
+    for name in sorted(listed, key=lambda one: -largest[one])[: MOST - len(columns)]:
+        words, factor = words_and_factor(name, problem.board)
+        columns[words] = draws.inputs[name] * factor
+    return columns
+
+
+def words_and_factor(name: str, board: Board) -> tuple[str, float]:
+    """What stands at the axis of a modulus, a rigidity or an input, and the factor from SI to its unit."""
+    if name not in board.inputs:
+        return (f"{name}, GPa", GPA) if name in MODULI else (f"{name}, N m", 1.0)
+    words, factor, unit = input_words(board.parameter(name), board)
+    return f"{words}, {unit}" if unit else words, factor
+
+
+def _correlated(columns: Mapping[str, Floats]) -> str:
+    """The pairs whose correlation is strong, in words."""
+    names = [name.partition(",")[0] for name in columns]
+    matrix = np.corrcoef([values.ravel() for values in columns.values()])
+    strong = [(i, j) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) > _STRONG]
+    told = "; ".join(f"{names[j]} with {names[i]} ({matrix[i, j]:+.2f})" for i, j in strong)
+    return f"Correlated: {told}." if strong else "No pair hangs together strongly."

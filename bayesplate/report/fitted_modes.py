@@ -1,94 +1,80 @@
-"""The figure of the fitted modes: where sand gathers at each, with the measured and the predicted frequency."""
+"""The figures of the fitted modes: where sand gathers at each, with the measured and the predicted frequency."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.frequencies.system import Limits
-from bayesplate.plate.setup import Setup
-from bayesplate.report.chladni import draw_edge, draw_sand
-from bayesplate.report.style import DARK, SMALL, WIDTH, WORDS, Picture
+from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
+from bayesplate.estimates.sheet import points
+from bayesplate.frequencies.model import SetupModel
+from bayesplate.plate.board import Values, vibrating_lengths
+from bayesplate.posterior.draws import Draws, posterior_mean_values
+from bayesplate.posterior.inference import Inference
+from bayesplate.report.chladni import board_panel, caption, draw_sand
+from bayesplate.report.style import WIDTH, Picture
 from bayesplate.results.modes import ModeRow
+from bayesplate.results.summary import Summary
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-_SIDE, _GAP, _BAND = 0.22, 0.26, 0.05
-_CAPTION, _TALLEST = 0.56, 2.4
+_SIDE, _GAP = 0.22, 0.26
+_CAPTION, _TALLEST = 0.6, 2.4
 _MARGIN = 0.14
 _N_COLUMNS = 3
 
-CAPTION = (
-    "Black lines stay at rest, so sand gathers there; white and grey parts move against each other. The grain runs "
-    "from left to right. The predicted frequency is the posterior mean."
-)
+
+def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
+    """One picture a setup."""
+    problem = inference.problem
+    shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
+    caption = (
+        "Black lines stay at rest, so sand gathers there; white and grey parts move against each other. "
+        f"{'x' if problem.board.isotropic else 'The grain'} runs from left to right. The predicted frequency is the "
+        "posterior mean."
+    )
+    pictures = []
+    for model in problem.posterior.models:
+        setup = model.setup.name
+        modes = [mode for mode in summary.modes if mode.setup == setup]
+        modes.sort(key=lambda mode: mode.measured_hz)
+        told = "; ".join(f"{mode.label} {', '.join(_hertz(mode))}" for mode in modes)
+        name = "modes" if len(problem.board.setups) == 1 else f"modes-{setup}"
+        title = f"Chladni figures of the fitted modes, setup {setup}"
+        figure = _figure(model, problem.board.nominal(), modes, shapes[setup])
+        pictures.append(Picture(name, title, f"Nodal lines of {len(modes)} modes: {told}.", caption, figure))
+    return pictures
 
 
-def fitted_modes_picture(
-    setup: Setup,
-    modes: Sequence[ModeRow],
-    shapes: Mapping[str, NDArray[np.float64]],
-    aspect_ratio: float,
-    name: str = "modes",
-    limits: Limits | None = None,
-) -> Picture:
-    """Draw the fitted modes of one setup in the order of frequency.
-
-    Parameters
-    ----------
-    setup : Setup
-    modes : sequence of ModeRow
-        Its rows of the summary.
-    shapes : dict of (n_x, n_y) array
-        By label.
-    aspect_ratio : float
-        L_x / L_y of the part that vibrates, L_y where it is widest.
-    name : str
-        Stem of the picture's files.
-    limits : ((n_x,) array, (n_x,) array), optional
-        Where the board begins and ends along y, as fractions of its widest width.
-
-    Returns
-    -------
-    Picture
-    """
+def _figure(
+    model: SetupModel, values: Values, modes: Sequence[ModeRow], shapes: Mapping[str, NDArray[np.float64]]
+) -> Figure:
+    """The modes of a setup, their shapes by label."""
     from matplotlib.figure import Figure
 
+    system = model.system
+    length_x, length_y = vibrating_lengths(system.adjusted(values), model.setup)
+    limits = system.limits(points(N_POINTS))
     cell = (WIDTH - 2 * _SIDE + _GAP) / _N_COLUMNS
-    side = min(cell - _GAP, _TALLEST * aspect_ratio)
-    size = (side, side / aspect_ratio)
-    n_rows = -(-len(modes) // _N_COLUMNS)
+    side = min(cell - _GAP, _TALLEST * float(length_x / length_y))
+    size = (side, side * float(length_y / length_x))
     row = size[1] + _CAPTION
-    height = n_rows * row + _MARGIN
+    height = -(-len(modes) // _N_COLUMNS) * row + _MARGIN
     figure = Figure(figsize=(WIDTH, height))
-    ordered = sorted(modes, key=lambda mode: mode.measured_hz)
-    for i, mode in enumerate(ordered):
+    for i, mode in enumerate(modes):
         at_row, column = divmod(i, _N_COLUMNS)
         left = _SIDE + column * cell + (cell - _GAP - side) / 2
         bottom = height - _MARGIN - at_row * row - size[1]
-        panel = figure.add_axes((left / WIDTH, bottom / height, size[0] / WIDTH, size[1] / height))
-        panel.set(xlim=(0, 1), ylim=(0, 1))
-        panel.set_axis_off()
-        for edge, word in setup.edges.items():
-            draw_edge(panel, edge, word, _BAND / size[0] if edge[0] == "x" else _BAND / size[1], limits)
+        panel = board_panel(figure, (left, bottom), size, model.setup.edges, limits)
         draw_sand(panel, shapes[mode.label], limits)
-        _caption(panel, mode)
-    told = "; ".join(
-        f"{mode.label} measured {mode.measured_hz:.6g} Hz, predicted {mode.predicted_hz.mean:.1f} Hz"
-        for mode in ordered
-    )
-    title = f"Chladni figures of the fitted modes, setup {setup.name}"
-    return Picture(name, title, f"Nodal lines of {len(ordered)} modes: {told}.", CAPTION, figure)
+        caption(panel, mode.label, *_hertz(mode))
+    return figure
 
 
-def _caption(panel: Axes, mode: ModeRow) -> None:
-    """Name, measured and predicted frequency below a panel."""
-    common: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
-    panel.annotate(mode.label, (0.5, 0.0), (0, -5), fontsize=WORDS, weight="bold", **common)
-    panel.annotate(f"measured {mode.measured_hz:.6g} Hz", (0.5, 0.0), (0, -16), fontsize=SMALL, **common)
-    predicted = f"predicted {mode.predicted_hz.mean:.1f} Hz"
-    panel.annotate(predicted, (0.5, 0.0), (0, -26), fontsize=SMALL, color=DARK, **common)
+def _hertz(mode: ModeRow) -> tuple[str, str]:
+    """Its measured and its predicted frequency in words."""
+    return f"measured {mode.measured_hz:.6g} Hz", f"predicted {mode.predicted_hz.mean:.1f} Hz"

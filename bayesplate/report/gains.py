@@ -11,21 +11,8 @@ import numpy as np
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
 from bayesplate.plate.material import MODULI
-from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREEN,
-    LIGHT,
-    ORANGE,
-    SKY,
-    SMALL,
-    VERMILLION,
-    WORDS,
-    Picture,
-    drawable,
-    legend_below,
-    plain_axes,
-)
+from bayesplate.report.colours import BLUE, DARK, GREEN, LIGHT, ORANGE, SKY, VERMILLION
+from bayesplate.report.style import SMALL, Picture, drawable, heading, legend_below, placed
 from bayesplate.report.symbols import in_figure
 
 if TYPE_CHECKING:
@@ -33,53 +20,33 @@ if TYPE_CHECKING:
 
 MOST = 10
 """Proposals that are drawn."""
-_ROW, _LEFT, _PANEL, _GAP, _RIGHT, _TOP, _BOTTOM = 0.56, 3.1, 2.3, 0.35, 0.25, 0.45, 0.95
+_ROW, _LEFT, _PANEL, _GAP, _TOP, _BOTTOM = 0.56, 3.1, 2.3, 0.35, 0.45, 0.95
+_STYLES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (VERMILLION, "v"))
 _LINE = 46
 
 
 def gains_picture(plan: Plan) -> Picture:
-    """Doubt that goes and intervals that are left, proposal by proposal; parameters that boards share for a campaign.
-
-    Parameters
-    ----------
-    plan : Plan
-
-    Returns
-    -------
-    Picture
-    """
+    """Doubt that goes and intervals that are left, proposal by proposal; of a campaign those of what boards share."""
     from matplotlib.figure import Figure
 
     shown = plan.proposals[:MOST]
     in_doubt = plan.entropy > 0.0 and len(plan.explanations) > 1
-    n_panels = 1 + in_doubt
-    width = _LEFT + n_panels * _PANEL + (n_panels - 1) * _GAP + _RIGHT
     inner = _ROW * max(len(shown), 1)
-    height = _TOP + inner + _BOTTOM
-    figure = Figure(figsize=(width, height))
-
-    def panel(i: int) -> Axes:
-        left = _LEFT + i * (_PANEL + _GAP)
-        axes = figure.add_axes((left / width, _BOTTOM / height, _PANEL / width, inner / height))
-        plain_axes(axes)
-        axes.set(ylim=(len(shown) - 0.5, -0.5))
-        axes.set_yticks([])
-        axes.spines["left"].set_visible(False)
+    figure = Figure(figsize=(_LEFT + (1 + in_doubt) * (_PANEL + _GAP), _TOP + inner + _BOTTOM))
+    for i, draw in enumerate([_doubt, _intervals] if in_doubt else [_intervals]):
+        panel = placed(figure, _LEFT + i * (_PANEL + _GAP), _BOTTOM, _PANEL, inner)
+        panel.set(ylim=(len(shown) - 0.5, -0.5), yticks=[])
+        panel.spines["left"].set_visible(False)
         for row in range(0, len(shown), 2):
-            axes.axhspan(row - 0.5, row + 0.5, color=LIGHT, alpha=0.5, lw=0, zorder=0)
-        return axes
-
-    if in_doubt:
-        _doubt(panel(0), plan, shown)
-    last = panel(n_panels - 1)
-    handles = _intervals(last, shown)
+            panel.axhspan(row - 0.5, row + 0.5, color=LIGHT, alpha=0.5, lw=0, zorder=0)
+        draw(panel, plan, shown)
     first = figure.axes[0]
     for row, one in enumerate(shown):
         first.text(
             -0.03, row, _label(one), transform=first.get_yaxis_transform(), ha="right", va="center",
             fontsize=SMALL - 0.5, linespacing=1.15, parse_math=False,
         )  # fmt: skip
-    legend_below(figure, handles, 3)
+    legend_below(figure, 3)
     told = "; ".join(f"{one.sentence}: {_told(one)}" for one in shown)
     caption = (
         "The best first. An interval at 50 % is half as wide as now. Doubt at 100 % would be gone: one explanation "
@@ -96,36 +63,29 @@ def _doubt(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
     rows = np.arange(len(shown))
     axes.barh(rows, values, height=0.5, color=SKY, edgecolor="white", zorder=2)
     axes.errorbar(values, rows, xerr=2.0 * errors, fmt="none", ecolor=DARK, elinewidth=1.0, capsize=2, zorder=3)
-    axes.set(xlim=(0, 100))
-    axes.set_xlabel("doubt that goes, %", fontsize=SMALL)
-    axes.set_title("Telling explanations apart", fontsize=WORDS, loc="left", weight="bold")
+    axes.set(xlim=(0, 100), xlabel="doubt that goes, %")
+    heading(axes, "Telling explanations apart")
 
 
-def _intervals(axes: Axes, shown: Sequence[ProposalEntry]) -> list[object]:
+def _intervals(axes: Axes, plan: Plan, shown: Sequence[ProposalEntry]) -> None:
     """What is left of each interval."""
     shared = list(shown[0].gain.shared) if shown else []
     names = shared or list(MODULI)
-    colours = [BLUE, ORANGE, GREEN, VERMILLION]
-    handles: list[object] = []
     for i, name in enumerate(names):
         values = [100.0 * (one.gain.shared[name] if shared else getattr(one.gain, name)) for one in shown]
         rows = np.arange(len(shown)) + 0.18 * (i - 0.5 * (len(names) - 1))
-        mark, colour = "osDv"[i % 4], colours[i % 4]
+        colour, mark = _STYLES[i % len(_STYLES)]
         axes.hlines(rows, values, 100.0, color=colour, lw=1.0, zorder=2)
         words = drawable(shared_words(name)) if shared else in_figure(name)
-        handles += axes.plot(values, rows, mark, color=colour, mec="black", mew=0.5, ms=5, zorder=3, label=words)
-    axes.set(xlim=(0, 103))
+        axes.plot(values, rows, mark, color=colour, mec="black", mew=0.5, ms=5, zorder=3, label=words)
+    axes.set(xlim=(0, 103), xlabel="interval after, % of now")
     axes.axvline(100.0, color=DARK, lw=0.8)
-    axes.set_xlabel("interval after, % of now", fontsize=SMALL)
-    title = "What the boards share" if shared else "Narrowing the constants"
-    axes.set_title(title, fontsize=WORDS, loc="left", weight="bold")
-    return handles
+    heading(axes, "What the boards share" if shared else "Narrowing the constants")
 
 
 def _label(one: ProposalEntry) -> str:
     """The sentence in at most three short lines, and the minutes."""
-    words = f"{drawable(one.sentence)}"
-    lines = textwrap.wrap(words, _LINE)
+    lines = textwrap.wrap(drawable(one.sentence), _LINE)
     if len(lines) > 3:
         lines = [*lines[:2], lines[2][: _LINE - 2] + "…"]
     lines[-1] += f" [{one.cost_minutes:g} min]"

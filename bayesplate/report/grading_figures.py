@@ -9,24 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
+from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREEN,
-    GREY,
-    LIGHT,
-    ORANGE,
-    SKY,
     SMALL,
-    VERMILLION,
-    WORDS,
     Picture,
     drawable,
+    heading,
+    in_rows,
+    key,
     legend_below,
     moved_apart,
+    name_rows,
     short,
     stacked,
+    whisker,
 )
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.grading import Grading
@@ -48,7 +45,7 @@ _ASIDE, _ABOVE, _LINE = 8.0, 3.0, SMALL + 2.0
 _MOST_VECTORS = 1000
 """Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
 _NINETY = 1.645
-_COLOURS = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
+_STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
 def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
@@ -66,7 +63,7 @@ def every_grading_picture(graded: Grading) -> dict[str, list[Picture]]:
 def sorted_picture(graded: Grading) -> Picture:
     """The boards sorted by each constant, the largest on top, with their 90 % intervals."""
     n = len(graded.names)
-    is_named, as_pixels = n <= MOST_NAMED, n > _MOST_VECTORS
+    is_named = n <= MOST_NAMED
     height = _ROW * n + 0.1 if is_named else _CROWD
     figure, panels = stacked([height] * 3, left=_LEFT if is_named else 0.75, top=0.3, bottom=0.5, gap=0.75)
     told = []
@@ -74,26 +71,31 @@ def sorted_picture(graded: Grading) -> Picture:
         middle, low, high = graded.spread(FIGURES[name])
         order = np.argsort(-middle, kind="stable")
         _limit_band(panel, graded, name)
-        rows = np.arange(n)
-        panel.hlines(rows, low[order], high[order], color=BLUE if is_named else SKY, lw=1.8 if is_named else 0.8,
-                     rasterized=as_pixels)  # fmt: skip
-        panel.plot(middle[order], rows, "o", color=BLUE, mec="black", mew=0.5 if is_named else 0.0,
-                   ms=5 if is_named else 1.5, zorder=3, rasterized=as_pixels)  # fmt: skip
+        ends = low[order], middle[order], high[order]
         if is_named:
-            _named_rows(panel, [_shown(graded, i) for i in order])
+            name_rows(panel, [_shown(graded, i) for i in order])
+            whisker(panel, np.arange(n), ends, BLUE)
         else:
-            panel.set(ylim=(n - 0.5, -0.5), ylabel="rank")
-            panel.yaxis.label.set_fontsize(SMALL)
-            panel.grid(axis="x", color="0.9", lw=0.6)
+            _draw_crowd(panel, ends)
         panel.locator_params(axis="x", nbins=6)
-        panel.set_title(modulus_title(name), fontsize=WORDS, loc="left", weight="bold")
-        panel.set_xlabel(f"GPa{'; shaded: the specification' if name in graded.request.limits else ''}", fontsize=SMALL)
+        heading(panel, modulus_title(name))
+        panel.set(xlabel=f"GPa{'; shaded: the specification' if name in graded.request.limits else ''}")
         told.append(f"{name} from {middle.min():.3g} to {middle.max():.3g} GPa, half of the boards above "
                     f"{np.median(middle):.3g}")  # fmt: skip
     caption = "Dot: median. Bar: 90 % interval. Where the bars of two boards overlap, their order is not sure."
     if len(graded.trusted) < n:
         caption += " Boards with a question mark are in doubt." if is_named else " Boards in doubt are among them."
     return Picture("boards-sorted", "The boards, sorted", f"{n} boards. {'; '.join(told)}.", caption, figure)
+
+
+def _draw_crowd(panel: Axes, ends: tuple[Floats, Floats, Floats]) -> None:
+    """Bars and dots of boards that are too many to be named."""
+    low, middle, high = ends
+    ranks, as_pixels = np.arange(len(middle)), len(middle) > _MOST_VECTORS
+    panel.hlines(ranks, low, high, color=SKY, lw=0.8, rasterized=as_pixels)
+    panel.plot(middle, ranks, "o", color=BLUE, ms=1.5, mew=0.0, zorder=3, rasterized=as_pixels)
+    panel.set(ylim=(len(middle) - 0.5, -0.5), ylabel="rank")
+    panel.grid(axis="x", color="0.9", lw=0.6)
 
 
 def speed_picture(graded: Grading) -> Picture:
@@ -113,8 +115,7 @@ def speed_picture(graded: Grading) -> Picture:
     _lines_of_equal_ratio(panel, speed[0] / density[0])
     if len(graded.names) <= _MOST_LABELLED:
         _name_points(panel, density[0], speed[0], [_shown(graded, i) for i in range(len(density[0]))])
-    panel.set_xlabel("density, kg/m³", fontsize=SMALL)
-    panel.set_ylabel("wave speed along the grain, m/s", fontsize=SMALL)
+    panel.set(xlabel="density, kg/m³", ylabel="wave speed along the grain, m/s")
     ratio = speed[0] / density[0]
     alt = (
         f"Density {density[0].min():.0f} to {density[0].max():.0f} kg/m³, wave speed {speed[0].min():.0f} to "
@@ -153,15 +154,13 @@ def limits_picture(graded: Grading) -> Picture:
     if is_named:
         colours = [GREEN if value >= 90.0 else VERMILLION if value < 10.0 else SKY for value in values]
         panel.barh(np.arange(len(order)), values, height=0.65, color=colours, edgecolor="black", lw=0.5)
-        _named_rows(panel, [_shown(graded, i) for i in order])
+        name_rows(panel, [_shown(graded, i) for i in order])
     else:
         panel.plot(values, np.arange(1, len(order) + 1), color=BLUE, lw=1.6)
-        panel.set(ylim=(len(order), 0))
-        panel.set_ylabel("boards, the likeliest on top", fontsize=SMALL)
+        panel.set(ylim=(len(order), 0), ylabel="boards, the likeliest on top")
         panel.grid(axis="x", color="0.9", lw=0.6)
-    panel.set_xlim(0, 100)
+    panel.set(xlim=(0, 100), xlabel="probability that the board meets all limits, %")
     panel.axvline(90, color=DARK, lw=0.8, ls="--")
-    panel.set_xlabel("probability that the board meets all limits, %", fontsize=SMALL)
     n_sure = int((graded.meets_all[order] >= 0.9).sum())
     alt = f"{n_sure} of {len(order)} boards meet all limits with 90 % or more."
     caption = f"{alt}{' Green: 90 % and more; red: less than 10 %.' if is_named else ''}"
@@ -172,30 +171,22 @@ def pairs_picture(graded: Grading) -> Picture:
     """The proposed pairs: by how much the constants of the partner differ, and the tolerance."""
     shown = graded.pairs[:_MOST_PAIRS]
     names = [name for name in MODULI if name in graded.request.match_percent] or list(MODULI)
-    figure, (panel,) = stacked([0.42 * len(shown) + 0.1], left=_LEFT, right=0.5, bottom=0.8)
+    both = [[short(drawable(graded.names[i]), _LONGEST) for i in (pair.first, pair.second)] for pair in shown]
+    figure, panel = in_rows(["\n".join(two) for two in both], row=0.42, left=_LEFT, right=0.5, bottom=0.8)
     for row, pair in enumerate(shown):
-        both = [pair.first, pair.second]
+        at = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
-            mean, sd = FIGURES[name].log(graded.log_mean[both], graded.triangles[both])
+            mean, sd = FIGURES[name].log(graded.log_mean[at], graded.triangles[at])
             apart, spread = float(mean[1] - mean[0]), _NINETY * float(np.sqrt((sd**2).sum()))
-            low, middle, high = (100.0 * np.expm1(apart + at * spread) for at in (-1.0, 0.0, 1.0))
-            colour, marker = _COLOURS[name]
-            panel.hlines(row + step, low, high, color=colour, lw=1.6)
-            panel.plot(middle, row + step, marker, color=colour, mec="black", mew=0.5, ms=4.5)
-    widths = sorted({graded.request.match_percent.get(name, 0.0) for name in names})
-    for width in widths:
-        panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)
-    panel.axvline(0, color=DARK, lw=0.8)
-    titles = [
-        f"{short(drawable(graded.names[p.first]), _LONGEST)}\n{short(drawable(graded.names[p.second]), _LONGEST)}"
-        for p in shown
-    ]
-    _named_rows(panel, titles)
-    for row, pair in enumerate(shown):
+            ends = 100.0 * np.expm1(apart + spread * np.array([-1.0, 0.0, 1.0]))
+            whisker(panel, row + step, tuple(ends), *_STYLES[name])
         panel.annotate(percent(pair.probability), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
                        va="center", fontsize=SMALL, weight="bold", annotation_clip=False)  # fmt: skip
-    panel.set_xlabel("constants of the partner over the board's, %", fontsize=SMALL)
-    legend_below(figure, [_handle(*_COLOURS[name], in_figure(name)) for name in names], 3)
+    for width in sorted({graded.request.match_percent.get(name, 0.0) for name in names}):
+        panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)
+    panel.axvline(0, color=DARK, lw=0.8)
+    panel.set(xlabel="constants of the partner over the board's, %")
+    legend_below(figure, 3, *(key(in_figure(name), *_STYLES[name]) for name in names))
     alt = "; ".join(f"{graded.names[p.first]} and {graded.names[p.second]} {percent(p.probability)}" for p in shown)
     caption = "Grey: within the tolerance. Bars: 90 % intervals. A pair matches where all its bars lie in the grey."
     return Picture("pairs", "Pairs that may match", f"Probabilities: {alt}.", caption, figure)
@@ -238,19 +229,3 @@ def _limit_band(panel: Axes, graded: Grading, name: str) -> None:
             color=LIGHT,
             zorder=0,
         )
-
-
-def _named_rows(panel: Axes, names: Sequence[str]) -> None:
-    """A row for each name, the first on top."""
-    panel.set(ylim=(len(names) - 0.5, -0.5))
-    panel.set_yticks(range(len(names)), names, fontsize=SMALL, parse_math=False)
-    panel.tick_params(axis="y", length=0)
-    panel.spines["left"].set_visible(False)
-    panel.grid(axis="x", color="0.9", lw=0.6)
-    panel.set_axisbelow(True)
-
-
-def _handle(color: Any, marker: str, label: str) -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], color=color, marker=marker, mec="black", mew=0.5, ms=4.5, lw=1.6, label=label)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
-from bayesplate.files import make_folder, write_text
 from bayesplate.report.grading_figures import every_grading_picture
-from bayesplate.report.page import policy, shown_picture, template
-from bayesplate.report.saving import drawing, save_pictures
+from bayesplate.report.page import from_template, save_page
+from bayesplate.report.saving import drawing
 from bayesplate.results.batch_summary import BatchSummary
-from bayesplate.results.folder import FIGURES, PAGE
+from bayesplate.results.folder import PAGE
 from bayesplate.results.grading import TARGET, Grading
 from bayesplate.results.grading_table import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
 from bayesplate.results.log_figures import limit_told
@@ -40,33 +38,23 @@ def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, 
     -------
     Path
     """
-    from markupsafe import Markup
-
-    make_folder(folder / FIGURES)
-    groups = every_grading_picture(graded)
-    every = [one for found in groups.values() for one in found]
-    vector = save_pictures(every, folder / FIGURES, "svg")
-    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
     tables: dict[str, Table | None] = {**dict.fromkeys(_TABLES), **grading_tables(graded)}
-    text = template(
-        "grading.html"
-    ).render(
-        policy=policy(css),
-        css=Markup(css),  # our own file; the policy lets in nothing else
-        title=f"{summary.n_fitted} boards, graded",
-        sentences=sentences(graded, summary),
-        failures=failures_table(summary),
-        pictures={place: [shown_picture(one, vector[one.name]) for one in found] for place, found in groups.items()},
-        tables=tables,
-        matching=matching_sentence(graded),
-        has_target=TARGET in graded.request.figures,
-        links=[(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
-        if has_pages
-        else [],
+    pages = [(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
+    return save_page(
+        folder / GRADING_PAGE,
+        every_grading_picture(graded),
+        lambda pictures: from_template(
+            "grading.html",
+            title=f"{summary.n_fitted} boards, graded",
+            sentences=sentences(graded, summary),
+            failures=failures_table(summary),
+            pictures=pictures,
+            tables=tables,
+            matching=matching_sentence(graded),
+            has_target=TARGET in graded.request.figures,
+            links=pages if has_pages else [],
+        ),
     )
-    write_text(folder / GRADING_PAGE, text)
-    save_pictures(every, folder / FIGURES, "png")
-    return folder / GRADING_PAGE
 
 
 def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Histogram, NullControlSummary
-from bayesplate.report.style import BLUE, DARK, LIGHT, SMALL, VERMILLION, Picture, legend_below, stacked
+from bayesplate.report.colours import BLUE, DARK, LIGHT, VERMILLION
+from bayesplate.report.style import SMALL, Picture, legend_below, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +40,7 @@ def null_picture(diagnosis: Diagnosis) -> Picture | None:
     for panel, row in zip(panels, rows, strict=True):
         _draw(panel, row)
     _as_odds(panels[0])
-    legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
+    legend_below(figure, 2)
     caption = (
         f"{diagnosis.null_control.n_sets} boards like this one that lack nothing were simulated, and searched as this "
         f"one was. Grey: what came out of them.{' Above, the' if len(rows) > 1 else ' The'} odds that something is "
@@ -72,9 +73,7 @@ def _draw(panel: Axes, row: _Row) -> None:
     panel.axvline(row.board, color=BLUE, lw=2.0, label="this board")
     panel.axvline(row.limit, color=VERMILLION, lw=1.2, ls="--")
     panel.set_title(f"dashed: {row.words}", loc="right", fontsize=SMALL, color=VERMILLION)
-    panel.set_ylabel("boards", fontsize=SMALL)
-    panel.set_xlabel(row.axis, fontsize=SMALL)
-    panel.set_ylim(0.0, 1.25 * max(counts))
+    panel.set(xlabel=row.axis, ylabel="boards", ylim=(0.0, 1.25 * max(counts)))
 
 
 def _as_odds(panel: Axes) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
@@ -12,27 +12,20 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bayesplate.cards import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.exports import write_before_after, write_known
-from bayesplate.estimates.paper import paper_system
-from bayesplate.estimates.percentile import percentile_estimate
-from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
-from bayesplate.estimates.sheet import points
 from bayesplate.files import make_folder, write_text
-from bayesplate.plate.board import vibrating_lengths
-from bayesplate.posterior.draws import Draws, posterior_mean_values
+from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
 from bayesplate.report.board import board_picture
 from bayesplate.report.constants import constants_picture
-from bayesplate.report.fitted_modes import fitted_modes_picture
+from bayesplate.report.corner_plot import corner_picture, load_corner
+from bayesplate.report.fitted_modes import modes_pictures
 from bayesplate.report.health import health_picture
 from bayesplate.report.null_control import null_picture
-from bayesplate.report.pairs import pairs_picture
-from bayesplate.report.percentiles import percentiles_picture
+from bayesplate.report.percentiles import percentiles_pictures
 from bayesplate.report.priors import priors_picture
 from bayesplate.report.residuals import predictive_picture, residuals_picture
 from bayesplate.report.saving import drawing, save_pictures
@@ -46,9 +39,6 @@ from bayesplate.results.exports import write_exports
 from bayesplate.results.folder import FIGURES, PAGE
 from bayesplate.results.references import references
 from bayesplate.results.summary import Summary
-
-MOST_MODES_OF_PERCENTILES = 12
-"""4017 subsets; with more modes the estimates are too many to be drawn, and take seconds."""
 
 _PIXELS_AN_INCH = 96
 
@@ -71,6 +61,8 @@ def load_libraries() -> None:
     import jinja2  # noqa: F401
     from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
     from matplotlib.figure import Figure  # noqa: F401
+
+    load_corner()
 
 
 @drawing()
@@ -101,21 +93,41 @@ def write_report(
     Path
         Of report.html. It shows the SVG figures, and is there before the PNG files are.
     """
-    make_folder(folder / FIGURES)
-    page = folder / PAGE
     with _uncollected():
-        groups = pictures(inference, draws, summary, diagnosis)
-        every = [one for found in groups.values() for one in found]
-        vector = save_pictures(every, folder / FIGURES, "svg")
-        shown = {place: [shown_picture(one, vector[one.name]) for one in found] for place, found in groups.items()}
         title = inference.problem.board.title or summary.name
+        make_folder(folder)
         write_exports(folder, quoted(summary, diagnosis), title)
         if diagnosis is not None:
             write_before_after(folder, diagnosis, title)
             write_known(folder, diagnosis, title)
-        write_text(page, render(card, inference, draws, summary, shown, diagnosis))
-        save_pictures(every, folder / FIGURES, "png")
-    return page
+        groups = pictures(inference, draws, summary, diagnosis)
+        return save_page(folder / PAGE, groups, lambda shown: render(card, inference, draws, summary, shown, diagnosis))
+
+
+def save_page(
+    path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[Shown]]], str]
+) -> Path:
+    """Write a page and, into the folder beside it, its figures as PNG and SVG.
+
+    Parameters
+    ----------
+    path : Path
+    groups : dict of sequence of Picture
+        By the place where they stand.
+    text : callable
+        The page, given its pictures by their place.
+
+    Returns
+    -------
+    Path
+        Of the page. It shows the SVG figures, and is there before the PNG files are.
+    """
+    make_folder(path.parent / FIGURES)
+    every = [one for found in groups.values() for one in found]
+    vector = save_pictures(every, path.parent / FIGURES, "svg")
+    write_text(path, text({place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}))
+    save_pictures(every, path.parent / FIGURES, "png")
+    return path
 
 
 @contextmanager
@@ -149,7 +161,7 @@ def pictures(
             *percentiles_pictures(inference, draws),
             predictive_picture(summary, draws.predictive),
             priors_picture(problem, draws),
-            pairs_picture(problem, draws),
+            corner_picture(problem, draws),
             health_picture(inference),
         ],
     }
@@ -163,37 +175,7 @@ def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Pict
     return [before_after] if before_after else [], [one for one in more if one]
 
 
-def percentiles_pictures(inference: Inference, draws: Draws) -> list[Picture]:
-    """The picture of the percentile method; none of one estimate, of too many, or where none is positive."""
-    problem = inference.problem
-    system = paper_system(problem.board, problem.estimate, compared=False)
-    n_modes = system.psi.size
-    if n_modes > MOST_MODES_OF_PERCENTILES:
-        return []
-    found = percentile_estimate(system)
-    if found is None or found.n_subsets == 1 or not np.isfinite(list(found.mean.values())).all():
-        return []
-    return [percentiles_picture(found, n_modes, draws.moduli)]
-
-
-def modes_pictures(inference: Inference, draws: Draws, summary: Summary) -> list[Picture]:
-    """One picture a setup."""
-    problem = inference.problem
-    board = problem.board
-    shapes = labelled_shapes(problem.posterior.models, posterior_mean_values(problem, draws))
-    values = board.nominal()
-    found = []
-    for model in problem.posterior.models:
-        setup, system = model.setup, model.system
-        length_x, length_y = vibrating_lengths(system.adjusted(values), setup)
-        own = [mode for mode in summary.modes if mode.setup == setup.name]
-        name = "modes" if len(board.setups) == 1 else f"modes-{setup.name}"
-        ratio, limits = float(length_x / length_y), system.limits(points(N_POINTS))
-        found.append(fitted_modes_picture(setup, own, shapes[setup.name], ratio, name, limits))
-    return found
-
-
-def shown_picture(picture: Picture, svg: bytes) -> Shown:
+def _shown(picture: Picture, svg: bytes) -> Shown:
     """A picture as a page holds it, from the content of its SVG file."""
     from markupsafe import Markup
 
@@ -211,14 +193,10 @@ def render(
     diagnosis: Diagnosis | None = None,
 ) -> str:
     """The page as text; parameters as of `write_report`, `shown` the pictures by their place."""
-    from markupsafe import Markup
-
     problem = inference.problem
     board, prior = problem.board, problem.prior
-    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    return template("report.html").render(
-        policy=policy(css),
-        css=Markup(css),  # our own file; the policy lets in nothing else
+    return from_template(
+        "report.html",
         title=board.title or board.name,
         name=board.name,
         sentences=short_sentences(summary, diagnosis),
@@ -226,7 +204,7 @@ def render(
         weak=summary.identifiability,
         effects=content.effect_sentences(summary),
         diagnosis=None if diagnosis is None else diagnosis_section(diagnosis),
-        pictures=_with_all_places(shown),
+        pictures=dict.fromkeys(PLACES, ()) | dict(shown),
         tables={
             "constants": quoted_constants(summary, diagnosis),
             "effects": content.effects_table(board, summary),
@@ -251,18 +229,11 @@ PLACES = ("diagnosis_first", "diagnosis_more", "constants", "board", "modes", "e
 """Where pictures stand on the page."""
 
 
-def _with_all_places(shown: Mapping[str, Sequence[Shown]]) -> dict[str, Sequence[Shown]]:
-    return {place: shown.get(place, ()) for place in PLACES}
+def from_template(template: str, /, **values: Any) -> str:
+    """A page, every value cleaned of what steers the way text runs, then escaped.
 
-
-def policy(css: str) -> str:
-    """What a browser may do with the page: show its own pictures in its own style, and nothing else whatever."""
-    digest = b64encode(sha256(css.encode("utf-8")).digest()).decode("ascii")
-    return f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
-
-
-def template(name: str) -> Any:
-    """A template by its name, every value cleaned of what steers the way text runs, then escaped."""
+    A browser may show its own pictures in its own style, and do nothing else whatever.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -272,4 +243,8 @@ def template(name: str) -> Any:
     loader = PackageLoader("bayesplate.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=cleaned)
     environment.filters["symbols"] = lambda text: in_page(visible(str(text)))
-    return environment.get_template(name)
+    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
+    digest = b64encode(sha256(css.encode("utf-8")).digest()).decode("ascii")
+    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
+    # our own file; the policy lets in nothing else
+    return environment.get_template(template).render(policy=policy, css=Markup(css), **values)

@@ -6,9 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
@@ -17,10 +14,24 @@ from bayesplate.estimates.sheet import Sheet
 from bayesplate.planning.assembled import Bench
 from bayesplate.planning.plan import Plan
 from bayesplate.plate.material import MODULI
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference, PosedProblem
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.bench import bench_sheet
+from bayesplate.report.board import board_picture
+from bayesplate.report.campaign_figures import boards_picture, common_picture, left_out_picture, shared_picture
+from bayesplate.report.chladni import chladni_sheet
+from bayesplate.report.constants import constants_figure
+from bayesplate.report.corner_plot import axis_labels, corner_figure, corner_picture, words_and_factor
+from bayesplate.report.fitted_modes import modes_pictures
+from bayesplate.report.gains import gains_picture
+from bayesplate.report.health import health_picture
+from bayesplate.report.null_control import null_picture
+from bayesplate.report.percentiles import percentiles_pictures
+from bayesplate.report.priors import priors_picture
+from bayesplate.report.residuals import predictive_picture, residuals_picture
+from bayesplate.report.shares import shares_picture
+from bayesplate.report.signatures import before_after_picture, signatures_picture
+from bayesplate.report.style import Picture
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.summary import Summary
 from bayesplate.results.words import GPA
@@ -39,14 +50,10 @@ class FitPlots:
 
     def constants(self) -> Figure:
         """Posterior of each modulus, least squares and percentile band beside it."""
-        from bayesplate.report.constants import constants_figure
-
         return constants_figure(self.summary, self.draws.moduli)
 
     def modes(self, setup: str | None = None) -> Figure:
         """Chladni figures of the fitted modes of a setup, the first unless named, measured and predicted."""
-        from bayesplate.report.page import modes_pictures
-
         names = [one.name for one in self.inference.problem.board.setups]
         return modes_pictures(self.inference, self.draws, self.summary)[_place("setup", setup, names)].figure
 
@@ -59,73 +66,53 @@ class FitPlots:
             One or more, each once, of moduli, rigidities and uncertain inputs; moduli are drawn in GPa, inputs in the
             units of cards.
         """
-        from bayesplate.report.corner_plot import corner_figure
-
         known = {**self.draws.moduli, **self.draws.rigidities, **self.draws.inputs}
         if isinstance(names, str) or not len(names) or len(set(names)) < len(names):
             wanted = f"a list of one or more of {', '.join(known)}, each once"
             raise InputError(Fault("names", wanted, repr(names) if isinstance(names, str) else f"{list(names)}"))
         for name in names:
             _place("name", name, list(known))
-        shown = {name: _factor_and_words(name, self.inference.problem) for name in names}
+        shown = {name: words_and_factor(name, self.inference.problem.board) for name in names}
         estimate = self.summary.weighted_least_squares
         at = {name: estimate[name] if name in estimate.NAMES else None for name in names}
         return corner_figure(
-            {words: known[name] * factor for name, (factor, words) in shown.items()},
-            {words: None if (v := at[name]) is None else v * factor for name, (factor, words) in shown.items()},
+            {name: known[name] * factor for name, (_, factor) in shown.items()},
+            {name: None if (v := at[name]) is None else v * factor for name, (_, factor) in shown.items()},
+            axis_labels([words for words, _ in shown.values()]),
         )
 
     def pairs(self) -> Figure:
         """Every pair of the constants, the noise and the inputs that matter most, as in the report."""
-        from bayesplate.report.pairs import pairs_picture
-
-        return pairs_picture(self.inference.problem, self.draws).figure
+        return corner_picture(self.inference.problem, self.draws).figure
 
     def priors(self) -> Figure:
         """Prior and posterior of every quantity that was not known."""
-        from bayesplate.report.priors import priors_picture
-
         return priors_picture(self.inference.problem, self.draws).figure
 
     def residuals(self) -> Figure:
         """How far each mode is missed, cents."""
-        from bayesplate.report.residuals import residuals_picture
-
         return residuals_picture(self.summary).figure
 
     def predictive(self) -> Figure:
         """What the fitted model would expect the next measurement to read."""
-        from bayesplate.report.residuals import predictive_picture
-
         return predictive_picture(self.summary, self.draws.predictive).figure
 
     def shares(self) -> Figure:
         """Energy of each mode by constant, and its leverage."""
-        from bayesplate.report.shares import shares_picture
-
         return shares_picture(self.summary, self.inference.problem.identifiability).figure
 
     def percentiles(self) -> Figure:
         """The percentile method's estimates beside the posterior."""
-        from bayesplate.report.page import percentiles_pictures
-
-        found = percentiles_pictures(self.inference, self.draws)
-        if not found:
-            raise InputError(
-                Fault("plot.percentiles", "a board of a few modes more than three", "too few, too many, or no estimate")
-            )
-        return found[0].figure
+        drawn = next(iter(percentiles_pictures(self.inference, self.draws)), None)
+        wanted, got = "a board of a few modes more than three", "too few, too many, or no estimate"
+        return _figure(drawn, "plot.percentiles", wanted, got)
 
     def sampler(self) -> Figure:
         """The way of each ensemble."""
-        from bayesplate.report.health import health_picture
-
         return health_picture(self.inference).figure
 
     def board(self) -> Figure:
         """The board to scale, its edges, hammer and sensors."""
-        from bayesplate.report.board import board_picture
-
         return board_picture(self.inference.problem.board).figure
 
     def __repr__(self) -> str:
@@ -140,30 +127,18 @@ class DiagnosePlots(FitPlots):
 
     def signatures(self) -> Figure:
         """What each candidate effect would do to the modes."""
-        from bayesplate.report.signatures import signatures_picture
-
-        found = signatures_picture(self.diagnosis)
-        if found is None:
-            raise InputError(Fault("plot.signatures", "a diagnosis with candidates", "one without"))
-        return found.figure
+        drawn = signatures_picture(self.diagnosis)
+        return _figure(drawn, "plot.signatures", "a diagnosis with candidates", "one without")
 
     def null_control(self) -> Figure:
         """Where the board stands among simulated boards that lack nothing."""
-        from bayesplate.report.null_control import null_picture
-
-        found = null_picture(self.diagnosis)
-        if found is None:
-            raise InputError(Fault("plot.null_control", "readings by which something can be judged", "too few"))
-        return found.figure
+        drawn = null_picture(self.diagnosis)
+        return _figure(drawn, "plot.null_control", "readings by which something can be judged", "too few")
 
     def before_after(self) -> Figure:
         """The error before and after, and what the effect does to the constants."""
-        from bayesplate.report.signatures import before_after_picture
-
-        found = before_after_picture(self.diagnosis)
-        if found is None:
-            raise InputError(Fault("plot.before_after", "a diagnosis that adds an effect", self.diagnosis.verdict))
-        return found.figure
+        drawn = before_after_picture(self.diagnosis)
+        return _figure(drawn, "plot.before_after", "a diagnosis that adds an effect", self.diagnosis.verdict)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -175,14 +150,10 @@ class PlanPlots:
 
     def gains(self) -> Figure:
         """What each proposal is expected to give."""
-        from bayesplate.report.gains import gains_picture
-
         return gains_picture(self.plan).figure
 
     def bench(self, setup: str | None = None) -> Figure:
         """The sheet for the bench of a setup, the first unless named."""
-        from bayesplate.report.bench import bench_sheet
-
         return bench_sheet(self.benches[_place("setup", setup, [one.entry.setup for one in self.benches])])
 
 
@@ -194,8 +165,6 @@ class ModesPlots:
 
     def modes(self, setup: str | None = None) -> Figure:
         """The sheet of a setup, the first unless named."""
-        from bayesplate.report.chladni import chladni_sheet
-
         return chladni_sheet(self.sheets[_place("setup", setup, [one.setup for one in self.sheets])])
 
     def __repr__(self) -> str:
@@ -211,14 +180,10 @@ class CheckPlots:
 
     def shares(self) -> Figure:
         """Energy of each mode by constant, and its leverage."""
-        from bayesplate.report.shares import shares_picture
-
         return shares_picture(self.report, self.problem.identifiability).figure
 
     def board(self) -> Figure:
         """The board to scale, its edges, hammer and sensors."""
-        from bayesplate.report.board import board_picture
-
         return board_picture(self.problem.board).figure
 
     def __repr__(self) -> str:
@@ -233,14 +198,19 @@ class ComparePlots:
 
     def corner(self, theory: str = "thin") -> Figure:
         """Every pair of moduli under one theory, by the package corner."""
-        from bayesplate.report.corner_plot import corner_figure
-
         _place("theory", theory, list(self.draws))
-        moduli: Mapping[str, NDArray[np.float64]] = self.draws[theory].moduli
-        return corner_figure({f"{in_figure(name)}, GPa": values * GPA for name, values in moduli.items()})
+        columns = {f"{name}, GPa": values * GPA for name, values in self.draws[theory].moduli.items()}
+        return corner_figure(columns, labels=axis_labels(list(columns)))
 
     def __repr__(self) -> str:
         return f"<figures: {_methods(self)}>"
+
+
+def _figure(picture: Picture | None, place: str, wanted: str, got: str) -> Figure:
+    """The figure of a picture; refused where there is none."""
+    if picture is None:
+        raise InputError(Fault(place, wanted, got))
+    return picture.figure
 
 
 def _place(what: str, name: str | None, names: Sequence[str]) -> int:
@@ -248,16 +218,6 @@ def _place(what: str, name: str | None, names: Sequence[str]) -> int:
     if name is not None and name not in names:
         raise InputError(Fault(what, f"one of {', '.join(names)}", repr(name)))
     return 0 if name is None else list(names).index(name)
-
-
-def _factor_and_words(name: str, problem: PosedProblem) -> tuple[float, str]:
-    """Factor to the unit that people use, and what stands at the axis."""
-    if name in MODULI:
-        return GPA, f"{in_figure(name)}, GPa"
-    if name not in problem.board.inputs:
-        return 1.0, f"{in_figure(name)}, N m"
-    factor, unit = unit_of_people(problem.board.parameter(name).unit)
-    return factor, f"{name}, {unit}" if unit else name
 
 
 def _methods(plots: object) -> str:
@@ -274,27 +234,19 @@ class CampaignPlots:
 
     def shared(self, name: str | None = None) -> Figure:
         """A shared number, the first unless named: each board alone, the others, all boards."""
-        from bayesplate.report.campaign_figures import shared_picture
-
         names = list(self.summary.shared)
         return shared_picture(self.summary, names[_place("shared number", name, names)]).figure
 
     def boards(self) -> Figure:
         """The constants of all boards."""
-        from bayesplate.report.campaign_figures import boards_picture
-
         return boards_picture(self.summary).figure
 
     def common(self) -> Figure:
         """What is left over on all boards alike."""
-        from bayesplate.report.campaign_figures import common_picture
-
         return common_picture(self.summary.common_residual).figure
 
     def left_out(self) -> Figure:
         """How much better the others predict each board that is left out."""
-        from bayesplate.report.campaign_figures import left_out_picture
-
         if self.diagnosis is None or not self.diagnosis.left_out_boards:
             wanted, remedy = "a diagnosis that left boards out", "bayesplate.diagnose leaves them out"
             raise InputError(Fault("left_out", wanted, "a fit, or nothing shared", remedy))

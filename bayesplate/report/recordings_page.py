@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
-from bayesplate.files import write_text
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.picking import Picked
 from bayesplate.recordings.responses import averaged
 from bayesplate.recordings.taking import Heard
-from bayesplate.report.page import policy, shown_picture, template
+from bayesplate.report.page import from_template, save_page
 from bayesplate.report.recordings_figures import every_picture
-from bayesplate.report.saving import drawing, save_pictures
-from bayesplate.results.folder import FIGURES
+from bayesplate.report.saving import drawing
 from bayesplate.results.tables import Table
 from bayesplate.results.words import MISSING, chances, percent, two_digits
 
@@ -27,7 +24,7 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked, hear
     Parameters
     ----------
     folder : Path
-        Must be there, with its folder of figures.
+        Made if it is not there.
     report : PickReport
     picked : Picked
     heard : Heard
@@ -37,28 +34,21 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked, hear
     Path
         Of recordings.html.
     """
-    from markupsafe import Markup
-
-    every = every_picture(report, averaged(heard), picked.paths)
-    vector = save_pictures(every, folder / FIGURES, "svg")
-    css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
     aside = [peak for peak in report.peaks if not peak.is_likely]
-    text = template(
-        "recordings.html"
-    ).render(
-        policy=policy(css),
-        css=Markup(css),  # our own file; the policy lets in nothing else
-        title=", ".join(report.files[:3]) + (" and others" if len(report.files) > 3 else ""),
-        sentences=sentences(report),
-        remarks=report.remarks,
-        pictures=[shown_picture(one, vector[one.name]) for one in every],
-        modes_table=modes_table(report),
-        aside_table=aside_table(aside) if aside else None,
-        fragment=report.fragment.splitlines(),
+    return save_page(
+        folder / RECORDINGS_PAGE,
+        {"every": every_picture(report, averaged(heard), picked.paths)},
+        lambda pictures: from_template(
+            "recordings.html",
+            title=", ".join(report.files[:3]) + (" and others" if len(report.files) > 3 else ""),
+            sentences=sentences(report),
+            remarks=report.remarks,
+            pictures=pictures["every"],
+            modes_table=modes_table(report),
+            aside_table=aside_table(aside) if aside else None,
+            fragment=report.fragment.splitlines(),
+        ),
     )
-    write_text(folder / RECORDINGS_PAGE, text)
-    save_pictures(every, folder / FIGURES, "png")
-    return folder / RECORDINGS_PAGE
 
 
 def sentences(report: PickReport) -> tuple[str, ...]:

@@ -9,19 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import cents
-from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREY,
-    LIGHT,
-    ORANGE,
-    SMALL,
-    WORDS,
-    Picture,
-    legend_below,
-    short,
-    stacked,
-)
+from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE
+from bayesplate.report.style import SMALL, WORDS, Picture, in_rows, legend_below, short
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import noise_cents
@@ -30,21 +19,11 @@ from bayesplate.results.words import mode_name
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_ROW = 0.235
 _QUANTILES = (0.05, 0.25, 0.75, 0.95)
 
 
 def residuals_picture(summary: Summary) -> Picture:
-    """How far the fitted model misses each reading, and a refit that has not seen it.
-
-    Parameters
-    ----------
-    summary : Summary
-
-    Returns
-    -------
-    Picture
-    """
+    """How far the fitted model misses each reading, and a refit that has not seen it."""
     modes = summary.modes
     residual = np.array([mode.residual_cents for mode in modes])
     low, high = np.array([mode.residual_interval_cents for mode in modes]).T
@@ -60,8 +39,8 @@ def residuals_picture(summary: Summary) -> Picture:
     panel.plot(residual, rows, "o", color=BLUE, ms=6, mec="black", mew=0.6, label="error of the fit")
     panel.plot(left_out, rows, "D", mfc="white", mec="black", ms=5, label="error if left out of the fit")
     panel.axvline(0, color=DARK, lw=0.8)
-    panel.set_xlabel("measured above (+) or below (-) the fit, cents", fontsize=SMALL)
-    legend_below(figure, panel.get_legend_handles_labels()[0], 2)
+    panel.set(xlabel="measured above (+) or below (-) the fit, cents")
+    legend_below(figure, 2)
     told = "; ".join(f"{mode.label} {mode.residual_cents:+.0f}" for mode in modes)
     caption = (
         "17 cents are about 1 % of a frequency, 100 cents are a semitone. An open diamond beyond the grey band is a "
@@ -96,8 +75,8 @@ def predictive_picture(summary: Summary, predictive: NDArray[np.float64]) -> Pic
     panel.hlines(rows, q25, q75, color=BLUE, lw=9, label="expected, 50 %")
     panel.plot(np.zeros(len(modes)), rows, "o", color="white", mec="black", mew=1.0, ms=5, label="the reading")
     panel.axvline(0, color=GREY, lw=0.7, zorder=0)
-    panel.set_xlabel("above (+) or below (-) the reading, cents", fontsize=SMALL)
-    legend_below(figure, panel.get_legend_handles_labels()[0], 2)
+    panel.set(xlabel="above (+) or below (-) the reading, cents")
+    legend_below(figure, 2)
     inside = int(np.sum((q05 <= 0) & (q95 >= 0)))
     alt = (
         f"Bars of the readings that the model expects. {inside} of {len(modes)} readings lie in their 90 % bars, which "
@@ -123,11 +102,5 @@ def _rows(modes: Sequence[ModeRow]) -> tuple[Any, Axes]:
     several = len(setups) > 1
     names = [mode_name(mode.label, mode.setup, several=several) for mode in modes]
     left = 0.62 if not several else min(1.6, 0.62 + 0.075 * (1 + max(len(name) for name in setups)))
-    figure, (panel,) = stacked([_ROW * len(modes) + 0.1], left=left, bottom=0.95)
-    panel.set(ylim=(len(modes) - 0.5, -0.5))
-    panel.set_yticks(range(len(modes)), [short(name, 22) for name in names], fontsize=WORDS if not several else SMALL)
-    panel.tick_params(axis="y", length=0)
-    panel.spines["left"].set_visible(False)
-    panel.grid(axis="x", color="0.9", lw=0.6)
-    panel.set_axisbelow(True)
-    return figure, panel
+    shown = [short(name, 22) for name in names]
+    return in_rows(shown, size=SMALL if several else WORDS, left=left, bottom=0.95)

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesplate.estimates.identifiability import Identifiability
-from bayesplate.report.style import BLUE, DARK, GREEN, GREY, ORANGE, SMALL, WORDS, Picture, legend_below, short, stacked
+from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, ORANGE
+from bayesplate.report.style import SMALL, WORDS, Picture, in_rows, legend_below, short
 from bayesplate.report.symbols import in_figure
 from bayesplate.results.checking import CheckedMode, CheckReport
 from bayesplate.results.modes import ModeRow
@@ -25,18 +26,7 @@ _ROW = 0.27
 
 
 def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Picture:
-    """Draw the energy of each mode.
-
-    Parameters
-    ----------
-    summary : Summary or CheckReport
-    found : Identifiability
-        Its shares belong to the summary's modes.
-
-    Returns
-    -------
-    Picture
-    """
+    """The energy of each mode by constant; what was found belongs to the modes of the summary."""
     modes: Sequence[ModeRow | CheckedMode] = summary.modes
     several = len({mode.setup for mode in modes}) > 1
     names = [mode_name(mode.label, short(mode.setup, 14), several=several) for mode in modes]
@@ -44,7 +34,7 @@ def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Pi
     shares = np.column_stack([found.shares, 1.0 - found.shares.sum(axis=1)])
     if np.abs(shares[:, 3]).max() < 0.005:
         shares = shares[:, :3]
-    figure, (panel,) = stacked([_ROW * len(modes) + 0.05], left=left, right=0.75, top=0.28, bottom=0.98)
+    figure, panel = in_rows(names, row=_ROW, size=WORDS, left=left, right=0.75, top=0.28, bottom=0.98)
     rows = np.arange(len(modes))
     start = np.zeros(len(modes))
     styles = _STYLES | (_OF_ISOTROPIC if found.symmetry.is_isotropic else {})
@@ -55,17 +45,10 @@ def shares_picture(summary: Summary | CheckReport, found: Identifiability) -> Pi
             label=in_figure(label),
         )  # fmt: skip
         start = start + wide
-    for row, mode in zip(rows, modes, strict=True):
-        panel.text(
-            102, float(row), f"{mode.leverage:.2f}", fontsize=SMALL, va="center", color=DARK, clip_on=False,
-        )  # fmt: skip
-    panel.text(102, -0.85, "leverage", fontsize=SMALL, va="center", color=DARK, clip_on=False)
-    panel.set(xlim=(0, 100), ylim=(len(modes) - 0.5, -0.5))
-    panel.set_yticks(rows, names, fontsize=WORDS)
-    panel.tick_params(axis="y", length=0)
-    panel.spines["left"].set_visible(False)
-    panel.set_xlabel("energy of the mode, %", fontsize=SMALL)
-    legend_below(figure, panel.get_legend_handles_labels()[0], 2)
+    for row, words in [(-0.85, "leverage"), *((row, f"{one.leverage:.2f}") for row, one in enumerate(modes))]:
+        panel.text(102, row, words, fontsize=SMALL, va="center", color=DARK, clip_on=False)
+    panel.set(xlim=(0, 100), xlabel="energy of the mode, %")
+    legend_below(figure, 2)
     return Picture("shares", "What each mode tells", _alt(names, found), _CAPTION, figure)
 
 

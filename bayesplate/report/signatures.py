@@ -2,31 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.words import MERITS, names_of
-from bayesplate.report.style import (
-    BLUE,
-    DARK,
-    GREY,
-    ORANGE,
-    SKY,
-    SMALL,
-    VERMILLION,
-    WORDS,
-    Picture,
-    legend_below,
-    stacked,
-)
+from bayesplate.report.colours import BLUE, DARK, GREY, ORANGE, SKY, VERMILLION
+from bayesplate.report.style import SMALL, Picture, heading, in_rows, legend_below, name_rows, stacked
 from bayesplate.report.symbols import in_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _ROW = 0.34
 
@@ -38,7 +23,7 @@ def signatures_picture(diagnosis: Diagnosis) -> Picture | None:
     if not shown:
         return None
     names = names_of(shown)
-    figure, (panel,) = stacked([_ROW * len(shown) + 0.1], left=1.75, bottom=0.78)
+    figure, panel = in_rows([name[:30] for name in names], row=_ROW, left=1.75, bottom=0.78)
     rows = np.arange(len(shown))
     raw = np.array([one.raw_rms_cents or 0.0 for one in shown])
     visible = np.array([one.visible_rms_cents for one in shown])
@@ -47,12 +32,8 @@ def signatures_picture(diagnosis: Diagnosis) -> Picture | None:
     for row, one in zip(rows, shown, strict=True):
         if one.below_detection_limit:
             panel.text(visible[row], row + 0.18, " lost in noise", fontsize=SMALL - 1, va="center", color=DARK)
-    panel.set(ylim=(len(shown) - 0.5, -0.5))
-    panel.set_yticks(rows, [name[:30] for name in names], fontsize=SMALL, parse_math=False)
-    panel.tick_params(axis="y", length=0)
-    panel.spines["left"].set_visible(False)
-    panel.set_xlabel("shift of the modes at a usual size, rms cents", fontsize=SMALL)
-    legend_below(figure, panel.get_legend_handles_labels()[0], 1)
+    panel.set(xlabel="shift of the modes at a usual size, rms cents")
+    legend_below(figure, 1)
     told = "; ".join(
         f"{name} {a:.0f} cents, of which {b:.1f} visible" for name, a, b in zip(names, raw, visible, strict=True)
     )
@@ -78,15 +59,18 @@ def before_after_picture(diagnosis: Diagnosis) -> Picture | None:
     for offset, errors, style in ((-0.18, before, hatched), (0.18, after, plain)):
         values = np.array([one.of(errors) for one in drawn], dtype=float)
         panels[0].barh(rows + offset, values, height=0.32, lw=0, **style)
-    _named(panels[0], [one.words for one in drawn], "error, rms cents", "Error of the frequencies")
+    name_rows(panels[0], [one.words for one in drawn])
+    heading(panels[0], "Error of the frequencies")
+    panels[0].set(xlabel="error, rms cents")
     rows, values = np.arange(len(shifts)), np.array(list(shifts.values()))
     panels[1].hlines(rows, 0, values, color=ORANGE, lw=4)
     panels[1].plot(values, rows, "o", color=VERMILLION, mec="black", mew=0.6, ms=6)
     panels[1].axvline(0, color=DARK, lw=0.8)
     reach = max(1.2, 1.15 * float(np.abs(values).max()))
-    panels[1].set_xlim(-reach, reach)
-    _named(panels[1], [in_figure(name) for name in shifts], "standard deviations", "Shift of the constants")
-    legend_below(figure, panels[0].get_legend_handles_labels()[0], 2)
+    name_rows(panels[1], [in_figure(name) for name in shifts], parse_math=True)
+    heading(panels[1], "Shift of the constants")
+    panels[1].set(xlim=(-reach, reach), xlabel="standard deviations")
+    legend_below(figure, 2)
     told = "; ".join(f"{one.words}: {_cents(one.of(before))} before, {_cents(one.of(after))} after" for one in drawn)
     moved = "; ".join(f"{name} by {value:+.1f} sd" for name, value in shifts.items())
     alt = f"Error {told}. The constants move: {moved}."
@@ -94,15 +78,6 @@ def before_after_picture(diagnosis: Diagnosis) -> Picture | None:
     if after.nested_leave_one_out_rms_cents is not None:
         caption += " The last is the honest one: each mode is left out of the search as well as of the fit."
     return Picture("before-after", "Error before and after, and what it does to the constants", alt, caption, figure)
-
-
-def _named(panel: Axes, names: Sequence[str], unit: str, title: str) -> None:
-    panel.set(ylim=(len(names) - 0.5, -0.5))
-    panel.set_yticks(range(len(names)), names, fontsize=SMALL)
-    panel.tick_params(axis="y", length=0)
-    panel.spines["left"].set_visible(False)
-    panel.set_xlabel(unit, fontsize=SMALL)
-    panel.set_title(title, fontsize=WORDS, loc="left", weight="bold")
 
 
 def _cents(value: float | None) -> str:

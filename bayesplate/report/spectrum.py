@@ -2,49 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from bayesplate.report.style import BLUE, DARK, GREY, ORANGE, SMALL, Picture, moved_apart, stacked
+from bayesplate.report.colours import BLUE, GREY, ORANGE
+from bayesplate.report.style import Picture, hertz_axis, stacked, upright_names
 from bayesplate.results.peaks import UNNAMED, Spectrum
 from bayesplate.results.summary import Summary
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 _PEAKS_AT, _MODES_AT = 1.0, 0.0
 _LEAST_SEEN = 0.5
-_APART = 0.026
-"""Share of the width that two labels of modes need."""
 
 
 def spectrum_pictures(summary: Summary) -> list[Picture]:
     """One picture per setup with peaks whose label is not sure."""
-    return [spectrum_picture(summary, one) for one in summary.spectra]
+    return [_picture(summary, one) for one in summary.spectra]
 
 
-def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
-    """Measured peaks over predicted modes of a setup.
-
-    Parameters
-    ----------
-    summary : Summary
-    spectrum : Spectrum
-        Of one of its setups.
-
-    Returns
-    -------
-    Picture
-    """
+def _picture(summary: Summary, spectrum: Spectrum) -> Picture:
+    """Measured peaks over predicted modes of a setup."""
     peaks = [peak for peak in summary.peaks if peak.setup == spectrum.setup]
     several = len(summary.spectra) > 1
     figure, (panel,) = stacked([2.6], left=0.2, right=0.2, bottom=0.4, top=0.1)
     highest = max(peak.hz for peak in peaks)
     shown = [mode for mode in spectrum.modes if mode.predicted_hz.mean < 1.05 * highest]
     lowest = min([*(peak.hz for peak in peaks), *(mode.predicted_hz.mean for mode in shown)])
-    panel.set(xscale="log", xlim=(0.93 * lowest, 1.07 * highest), ylim=(-0.62, 1.42), yticks=[])
+    hertz_axis(panel, 0.93 * lowest, 1.07 * highest)
+    panel.set(ylim=(-0.62, 1.42), yticks=[])
     panel.spines["left"].set_visible(False)
     hertz = {mode.label: mode.predicted_hz.mean for mode in shown}
     for peak in peaks:
@@ -60,12 +41,10 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
         panel.plot(ends, [_MODES_AT] * 2, color=BLUE if is_seen else GREY, lw=5, solid_capstyle="butt")
         face = BLUE if is_seen else "white"
         panel.plot(mode.predicted_hz.mean, _MODES_AT, "o", mfc=face, mec=BLUE if is_seen else GREY, ms=4)
-    _write(panel, [mode.predicted_hz.mean for mode in shown], [short_label(mode.label) for mode in shown], -0.1, "top")
-    _write(panel, [peak.hz for peak in peaks], [f"{peak.hz:.4g}" for peak in peaks], 1.1, "bottom")
-    ticks = [tick for tick in (20, 50, 100, 200, 500, 1000, 2000, 5000) if 0.93 * lowest < tick < 1.07 * highest]
-    panel.set_xticks(ticks, [str(tick) for tick in ticks])
-    panel.minorticks_off()
-    panel.set_xlabel("Hz", fontsize=SMALL)
+    upright_names(
+        panel, [mode.predicted_hz.mean for mode in shown], [short_label(mode.label) for mode in shown], 0.28, 0.22
+    )
+    upright_names(panel, [peak.hz for peak in peaks], [f"{peak.hz:.4g}" for peak in peaks], 0.82, 0.88)
     alone = [peak for peak in peaks if peak.spurious_probability > _LEAST_SEEN]
     missed = [mode.label for mode in shown if mode.seen_probability <= _LEAST_SEEN]
     told = f"{len(peaks)} peaks, {len(peaks) - len(alone)} of them likely a mode of the plate. "
@@ -83,20 +62,6 @@ def spectrum_picture(summary: Summary, spectrum: Spectrum) -> Picture:
     title = "Which mode each peak is" + (f", {spectrum.setup}" if several else "")
     name = f"spectrum_{spectrum.setup}" if several else "spectrum"
     return Picture(name, title, told, caption, figure)
-
-
-def _write(panel: Axes, at: Sequence[float], names: Sequence[str], height: float, side: str) -> None:
-    """Names upright at their frequencies, moved apart where they would overlap."""
-    low, high = np.log(panel.get_xlim())
-    order = np.argsort(at, kind="stable")
-    wanted = (np.log(np.array(at)[order]) - low) / (high - low)
-    placed = moved_apart(wanted, _APART)
-    for place, true, i in zip(placed, wanted, order, strict=True):
-        x, x_true = np.exp(low + (high - low) * np.array([place, true]))
-        inner = height - 0.05 * np.sign(height)
-        outer = height + 0.08 * np.sign(height)
-        panel.plot([x_true, x], [inner, outer], color=DARK, lw=0.4)
-        panel.text(x, outer, names[i], rotation=90, ha="center", va=side, fontsize=SMALL - 1.5)
 
 
 def short_label(label: str) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.files import write_bytes
+from bayesplate.libraries import load_arviz
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -112,7 +113,7 @@ def to_arviz(archive: Archive) -> Any:
     arviz.InferenceData or xarray.DataTree
     """
     xarray: Any = import_module("xarray")
-    arviz: Any = import_module("arviz")
+    arviz = load_arviz()
     axes, groups = archive.placed()
     datasets = {}
     for name, variables in groups.items():
@@ -170,8 +171,7 @@ def read_archive(path: Path) -> Archive:
     Archive
         Plain arrays; nothing of ArviZ or xarray leaves this module.
     """
-    arviz: Any = import_module("arviz")  # typed in 1.x, not in 0.23
-    tree = arviz.from_netcdf(str(path), engine="h5netcdf")
+    tree = load_arviz().from_netcdf(str(path), engine="h5netcdf")
     groups: dict[str, dict[str, NDArray[Any]]] = {}
     coords: dict[str, NDArray[Any]] = {}
     dims: dict[str, tuple[str, ...]] = {}

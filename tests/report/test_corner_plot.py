@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from bayesplate.report.corner_plot import write_corner_plot
+from bayesplate.report.corner_plot import corner_figure, write_corner_plot
 
 N_DRAWS = 4000
 WORDS = ("E_x, GPa", "E_y, GPa", "G_xy, GPa")
@@ -41,6 +41,24 @@ def test_every_pair_has_a_panel_with_its_draws(columns, drawn, tmp_path):
             assert low < columns[other].mean() < high
             low, high = panels[i, j].get_ylim()
             assert low < columns[name].mean() < high
+
+
+@pytest.mark.parametrize("n", [1, 3, 6, 9])
+def test_a_panel_has_two_ticks_and_none_where_it_would_run_into_the_next_panel(n):
+    """As wide as the page up to six columns; every column ten times narrower than the one before, in full numbers."""
+    rng = np.random.default_rng(2)
+    figure = corner_figure({f"D_{i}": rng.normal(10.0, 3.0 * 0.1**i, N_DRAWS) for i in range(n)})
+    shown = [panel for panel in figure.axes if panel.get_frame_on()]
+
+    assert len(shown) == n * (n + 1) / 2
+    assert (figure.get_figwidth() == pytest.approx(4.5)) == (n <= 6)
+    figure.draw_without_rendering()
+    for panel in shown:
+        assert not panel.xaxis.get_offset_text().get_text()
+        assert not panel.yaxis.get_offset_text().get_text()
+        at = (panel.get_xticks() - panel.get_xlim()[0]) / np.ptp(panel.get_xlim())
+        assert len(at) >= 2
+        assert ((at > 0.07) & (at < 0.93)).all()
 
 
 @pytest.mark.parametrize(("marked", "n_lines"), [(None, 0), ({WORDS[0]: 11.05}, 1)], ids=["nothing", "one"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -168,3 +169,16 @@ def test_writing_imports_neither_arviz_nor_xarray():
     )
     root = Path(archive_module.__file__).parents[2]
     subprocess.run([sys.executable, "-c", program], check=True, cwd=root)
+
+
+@pytest.mark.parametrize("name", ["writable", "a-file"], ids=["a cache", "none that can be written"])
+def test_arviz_is_loaded_quietly_whatever_its_user_has_for_a_home(tmp_path, name):
+    """On its first day 0.23 announces version 1, as a warning, and writes into the cache that it did."""
+    (tmp_path / "a-file").touch()
+    program = "from bayesplate.libraries import load_arviz\nload_arviz().ess"
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / name)}
+    root = Path(archive_module.__file__).parents[2]
+    run = [sys.executable, "-W", "error::FutureWarning", "-c", program]
+
+    assert subprocess.run(run, check=False, cwd=root, env=environment).returncode == 0
+    assert (tmp_path / "a-file").read_bytes() == b""

@@ -29,7 +29,7 @@ ROAD = (
     "report",
 )
 """Each room sees the rooms before it."""
-OPEN_TO_ALL = {"errors", "files", "quantities", "labels"}
+OPEN_TO_ALL = {"errors", "files", "quantities", "labels", "libraries"}
 ROOMS = {
     **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
     "recordings": {"recordings", "modes", *OPEN_TO_ALL},
@@ -59,7 +59,7 @@ CALLED = {Path("modes/__init__.py"): {"workflow"}}
 DOORS = {
     "emcee": "posterior",
     "skfem": "modes",
-    "arviz": "results",
+    "arviz": "libraries",
     "xarray": "results",
     "matplotlib": "report",
     "corner": "report",
