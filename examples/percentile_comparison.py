@@ -34,8 +34,8 @@ from bayesplate.modes.shear import shear_flexible_plate
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, moduli, rigidities
-from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.laplace import predictor
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare

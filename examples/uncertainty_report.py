@@ -28,7 +28,8 @@ import numpy as np
 import bayesplate
 from bayesplate.plate.board import Board
 from bayesplate.posterior.draws import named_draws
-from bayesplate.posterior.inference import infer, pose
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare

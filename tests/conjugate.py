@@ -22,7 +22,8 @@ from bayesplate.cards import StatedPrior, load_prior
 from bayesplate.plate.board import Board
 from bayesplate.plate.setup import Setup
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.inference import PosedProblem, infer
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity

@@ -19,7 +19,7 @@ from bayesplate.modes.naming import find
 from bayesplate.modes.solve import Modes, solve
 from bayesplate.plate.parameter import Owner, shown_name
 from bayesplate.plate.setup import AttachedItem, Reading, Setup
-from bayesplate.posterior.inference import PosedProblem, pose
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.workflow.prepare import prepare
 
 SETUP = "made"

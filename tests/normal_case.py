@@ -30,8 +30,9 @@ from scipy.special import ndtri
 from statistics_checks import QUANTILES
 
 from bayesplate.estimates.least_squares import log_measured
-from bayesplate.posterior.inference import Inference, PosedProblem
+from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.parameters import Parameters
+from bayesplate.posterior.posing import PosedProblem
 
 Floats = NDArray[np.float64]
 

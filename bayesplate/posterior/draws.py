@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.board import density
 from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
-from bayesplate.posterior.inference import Inference, PosedProblem, columns_of_each, labelled_by
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.posing import PosedProblem
 
 Floats = NDArray[np.float64]
 
-MOST_DRAWS_OF_LABELS = 2000
-"""From which the probabilities of labels are taken."""
 _LINE_OF_PREDICTIVE_DRAWS = 1
 
 
@@ -111,26 +110,6 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
         log_likelihood=shaped(posterior.log_likelihood_of(by_setup, flat)),
         predictive=shaped(np.concatenate(predictive, axis=1)),
     )
-
-
-def with_likely_labels(inference: Inference, seed: int) -> tuple[Inference, Draws]:
-    """An inference whose peaks have the labels that its own draws make likely, and these draws by name.
-
-    Parameters
-    ----------
-    inference : Inference
-    seed : int
-        Of the predictive draws.
-    """
-    draws = named_draws(inference, seed)
-    flat = [every.reshape(-1, every.shape[-1]) for every in draws.every_log_frequency]
-    step = max(1, len(draws.flat) // MOST_DRAWS_OF_LABELS)
-    noise = draws.noise.reshape(len(draws.flat), -1)
-    labelled = labelled_by(inference, [every[::step] for every in flat], noise[::step])
-    if labelled is inference:
-        return inference, draws
-    columns = columns_of_each(inference.problem.posterior.models, labelled.problem.posterior.models)
-    return labelled, named_draws(labelled, seed, [every[:, own] for every, own in zip(flat, columns, strict=True)])
 
 
 def posterior_mean_values(problem: PosedProblem, draws: Draws) -> dict[str, Floats]:

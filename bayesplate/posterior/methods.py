@@ -15,7 +15,7 @@ from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.plate.board import Values
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli, rigidities
 from bayesplate.posterior.draws import Draws, posterior_mean_values
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import weighted_mean
 
 Floats = NDArray[np.float64]

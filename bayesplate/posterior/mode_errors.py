@@ -11,8 +11,9 @@ from bayesplate.estimates.refit import deviance_misfit
 from bayesplate.plate.readings import reading_sd
 from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference, PosedProblem
+from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.laplace import predictor
+from bayesplate.posterior.posing import PosedProblem
 
 _N_STARTS = 500
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.libraries import load_arviz
+
 Floats = NDArray[np.float64]
 
 LARGEST_K = 0.7
@@ -23,7 +25,8 @@ def rhat(chains: Floats) -> Floats:
 
 def effective_sizes(chains: Floats) -> Floats:
     """The smaller of bulk and tail effective size of (n_chains, n_draws, n_dim) draws: (n_dim,) array."""
-    return _of_each(chains, lambda arviz, one: min(arviz.ess(one, method=kind) for kind in ("bulk", "tail")))
+    tails = (0.05, 0.95)  # which 1.x wants to be told
+    return _of_each(chains, lambda arviz, one: min(arviz.ess(one), arviz.ess(one, method="tail", prob=tails)))
 
 
 def smoothed(log_weights: Floats) -> tuple[Floats, float]:
@@ -34,7 +37,7 @@ def smoothed(log_weights: Floats) -> tuple[Floats, float]:
     log_weights : (n,) array
         Minus infinity where a draw has none.
     """
-    arviz: Any = import_module("arviz")
+    arviz = load_arviz()
     if hasattr(arviz, "psislw"):
         log_smoothed, k = arviz.psislw(log_weights)
     else:
@@ -60,7 +63,7 @@ def resampled(weights: Floats, n: int, rng: np.random.Generator) -> NDArray[np.i
 
 
 def _of_each(chains: Floats, statistic: Any) -> Floats:
-    arviz: Any = import_module("arviz")
+    arviz = load_arviz()
     with np.errstate(invalid="ignore", divide="ignore"):  # a parameter that never moves has none
         found = [float(statistic(arviz, np.ascontiguousarray(chains[:, :, dim]))) for dim in range(chains.shape[2])]
     return np.array(found)

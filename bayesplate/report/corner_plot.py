@@ -13,7 +13,7 @@ from bayesplate.libraries import load_arviz
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.colours import BLACK, ORANGE, POSTERIOR
 from bayesplate.report.priors import input_words
 from bayesplate.report.saving import drawing, save_figure

@@ -15,7 +15,8 @@ from bayesplate.planning.assembled import Bench
 from bayesplate.planning.plan import Plan
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference, PosedProblem
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.bench import bench_sheet
 from bayesplate.report.board import board_picture
 from bayesplate.report.campaign_figures import boards_picture, common_picture, left_out_picture, shared_picture

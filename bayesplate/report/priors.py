@@ -13,7 +13,7 @@ from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.plate.sessions import DISCREPANCY
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.quantities import Quantity
 from bayesplate.report.colours import BLACK
 from bayesplate.report.style import SMALL, WIDTH, Picture, hump, legend_below, limits, placed, short

@@ -12,8 +12,8 @@ from bayesplate.estimates.leave_one_out import CarryingMode, Errors
 from bayesplate.estimates.paper import PaperSystem
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI
-from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.methods import Method
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import Elastic, finite, rms
 from bayesplate.results.modes import foretold
 

@@ -12,7 +12,7 @@ from bayesplate.estimates.leave_one_out import CarryingMode
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import finite
 
 LabelOrigin = Literal["card", "doubtful", "proposed"]

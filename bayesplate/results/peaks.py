@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.labels import Label
 from bayesplate.plate.setup import Setup
-from bayesplate.posterior.draws import MOST_DRAWS_OF_LABELS, Draws
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.likely_labels import MOST_DRAWS_OF_LABELS
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.modes import Prediction, over
 
 UNNAMED = "cannot tell"

@@ -17,7 +17,8 @@ from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.assessment import Assessment
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import Inference, PosedProblem
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks

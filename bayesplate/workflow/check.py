@@ -13,7 +13,7 @@ from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_al
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, moduli
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.report.plots import CheckPlots
 from bayesplate.results.checking import CheckedEffect, CheckedMode, CheckedSetup, CheckReport
 from bayesplate.results.contract import NOT_IN_JSON, Constants, Elastic

@@ -14,8 +14,10 @@ from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence
-from bayesplate.posterior.draws import Draws, with_likely_labels
-from bayesplate.posterior.inference import Inference, PosedProblem, infer
+from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference, infer
+from bayesplate.posterior.likely_labels import with_likely_labels
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import OutputFolder

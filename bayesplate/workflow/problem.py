@@ -15,8 +15,8 @@ from bayesplate.errors import Fault, InputError
 from bayesplate.frequencies.laws import LawName
 from bayesplate.plate.board import Board
 from bayesplate.plate.sessions import sessions
-from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.parameters import Parameters
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.prepare import Card, Prepared, prepare

@@ -28,7 +28,8 @@ from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.setup import Ends
 from bayesplate.posterior.convergence import autocorrelation_times, burn_in_steps
-from bayesplate.posterior.inference import PosedProblem, infer, pose
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.workflow.prepare import prepare, prepared_card
 

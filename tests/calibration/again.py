@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 from bayesplate.errors import BayesplateError
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.inference import PosedProblem, infer
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from bayesplate.errors import BayesplateError
 from bayesplate.frequencies.model import SetupModel, with_others
 from bayesplate.plate.setup import Setup
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.plate.board import Board
 from bayesplate.plate.setup import DEFAULT_NOISE
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 

@@ -26,7 +26,8 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws, named_draws
-from bayesplate.posterior.inference import Inference, PosedProblem, infer, pose
+from bayesplate.posterior.inference import Inference, infer
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.reweighting import linear_is_enough
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity

@@ -32,7 +32,7 @@ from bayesplate.estimates.labelling import with_labels
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
-from bayesplate.posterior.inference import PosedProblem, pose
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.results.peaks import assigned_peaks
 from bayesplate.workflow.prepare import Prepared, prepare
 

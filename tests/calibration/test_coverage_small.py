@@ -25,7 +25,7 @@ from generator.designs import DESIGNS, MEDIANS
 from scipy import stats
 
 from bayesplate.effects import EFFECTS
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 

@@ -23,8 +23,8 @@ from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.material import MODULI, RIGIDITIES, rigidities
 from bayesplate.plate.sessions import with_discrepancies
 from bayesplate.plate.setup import DEFAULT_NOISE
-from bayesplate.posterior.inference import PosedProblem, pose
 from bayesplate.posterior.laplace import predictor
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 

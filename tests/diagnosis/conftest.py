@@ -10,7 +10,7 @@ import pytest
 
 from bayesplate.diagnosis.evidence.search import Ground, prepare_search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
 from bayesplate.workflow.problem import Problem
 

@@ -18,7 +18,7 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.signatures import Signature, acts_both_ways, look_alikes, signatures
 from bayesplate.diagnosis.wording.entries import effect_entry
 from bayesplate.effects import declare, effects_of
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 

@@ -15,7 +15,7 @@ from generator.known_boards import FREE
 
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS, declare
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare
 
 TEXT = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")

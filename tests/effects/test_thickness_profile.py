@@ -21,8 +21,8 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.system import System
 from bayesplate.plate.board import density
 from bayesplate.plate.random_field import Surface
-from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
+from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 

@@ -26,8 +26,8 @@ from bayesplate.estimates.refit import (
 from bayesplate.estimates.side_by_side import most_likely_of_each
 from bayesplate.modes.terms import Weights
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import predictor
+from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare
 
 NOISE = 0.003

@@ -17,7 +17,7 @@ from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.labels import Label
 from bayesplate.plate.measured import Peak
 from bayesplate.plate.setup import AttachedItem
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
 from bayesplate.results.references import references
 from bayesplate.workflow.prepare import prepare

@@ -18,7 +18,7 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.setup import Setup
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare
 
 

@@ -11,8 +11,8 @@ from bayesplate.estimates.least_squares import log_measured, weighted_least_squa
 from bayesplate.estimates.refit import Bounds, deviance_misfit, most_likely, normal_misfit
 from bayesplate.estimates.side_by_side import curvatures, most_likely_of_each
 from bayesplate.plate.readings import ReadingErrors
-from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import predictor
+from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare
 
 N_MODES, N_FREE, SD = 9, 5, 0.1

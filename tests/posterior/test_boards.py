@@ -21,9 +21,10 @@ from bayesplate.plate.board import density, vibrating_lengths
 from bayesplate.plate.material import MODULI, moduli
 from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.inference import infer, pose
+from bayesplate.posterior.inference import infer
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.mode_errors import mode_errors
+from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare

@@ -12,7 +12,8 @@ from made_boards import CANTILEVER_LABELS, board_of, setup_of, with_noise
 from normal_case import NormalCase, differences, draws_of
 
 from bayesplate.cards import load_prior
-from bayesplate.posterior.inference import infer, pose
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 

@@ -13,7 +13,7 @@ from bayesplate.cards.shelf import shelf_folder
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.posterior.contradictions import require_possible_noise
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 

@@ -15,8 +15,8 @@ import pytest
 
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.frequencies.laws import cents
-from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import law_tolerance, worst_cents
+from bayesplate.posterior.posing import pose
 from bayesplate.workflow.fit import fit
 from bayesplate.workflow.prepare import prepare
 

@@ -20,7 +20,7 @@ from statistics_checks import Truth, differences, differences_from_normal
 
 from bayesplate.campaigns.evidence import bridge_sampling
 from bayesplate.cards import load_prior
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 
 THINNING_LOSS = 0.9
 """Share of the effective size that thinning to half an autocorrelation time leaves."""

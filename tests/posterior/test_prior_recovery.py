@@ -12,7 +12,8 @@ from scipy import stats
 
 from bayesplate.cards import load_prior
 from bayesplate.posterior.convergence import Gate
-from bayesplate.posterior.inference import infer, pose
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.target import Posterior
 from bayesplate.posterior.thinning import thin_walker_major

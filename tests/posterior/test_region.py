@@ -14,8 +14,8 @@ from bayesplate.frequencies.laws import ExactLaw, cents
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.plate.readings import reading_sd
 from bayesplate.posterior import laplace
-from bayesplate.posterior.inference import pose
 from bayesplate.posterior.laplace import law_tolerance, linearisation_errors, noise_widenings, predictor, worst_cents
+from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 

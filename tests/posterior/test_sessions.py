@@ -28,7 +28,8 @@ from bayesplate.plate.board import Board, made_board
 from bayesplate.plate.parameter import BOARD
 from bayesplate.plate.sessions import discrepancy_names, sessions, with_discrepancies
 from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid
-from bayesplate.posterior.inference import PosedProblem, infer, pose
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.quantities import Quantity
 

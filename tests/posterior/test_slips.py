@@ -16,7 +16,7 @@ from bayesplate.estimates.least_squares import log_measured
 from bayesplate.plate.board import Board
 from bayesplate.posterior import slips
 from bayesplate.posterior.doubts import LARGE_NOISE, noise_remarks, reading_remarks
-from bayesplate.posterior.inference import PosedProblem, pose
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.slips import RARITY, Slip, SlipSearch
 from bayesplate.quantities import Quantity
 

@@ -20,7 +20,8 @@ from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.posterior.assessment import assess as assessed
 from bayesplate.posterior.convergence import assess
 from bayesplate.posterior.draws import named_draws
-from bayesplate.posterior.inference import Inference, pose
+from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.posing import pose
 from bayesplate.posterior.reweighting import linearisation
 from bayesplate.posterior.sampling import Chains
 from bayesplate.posterior.target import linear_suffices

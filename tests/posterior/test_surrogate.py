@@ -11,8 +11,9 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.draws import named_draws
-from bayesplate.posterior.inference import infer, pose
+from bayesplate.posterior.inference import infer
 from bayesplate.posterior.mixture import Mixture
+from bayesplate.posterior.posing import pose
 from bayesplate.posterior.sampling import SamplerSettings
 from bayesplate.posterior.surrogate import (
     Solved,

@@ -15,7 +15,7 @@ from bayesplate.estimates.identifiability import identifiability
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.plate.material import moduli
 from bayesplate.plate.parameter import BOARD
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.posterior.target import Posterior
 from bayesplate.quantities import Quantity
 

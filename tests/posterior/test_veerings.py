@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 from bayesplate.cards import load_prior
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.assessment import labels_contradicted
-from bayesplate.posterior.inference import PosedProblem, pose
+from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.posterior.veerings import contradicted_labels, with_doubts
 
 AT_THE_VEERING, BESIDE_IT = 0.0632, 0.08
@@ -95,7 +95,7 @@ def test_a_truth_on_the_other_side_of_the_veering_is_as_likely_as_it_should_be(m
     design = Design(edges="both")
     truth = draw_truth(design, random_lines(design.base_seed, EXCHANGED)[0])
     doubted = make_problem(design, truth)
-    monkeypatch.setattr("bayesplate.posterior.inference.with_doubts", lambda board, *_: board)
+    monkeypatch.setattr("bayesplate.posterior.posing.with_doubts", lambda board, *_: board)
     sure = make_problem(design, truth)
 
     def distance(problem: PosedProblem, stiffer: float = 0.0) -> float:

@@ -29,7 +29,7 @@ ROAD = (
     "report",
 )
 """Each room sees the rooms before it."""
-OPEN_TO_ALL = {"errors", "files", "quantities", "labels", "libraries"}
+OPEN_TO_ALL = {"errors", "files", "locks", "quantities", "labels", "libraries", "streams"}
 ROOMS = {
     **{room: {*ROAD[: i + 1], *OPEN_TO_ALL} for i, room in enumerate(ROAD)},
     "recordings": {"recordings", "modes", *OPEN_TO_ALL},
@@ -71,10 +71,11 @@ DOORS = {
 """Heavy libraries and the one room that may import each."""
 ONLY_WHERE_NEEDED = {*DOORS, "scipy.stats"}
 """Imported inside functions, so that `--help` answers at once."""
-WRITERS = {Path("files.py"), Path("posterior/checkpoint.py"), Path("results/board_journal.py")}
-"""Files are written by the first; the others add to theirs while a run goes on."""
+WRITERS = {Path("files.py"), Path("locks.py"), Path("results/board_journal.py")}
+"""Files are written by the first; the others hold theirs open while a run goes on."""
 EXECUTES_DATA = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve"}
 SEEDED_RANDOM = {"Generator", "BitGenerator", "SeedSequence", "default_rng", "MT19937", "PCG64", "Philox", "SFC64"}
+SEEDED_RANDOM |= {"RandomState"}  # what emcee draws from
 
 
 @dataclass(frozen=True)

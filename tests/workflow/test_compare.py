@@ -164,7 +164,7 @@ def test_all_methods_stand_on_the_labels_that_the_draws_leave(monkeypatch):
     (setup,) = board.setups
     *sure, last = setup.readings
     bare = replace(setup, readings=tuple(sure), peaks=(Peak(last.frequency),))
-    monkeypatch.setattr("bayesplate.posterior.inference.LIKELY", 1.0)
+    monkeypatch.setattr("bayesplate.posterior.likely_labels.LIKELY", 1.0)
     monkeypatch.setattr("bayesplate.workflow.compare._SHEAR", ())  # the thin plate twice: shear takes its time
 
     result = compare(replace(board, setups=(bare,)))

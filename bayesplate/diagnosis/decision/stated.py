@@ -20,7 +20,7 @@ from bayesplate.diagnosis.evidence.scores import scores_given
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.board import Board
 from bayesplate.plate.sessions import same_modes
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms
 
 Floats = NDArray[np.float64]

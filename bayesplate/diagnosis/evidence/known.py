@@ -36,9 +36,9 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import RIGIDITIES, moduli
 from bayesplate.plate.sessions import same_modes
-from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]

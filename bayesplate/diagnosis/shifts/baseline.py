@@ -28,9 +28,9 @@ from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import same_modes, under_prior_scales
-from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.parameters import Parameters
+from bayesplate.posterior.posing import PosedProblem
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

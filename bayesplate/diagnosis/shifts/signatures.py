@@ -23,8 +23,8 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, Moduli, moduli
 from bayesplate.plate.parameter import Parameter
-from bayesplate.posterior.inference import PosedProblem
 from bayesplate.posterior.laplace import predictor
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.modes.solve import solve
 from bayesplate.modes.thin import thin_plate
 from bayesplate.plate.material import rigidities
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare
 from computations.markdown import BLUE, GREEN, VERMILLION, empty_figure, figure, signed, table
 from designs import E_X, E_Y, G_XY

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesplate.diagnosis.shifts.signatures import cosine, look_alikes, signatures
 from bayesplate.frequencies.laws import cents
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare
 from commands import bench
 from computations.markdown import BLUE, GREEN, GREY, VERMILLION, empty_figure, figure, plain, signed, table

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from benchmarks.peers.statement import BOARD
 
-from bayesplate.posterior.inference import PosedProblem, infer
+from bayesplate.posterior.inference import infer
+from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.sampling import SamplerSettings
 
 COMMANDS = {"bayesplate fit": (), "bayesplate fit --no-report": ("--no-report",)}

@@ -10,7 +10,7 @@ from benchmarks import timing
 from benchmarks.peers.density import Density
 
 from bayesplate.plate.material import MODULI, RIGIDITIES
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 
 BOARD = "fiemme-spruce-clamped"
 TOLERANCE = 1e-8

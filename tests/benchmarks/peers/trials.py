@@ -17,7 +17,7 @@ from benchmarks.peers import measures, package
 from benchmarks.peers.environments import Unavailable
 from benchmarks.peers.registry import Peer
 
-from bayesplate.posterior.inference import PosedProblem
+from bayesplate.posterior.posing import PosedProblem
 
 TESTS = Path(__file__).resolve().parents[2]
 LONGEST = 1500.0

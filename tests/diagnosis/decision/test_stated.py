@@ -18,7 +18,7 @@ from bayesplate.diagnosis.evidence.known import known_fit
 from bayesplate.diagnosis.evidence.scores import scores_given
 from bayesplate.diagnosis.wording.stated import stated_sentences
 from bayesplate.plate.setup import DeclaredFluid
-from bayesplate.posterior.inference import pose
+from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.problem import Problem
 
