@@ -12,10 +12,9 @@ from bayesplate.plate.board import density
 from bayesplate.plate.material import MODULI, RIGIDITIES, Derived, derived_quantities, moduli
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
+from bayesplate.streams import stream
 
 Floats = NDArray[np.float64]
-
-_LINE_OF_PREDICTIVE_DRAWS = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +85,7 @@ def named_draws(inference: Inference, seed: int, every_log_frequency: Sequence[F
         distinct, which = np.unique(flat, axis=0, return_inverse=True)  # where a step was refused the draw stays
         every_log_frequency = [part[which.ravel()] for part in posterior.every_log_frequency(distinct)]
     by_setup = list(every_log_frequency)
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(_LINE_OF_PREDICTIVE_DRAWS)[0])
+    rng = stream(seed, "predictive")
     labelled = posterior.labelled(by_setup)
     predictive = [
         readings.simulate(predicted, noise[:, i], rng)

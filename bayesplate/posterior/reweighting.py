@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
+from bayesplate.posterior.statistics import smoothed
 from bayesplate.posterior.target import linear_suffices
 
 Floats = NDArray[np.float64]
@@ -66,11 +67,9 @@ def law_weights(inference: Inference, draws: Draws, law: LawName) -> Floats:
 
 
 def _weights(log_likelihood: Floats, draws: Draws, every: int = 1) -> Floats:
-    """Weights of every so many draws from what another law says of them: (n_some, n_modes) to (n_some,) array."""
+    """Smoothed weights of every so many draws from what another law says of them: (n_some, n_modes) to (n_some,)."""
     own = draws.log_likelihood.sum(axis=-1).ravel()[::every]
-    log_weights = log_likelihood.sum(axis=1) - own
-    weights = np.exp(log_weights - log_weights.max())
-    return np.asarray(weights / weights.sum())
+    return smoothed(log_likelihood.sum(axis=1) - own)[0]
 
 
 def _log_likelihood(inference: Inference, theta: Floats, every_log_frequency: Floats) -> Floats:
