@@ -176,7 +176,7 @@ def test_a_board_held_free_as_well_tells_a_soft_clamp_from_one_that_covers_more(
     card.write_text("[[setup]]".join(card.read_text().split("[[setup]]")[:2]))
     found = []
     for asked in (both, prepare(card)):
-        _, draws, _ = fitted(pose(asked.board, asked.prior), replace(SHORT, n_walkers=16), rng)
+        _, draws, _ = fitted(pose(asked.board, asked.prior), replace(SHORT, n_ensembles=4, n_walkers=32), rng)
         found.append(intervals(asked.board, truth, draws))
     for name in ("clamped_x0[cantilever]", "clamp_rotation.compliance[cantilever]", "E_x"):
         with_free, alone = ({"width": one[name]["q95"] - one[name]["q05"], **one[name]} for one in found)
