@@ -24,7 +24,7 @@ DEGREES_OF_FREEDOM = 6.0
 """Of each part: heavier tails than the posterior's, or walkers far out would stay there."""
 N_PARTS = 4
 _N_PASSES = 15
-_MOST_FITTED = 4096
+_MOST_FITTED = 32_768
 _DRAWS_PER_NUMBER = 10
 """Fewer draws than that for each number of a part's mean and covariance, and a part would follow single walkers."""
 _FLOOR = 1e-3

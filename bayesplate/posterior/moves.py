@@ -23,7 +23,7 @@ from bayesplate.posterior.mixture import Mixture
 
 Floats = NDArray[np.float64]
 
-_INDEPENDENT, _DIFFERENTIAL, _STRETCH = 0.8, 0.15, 0.05
+_INDEPENDENT, _DIFFERENTIAL, _STRETCH = 0.6, 0.3, 0.1
 _AHEAD = 16
 """Steps whose proposals are evaluated in one call, for they depend on no walker."""
 
