@@ -19,7 +19,8 @@ Floats = NDArray[np.float64]
 
 _PILOT_STEPS = 40
 FEWEST_ROUNDS, _MOST_ROUNDS = 3, 60
-"""Of a pilot. One that teaches proposals makes two for each parameter: the longer, the better they are."""
+_PAIRS_A_ROUND = 8
+"""One that teaches proposals makes a round for so many pairs of parameters, for it teaches their covariances."""
 _RISE = 1.0
 """Of the mean log density from one round of the pilot to the next, from which on it is still on its way."""
 
@@ -58,7 +59,9 @@ class Ensembles:
     def pilot(self) -> Pilot:
         """The walk from the starts to where the ensembles begin."""
         rng, n_walkers = stream(self.seed, "pilot"), self.shape[0] * self.shape[1]
-        return pilot(self.log_density, self.centre, self.factor, rng, n_walkers, 2 * len(self.centre))
+        return pilot(
+            self.log_density, self.centre, self.factor, rng, n_walkers, len(self.centre) ** 2 // _PAIRS_A_ROUND
+        )
 
     @property
     def chain(self) -> Floats:
