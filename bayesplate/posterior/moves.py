@@ -23,7 +23,10 @@ from bayesplate.posterior.mixture import Mixture
 
 Floats = NDArray[np.float64]
 
-_INDEPENDENT, _DIFFERENTIAL, _STRETCH = 0.6, 0.3, 0.1
+_FEW_PARAMETERS = 10
+"""Up to which a mixture knows a posterior well; of more parameters emcee's own moves have to do a larger part."""
+_STRETCHED = 0.25
+"""Of emcee's own moves."""
 _AHEAD = 16
 """Steps whose proposals are evaluated in one call, for they depend on no walker."""
 
@@ -65,5 +68,9 @@ def moves(mixture: Mixture) -> list[tuple[Any, float]]:
     """Independent proposals, and emcee's differential and stretch moves beside them, with their shares of the steps."""
     import emcee
 
-    others = (emcee.moves.DEMove(), _DIFFERENTIAL), (emcee.moves.StretchMove(), _STRETCH)
-    return [(IndependentMove(mixture), _INDEPENDENT), *others]
+    others = 0.2 if mixture.centres.shape[1] <= _FEW_PARAMETERS else 0.4
+    return [
+        (IndependentMove(mixture), 1.0 - others),
+        (emcee.moves.DEMove(), (1.0 - _STRETCHED) * others),
+        (emcee.moves.StretchMove(), _STRETCHED * others),
+    ]
