@@ -24,7 +24,10 @@ DEGREES_OF_FREEDOM = 6.0
 """Of each part: heavier tails than the posterior's, or walkers far out would stay there."""
 N_PARTS = 4
 _N_PASSES = 15
-_MOST_FITTED = 32_768
+FEW_PARAMETERS = 10
+"""Up to which a mixture knows a posterior well from few draws."""
+_MOST_FITTED, _MOST_OF_MANY = 4096, 32_768
+"""Draws that a mixture of few and of many parameters is fitted to."""
 _DRAWS_PER_NUMBER = 10
 """Fewer draws than that for each number of a part's mean and covariance, and a part would follow single walkers."""
 _FLOOR = 1e-3
@@ -68,8 +71,8 @@ class Mixture:
         ellipsoid misses first is how the density falls off, so the start needs no random numbers.
         """
         flat = draws.reshape(-1, draws.shape[-1])
-        flat = flat[:: -(-len(flat) // _MOST_FITTED)]
         n_dim = flat.shape[1]
+        flat = flat[:: -(-len(flat) // (_MOST_FITTED if n_dim <= FEW_PARAMETERS else _MOST_OF_MANY))]
         n_parts = min(N_PARTS, len(flat) // (_DRAWS_PER_NUMBER * n_dim * (n_dim + 3) // 2))
         mixture = cls.one_fitted(flat)
         if n_parts < 2:

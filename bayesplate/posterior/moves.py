@@ -19,12 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.posterior.mixture import Mixture
+from bayesplate.posterior.mixture import FEW_PARAMETERS, Mixture
 
 Floats = NDArray[np.float64]
 
-_FEW_PARAMETERS = 10
-"""Up to which a mixture knows a posterior well; of more parameters emcee's own moves have to do a larger part."""
 _STRETCHED = 0.25
 """Of emcee's own moves."""
 _AHEAD = 16
@@ -68,7 +66,7 @@ def moves(mixture: Mixture) -> list[tuple[Any, float]]:
     """Independent proposals, and emcee's differential and stretch moves beside them, with their shares of the steps."""
     import emcee
 
-    others = 0.2 if mixture.centres.shape[1] <= _FEW_PARAMETERS else 0.4
+    others = 0.2 if mixture.centres.shape[1] <= FEW_PARAMETERS else 0.4
     return [
         (IndependentMove(mixture), 1.0 - others),
         (emcee.moves.DEMove(), (1.0 - _STRETCHED) * others),

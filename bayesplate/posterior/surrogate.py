@@ -37,7 +37,7 @@ ALONG_BENT = {3: 6, 4: 4, 5: 3}
 """Orders above the second, and along how many of the directions in which ln f is bent most."""
 _POINTS_PER_TERM = 3
 _FEWEST_POINTS = 512
-_FEWEST_ROUNDS, _MOST_ROUNDS = 2, 6
+_MOST_ROUNDS = 6
 _TEMPERATURE, _LOWEST = 4.0, -200.0
 """Of the weights in a fit. Lower differences of log densities than the second count as that: a law that is wild far out
 must not bend the polynomial here."""
@@ -216,7 +216,7 @@ def find_surrogate(
     theta = rng.multivariate_normal(centre, _WIDER**2 * covariance, n_points)
     theta[:, columns] = np.clip(theta[:, columns], bounds.lower, bounds.upper)
     points = _solved(posterior, coordinates, theta)
-    for n_rounds in range(1, _MOST_ROUNDS + 1):
+    for _ in range(_MOST_ROUNDS):
         surrogate = Surrogate.fitted(points, columns)
         density = coordinates.density(with_surrogate(posterior, surrogate))
         walked = pilot(density, coordinates.start, factor, rng).draws
@@ -228,8 +228,7 @@ def find_surrogate(
         y = y[coordinates.is_near(y)]
         further_out = _solved(posterior, coordinates, coordinates.theta(y))
         lacks = share_lacking(further_out.log_density, density(y), proposal.log_density(y))
-        serves = may_stand(weights, pareto_k) and effective_share(weights) >= _GOOD_SHARE and lacks <= _MAY_LACK
-        if serves and n_rounds >= _FEWEST_ROUNDS:
+        if may_stand(weights, pareto_k) and effective_share(weights) >= _GOOD_SHARE and lacks <= _MAY_LACK:
             return surrogate
         points = Solved(*(np.concatenate(parts) for parts in zip(points, solved, further_out, strict=True)))
     return None
