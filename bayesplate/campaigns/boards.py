@@ -16,9 +16,9 @@ from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS, effective_draws
+from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains, SamplerSettings, sample
-from bayesplate.posterior.statistics import resampled
+from bayesplate.posterior.statistics import effective_draws, resampled
 from bayesplate.posterior.surrogate import Solved, Surrogate, n_terms, with_surrogate
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,8 @@ from bayesplate.campaigns.shared import Shared
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.mixture import Mixture
-from bayesplate.posterior.reweighting import effective_draws
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample
+from bayesplate.posterior.statistics import effective_draws
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.posterior.statistics import smoothed
+from bayesplate.posterior.statistics import effective_draws, smoothed
 from bayesplate.posterior.target import linear_suffices
 
 Floats = NDArray[np.float64]
@@ -81,11 +81,6 @@ def _log_likelihood(inference: Inference, theta: Floats, every_log_frequency: Fl
 def weighted_mean(values: Floats, weights: Floats) -> float:
     """Mean of draws with weights that sum to 1; a sum, because a long dot product depends on the number of threads."""
     return float(np.sum(weights * values))
-
-
-def effective_draws(weights: Floats) -> float:
-    """How many draws of equal weight are worth as much."""
-    return float(1.0 / np.sum(weights**2))
 
 
 def linearisation(inference: Inference, draws: Draws) -> Floats:

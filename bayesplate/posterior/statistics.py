@@ -51,9 +51,14 @@ def may_stand(weights: Floats, pareto_k: float) -> bool:
     return pareto_k <= LARGEST_K or bool(weights.max() * weights.size <= _ALIKE * weights.sum())
 
 
+def effective_draws(weights: Floats) -> float:
+    """How many draws of equal weight are worth as much, from weights that sum to 1."""
+    return float(1.0 / np.sum(weights**2))
+
+
 def effective_share(weights: Floats) -> float:
     """Share of the draws that count, from weights that sum to 1."""
-    return float(1.0 / (weights.size * np.sum(weights**2)))
+    return effective_draws(weights) / weights.size
 
 
 def resampled(weights: Floats, n: int, rng: np.random.Generator) -> NDArray[np.intp]:

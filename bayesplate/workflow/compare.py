@@ -20,8 +20,9 @@ from bayesplate.posterior.likely_labels import with_likely_labels
 from bayesplate.posterior.methods import Method, point_methods, posterior_method
 from bayesplate.posterior.mode_errors import carried_in_fit, mode_errors
 from bayesplate.posterior.posing import PosedProblem, pose
-from bayesplate.posterior.reweighting import effective_draws, law_weights
+from bayesplate.posterior.reweighting import law_weights
 from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.posterior.statistics import effective_draws
 from bayesplate.report.plots import ComparePlots
 from bayesplate.results.archive import to_arviz
 from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, judged_alike, theory_row

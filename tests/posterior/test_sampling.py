@@ -195,7 +195,7 @@ def test_a_density_that_no_step_crosses_ends_the_sampling_early():
 
     chains, convergence = sample(washboard, np.zeros(4), np.eye(4), SamplerSettings(seed=2, max_steps=10_000))
     assert not convergence.passed
-    assert convergence.tau_max > 100
+    assert convergence.tau_max > 400
     assert chains.draws.shape[1] < 10_000
 
 
