@@ -2,8 +2,8 @@
 
 The paper's clamped board under the prior for spruce. The package samples its posterior in coordinates of its own; here
 emcee walks on `problem.log_prob` by other moves, and dynesty climbs through `problem.prior_transform`, which also gives
-the evidence. All three find the same constants within their Monte Carlo errors. Under another prior, by weights, they
-lie elsewhere: such a difference is seen.
+the evidence. All three find the same constants within their Monte Carlo errors. Under another prior they lie elsewhere:
+such a difference is seen.
 
     python examples/other_samplers.py samplers.png
 """
@@ -29,7 +29,7 @@ RESAMPLED = 20
 
 
 def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str, Any]:
-    """Sample one posterior in three ways, and weigh it to that of another prior.
+    """Sample one posterior in three ways, and that of another prior.
 
     Parameters
     ----------
@@ -46,17 +46,12 @@ def run(figure: Path | None = None, card: str = CARD, seed: int = 1) -> dict[str
         each; evidence: the logarithm of the probability of the readings, and its error.
     """
     problem = bayesplate.Problem.from_card(card, prior=PRIOR)
-    result = bayesplate.fit(problem, seed=seed)
-    ess = result.summary.sampler.ess_min
     nested, evidence = by_dynesty(problem, seed)
     found: dict[str, Any] = {
-        "fit": {
-            name: moments(values.ravel() / 1e9, np.full(values.size, 1.0 / values.size), ess)
-            for name, values in result.draws.moduli.items()
-        },
+        "fit": by_fit(problem, seed),
         "emcee": by_emcee(problem, seed),
         "dynesty": nested,
-        "other_prior": under(bayesplate.Problem.from_card(card, prior=OTHER_PRIOR), problem, result),
+        "other_prior": by_fit(bayesplate.Problem.from_card(card, prior=OTHER_PRIOR), seed),
     }
     if figure is not None:
         figure_of(found).savefig(figure, dpi=150)
@@ -84,16 +79,14 @@ def moments(values: np.ndarray, weights: np.ndarray, effective: float) -> dict[s
     }
 
 
-def under(
-    other: bayesplate.Problem, problem: bayesplate.Problem, result: bayesplate.FitResult
-) -> dict[str, dict[str, float]]:
-    """The constants under another prior: the draws of a fit, weighted by the ratio of the two densities."""
-    theta = result.draws.flat
-    log_ratios = other.log_prior(theta) - problem.log_prior(theta)
-    weights = np.exp(log_ratios - log_ratios.max())
-    weights /= weights.sum()
-    effective = float(result.summary.sampler.ess_min / (len(theta) * np.sum(weights**2)))
-    return {name: moments(values, weights, effective) for name, values in constants(other, theta).items()}
+def by_fit(problem: bayesplate.Problem, seed: int) -> dict[str, dict[str, float]]:
+    """The package's own sampler."""
+    result = bayesplate.fit(problem, seed=seed)
+    ess = result.summary.sampler.ess_min
+    return {
+        name: moments(values.ravel() / 1e9, np.full(values.size, 1.0 / values.size), ess)
+        for name, values in result.draws.moduli.items()
+    }
 
 
 def by_emcee(problem: bayesplate.Problem, seed: int) -> dict[str, dict[str, float]]:

@@ -8,9 +8,16 @@ import numpy as np
 from scipy.special import ndtri
 
 QUANTILES = (0.05, 0.5, 0.95)
+FALSE_ALARMS = 1e-4
+"""Probability that draws of the right posterior fail a test. Some sixty tests of the suite compare so."""
 
 
-def differences_from_normal(draws, ess, mean, sd, n_errors=4.0):
+def furthest(n_compared):
+    """Standard errors that none of so many differences exceeds but in a share `FALSE_ALARMS` of tests."""
+    return float(-ndtri(0.5 * FALSE_ALARMS / n_compared))
+
+
+def differences_from_normal(draws, ess, mean, sd):
     """List in what the draws differ from exact normal distributions.
 
     Compared are the mean, the standard deviation and the 5, 50 and 95 % quantiles of every parameter.  A Monte Carlo
@@ -24,15 +31,13 @@ def differences_from_normal(draws, ess, mean, sd, n_errors=4.0):
         Effective sample sizes of the means.
     mean, sd : (n_dim,) array
         The truth.
-    n_errors : float, optional
-        Standard errors allowed.
 
     Returns
     -------
     list of str
         One sentence a difference; empty if the draws agree.
     """
-    return differences(draws, ess, normal_truth(mean, sd), n_errors)
+    return differences(draws, ess, normal_truth(mean, sd))
 
 
 def normal_truth(mean, sd):
@@ -77,15 +82,16 @@ class Truth:
         return cls(mean, sd, kurtosis, quantiles.T, at_quantiles.T)
 
 
-def differences(draws, ess, truth, n_errors=4.0):
-    """List in what the draws differ from known marginal distributions; see `differences_from_normal`.
+def differences(draws, ess, truth):
+    """List in what the draws differ from known marginal distributions, see `differences_from_normal`.
+
+    The tolerance is that of all comparisons together, see `furthest`.
 
     Parameters
     ----------
     draws : (n_draws, n_dim) array
     ess : (n_dim,) array
     truth : Truth
-    n_errors : float, optional
 
     Returns
     -------
@@ -101,6 +107,7 @@ def differences(draws, ess, truth, n_errors=4.0):
     for probability, found, true, density in zip(QUANTILES, drawn, truth.quantiles, truth.densities, strict=True):
         error = np.sqrt(probability * (1 - probability) / ess) / density
         compared[f"{100 * probability:g} % quantile"] = (found, true, error)
+    n_errors = furthest(len(compared) * mean.size)
     return [
         f"{what} of parameter {dim + 1}: {found[dim]:.6g} instead of {true[dim]:.6g}, "
         f"{abs(found[dim] - true[dim]) / error[dim]:.1f} standard errors"

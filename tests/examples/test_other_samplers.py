@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from statistics_checks import furthest
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "other_samplers.py"
 CONSTANTS = ("E_x", "E_y", "G_xy")
-FURTHEST = 4.0
-"""Monte Carlo errors of a difference: twelve are compared, and one in a thousand such tests would fail by chance."""
+FURTHEST = furthest(12)
+"""Monte Carlo errors of a difference: twelve are compared."""
 
 
 @pytest.fixture(scope="module")

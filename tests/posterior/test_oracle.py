@@ -1,7 +1,8 @@
 """The whole of `infer` against posteriors that are known: one in closed form, one by quadrature.
 
-A difference is more than four Monte Carlo errors of a mean, a standard deviation or a quantile. Each comparison is made
-again with a posterior that is wrong in a known way, which must differ.
+A difference is more Monte Carlo errors of a mean, a standard deviation or a quantile than chance allows. Each
+comparison
+is made again with a posterior that is wrong in a known way, which must differ.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from statistics_checks import furthest
 
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import RIGIDITIES
@@ -29,6 +30,7 @@ from bayesplate.posterior.thinning import thin_walker_major
 from bayesplate.workflow.prepare import prepare
 
 BOARD = "finnish-spruce-cantilever"
+FURTHEST = furthest(18)  # six shares or means of three constants
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +190,7 @@ def differences(first, second):
 
 def test_with_and_without_a_surrogate_the_posterior_is_the_same(inference, exact):
     assert inference.convergence.passed
-    assert differences(inference, exact).max() < 4
+    assert differences(inference, exact).max() < FURTHEST
 
 
 def bent(problem, monkeypatch):
@@ -208,10 +210,10 @@ def bent(problem, monkeypatch):
 def test_the_weights_undo_the_error_of_a_surrogate(problem, exact, monkeypatch):
     """Without them the draws are the surrogate's, which is the control."""
     weighted = bent(problem, monkeypatch)
-    assert differences(weighted, exact).max() < 4
+    assert differences(weighted, exact).max() < FURTHEST
     chains = weighted.chains
     theta = thin_walker_major(chains.draws, chains.burn_in, weighted.convergence.tau_max)
-    assert differences(replace(weighted, theta=theta), exact).max() > 4
+    assert differences(replace(weighted, theta=theta), exact).max() > FURTHEST
 
 
 def test_where_too_few_draws_count_the_law_itself_is_sampled(problem, exact, monkeypatch):
