@@ -32,10 +32,11 @@ def add_effects(one: Explanation, known: KnownBoard, law: BareLaw, shift: Floats
         Of the station.
     shift : (n_terms, (1 + n_spots) n_modes) array
         Where u is zero, the modes, then what a known mass at each spot adds to each; changed in place, to not a number
-        where a mode cannot be followed.
+        where a mode cannot be followed in the middle of a size, or to neither side of it.
     slopes : (n_terms, (1 + n_spots) n_modes, n_u) array
         Changed in place.
     """
+    n = len(law.middle)
     for form in one.forms:
         mean = one.mean[form.rows]
         sizes, own = mean[:, form.columns], one.covariance[form.rows][:, form.columns, form.columns]
@@ -56,6 +57,10 @@ def add_effects(one: Explanation, known: KnownBoard, law: BareLaw, shift: Floats
         shift[form.rows] += solved[0]
         for j, column in enumerate(form.columns):
             two, pair = away[:, j], solved[1 + 2 * j : 3 + 2 * j] - solved[0]
+            across = (
+                pair[::-1] * (two / two[::-1])[:, None]
+            )  # a straight line where a mode is followed to one side only
+            pair[:, :n] = np.where(np.isnan(pair), across, pair)[:, :n]
             linear, square = np.linalg.solve(np.column_stack([two, two**2]), pair)
             place = np.clip(sizes[:, j] - centre[j], *two)[:, None]
             along = linear + 2.0 * square * place

@@ -43,7 +43,7 @@ def added(monkeypatch):
     monkeypatch.setattr(home, "_beside", solved)
     known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
     shift, slopes = np.zeros((N_TERMS, 2)), np.zeros((N_TERMS, 2, 3))
-    home.add_effects(one, known, None, shift, slopes)
+    home.add_effects(one, known, SimpleNamespace(middle=np.zeros(2)), shift, slopes)
     return mean, shift, slopes, asked
 
 
@@ -63,3 +63,22 @@ def test_each_term_is_linear_about_its_own_place_on_the_parabola(added):
 
 def test_two_solutions_along_each_size_and_one_in_the_middle_are_all_it_takes(added):
     assert len(added[3]) == 5
+
+
+def test_a_mode_that_is_lost_to_one_side_goes_on_straight_and_what_a_mass_adds_to_it_is_not_told(monkeypatch):
+    """One mode and one spot, one size; the mode has lost its name where the effect is large."""
+    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    form = FormTerms(np.arange(3), None, ("made",), (SimpleNamespace(name="a", prior=prior),), np.array([1]))
+    mean = np.column_stack([np.zeros(3), [-0.5, 0.0, 0.5]])
+    one = Explanation(
+        members=("made",), words="", probability=1.0, mean=mean, covariance=np.tile(0.01 * np.eye(2), (3, 1, 1)),
+        noise=np.ones((3, 1)), middle=np.zeros((3, 0)), wanted=np.zeros((3, 0, 2)), forms=(form,),
+    )  # fmt: skip
+    monkeypatch.setattr(home, "_beside", lambda *a: np.full(2, np.nan if a[3][0] > 0.2 else 0.1 * a[3][0]))
+    known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
+    shift, slopes = np.zeros((3, 2)), np.zeros((3, 2, 2))
+
+    home.add_effects(one, known, SimpleNamespace(middle=np.zeros(1)), shift, slopes)
+
+    assert shift[:, 0] + slopes[:, 0, 1] * mean[:, 1] == pytest.approx(0.1 * np.clip(mean[:, 1], -0.47, 0.47))
+    assert np.isnan(shift[:, 1]).all()
