@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,6 +158,21 @@ def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Val
     KeyError
         If one of its modes is no mode of the plate at the estimate.
     """
+    slopes, inputs, offset = _linear(board, station, values)
+    found = SolvedStation.of(station, board, values)
+    solved, n = found.bare_and_added, board.symmetry.n
+    middle = solved[0] + offset - slopes[:, n:] @ inputs
+    others = []
+    for one in drawn:
+        try:
+            others.append(_linear(board, station, one)[0])
+        except (KeyError, BayesplateError):
+            continue
+    return BareLaw(station, solved, middle, np.stack(others or [slopes]), found.off_place)
+
+
+def _linear(board: Board, station: Station, values: Values) -> tuple[Floats, Floats, Floats]:
+    """Slopes of ln f by constants and inputs, the inputs, and how far the board is off its plate: at some values."""
     parameters = Parameters(board)
     n = parameters.n_constants
     centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
@@ -171,16 +186,6 @@ def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Val
 
     start = centre[parameters.fitted_columns]
     slopes = sensitivities(Predictor(at, [model], "linear"), start)
-    found = SolvedStation.of(station, board, values)
-    solved = found.bare_and_added
-    there = solved[0] + model.discrepancies(at(start[None, :]))[0]
     of_inputs, inputs = under_prior_scales(board, values, slopes[:, n:], start[n:])
     every = np.concatenate([slopes[:, :n], of_inputs], axis=1)
-    law = BareLaw(station, solved, there - of_inputs @ inputs, every[None], found.off_place)
-    others = []
-    for one in drawn:
-        try:
-            others.append(bare_law(board, station, one).slopes)
-        except (KeyError, BayesplateError):
-            continue
-    return replace(law, slopes=np.concatenate(others)) if others else law
+    return every, inputs, model.discrepancies(at(start[None, :]))[0]

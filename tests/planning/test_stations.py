@@ -12,11 +12,12 @@ from generator.plate import Plate
 from made_boards import setup_of
 
 from bayesplate.cards import load_prior
-from bayesplate.planning.beliefs import KnownBoard, prior_beliefs
+from bayesplate.planning.beliefs import KnownBoard
 from bayesplate.planning.bench import bench_of
 from bayesplate.planning.laws import PLACED, SolvedStation, bare_law, known_mass
 from bayesplate.planning.modes_read import station_readings
 from bayesplate.planning.stations import new_stations, old_stations
+from bayesplate.planning.unmeasured import prior_beliefs
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies
