@@ -1,12 +1,8 @@
-"""What is believed of a board now: every surviving explanation as normal terms of constants, inputs and sizes.
+"""What is believed now: of one board or of several, as normal terms of constants, inputs and what boards share.
 
-Around a cell of an effect's table and at one level of noise everything is linear and normal,
-
-    y = shift + X x + Z z + S t + noise,
-
-with x the logarithms of the free rigidities beyond what the cell has moved them by, z the standard coordinates of the
-uncertain inputs, and t the place within the cell. Given the readings at hand u = (x, z, t) is normal, so that an
-explanation is a mixture of normal terms, each with the weight that its cell and its level have now.
+Every reading, taken or not, is linear in the columns of u: the logarithms of each board's free rigidities, the standard
+coordinates of its uncertain inputs, of the numbers that boards share, and of the sizes of an effect within a cell of
+its table. Given the readings at hand u is normal; where effects or noise are in doubt, a mixture of such terms.
 """
 
 from __future__ import annotations
@@ -17,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.verdict import Answer, answer_words
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.terms import Terms, normalised
-from bayesplate.plate.board import Board
+from bayesplate.cards import PriorCard
+from bayesplate.planning.laws import BareLaw, bare_law
+from bayesplate.planning.stations import new_stations, old_stations
+from bayesplate.plate.board import Board, Values
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.parameters import Parameters
+from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -34,8 +32,51 @@ _STEP = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
+class FormTerms:
+    """Terms of an explanation in which its effects have the same forms.
+
+    Attributes
+    ----------
+    rows : (n,) array of int
+        Which terms.
+    board : Board
+        With the forms declared.
+    effects : tuple of str
+        One per parameter.
+    parameters : tuple of Parameter
+        The sizes that are uncertain.
+    columns : (n_parameters,) array of int
+        Of u: their standard coordinates.
+    """
+
+    rows: Rows
+    board: Board
+    effects: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    columns: Rows
+
+
+@dataclass(frozen=True, eq=False)
+class AtHand:
+    """What an explanation expects of the readings at hand, of all setups in turn: the peaks stay, whatever their names.
+
+    Attributes
+    ----------
+    shift : (n_terms, n_readings) array
+        ln f (Hz) where u is zero; not a number of a reading that is taken for no mode.
+    slopes : (n_terms, n_readings, n_u) array
+    taken : (n_readings,) array of int
+        The reading by whose label each of them goes then; -1 for none.
+    """
+
+    shift: Floats
+    slopes: Floats
+    taken: Rows
+
+
+@dataclass(frozen=True, eq=False)
 class Explanation:
-    """One thing that may be the case, as equally probable normal terms of u = (x, z, t).
+    """One thing that may be the case, as equally probable normal terms of u.
 
     Attributes
     ----------
@@ -47,15 +88,15 @@ class Explanation:
     mean : (n_terms, n_u) array
     covariance : (n_terms, n_u, n_u) array
     noise : (n_terms, n_setups) array
-        Relative.
-    log_moduli : (n_terms, 3) array
-        ln of E_x, E_y, G_xy (Pa) where u is zero.
-    to_moduli : (n_terms, 3, n_u) array
+        Relative, of the setups of all boards in turn.
+    middle : (n_terms, n_wanted) array
+        Where u is zero: standard coordinates of what boards share, then ln of E_x, E_y, G_xy (Pa), board after board.
+    wanted : (n_terms, n_wanted, n_u) array
         Their slopes.
-    cells : (n_terms,) array of int
-        Of the table of its hypothesis.
-    hypothesis : int
-        Its index; 0 where nothing is lacking.
+    forms : tuple of FormTerms
+        Of its effects.
+    again : AtHand, optional
+        What is expected of the readings at hand; by default what the laws of the stations say.
     """
 
     members: tuple[str, ...]
@@ -64,10 +105,10 @@ class Explanation:
     mean: Floats
     covariance: Floats
     noise: Floats
-    log_moduli: Floats
-    to_moduli: Floats
-    cells: Rows
-    hypothesis: int = 0
+    middle: Floats
+    wanted: Floats
+    forms: tuple[FormTerms, ...] = ()
+    again: AtHand | None = None
 
     @property
     def n_terms(self) -> int:
@@ -76,26 +117,67 @@ class Explanation:
 
     @property
     def expected(self) -> Floats:
-        """Mean of ln E_x, E_y, G_xy in each term: (n_terms, 3) array."""
-        return np.asarray(self.log_moduli + np.einsum("tmu,tu->tm", self.to_moduli, self.mean))
+        """Mean of what is wanted in each term: (n_terms, n_wanted) array."""
+        return np.asarray(self.middle + np.einsum("twu,tu->tw", self.wanted, self.mean))
 
 
 @dataclass(frozen=True, eq=False)
-class Beliefs:
-    """What is believed of a board now.
+class KnownBoard:
+    """A board of a belief.
 
     Attributes
     ----------
     board : Board
-    explanations : tuple of Explanation
-        The most probable first.
-    n_inputs : int
-        Uncertain inputs: the columns of u after the constants.
+    values : dict of float
+        Rigidities and inputs about which its modes are computed, SI.
+    laws : tuple of BareLaw
+        Of the stations that are looked at.
+    columns : (n_fitted, n_u) array
+        What the columns of u do to its constants and inputs.
+    first_setup : int
+        Where its setups begin among those of all boards.
+    pull : (n_shared, n_shared) array, optional
+        Precision of what it says of the shared parameters, its own integrated out.
     """
 
     board: Board
+    values: Values
+    laws: tuple[BareLaw, ...]
+    columns: Floats
+    first_setup: int = 0
+    pull: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Beliefs:
+    """What is believed now of one board, or of several together.
+
+    Attributes
+    ----------
+    boards : tuple of KnownBoard
+    explanations : tuple of Explanation
+        The most probable first.
+    shared : tuple of str
+        Names of what the boards share.
+    basis : str
+        What is believed: "readings", "prior" (readings, if there are any, were left aside) or "campaign".
+    notes : tuple of str
+        What a plan that rests on it does not know.
+    wrong : str, optional
+        Where nothing explains the readings, what is to be done about a wrong one before anything else.
+    """
+
+    boards: tuple[KnownBoard, ...]
     explanations: tuple[Explanation, ...]
-    n_inputs: int
+    shared: tuple[str, ...] = ()
+    basis: str = "readings"
+    notes: tuple[str, ...] = ()
+    wrong: str | None = None
+
+    @property
+    def is_prior(self) -> bool:
+        """Whether readings, if there are any, were left aside."""
+        return self.basis == "prior"
 
     @property
     def probabilities(self) -> Floats:
@@ -105,106 +187,57 @@ class Beliefs:
     @property
     def entropy(self) -> float:
         """Of the explanations, nats."""
-        return float(-np.sum([p * np.log(p) for p in self.probabilities if p > 0.0]))
+        return float(entropy(self.probabilities[:, None])[0])
+
+    @property
+    def free(self) -> list[int]:
+        """Which of the wanted numbers the information is counted of: the shared ones, or else the free moduli.
+
+        The moduli of an isotropic board follow from its first one.
+        """
+        n, many = len(MODULI), enumerate(self.boards)
+        return list(range(len(self.shared))) or [n * i + j for i, one in many for j in range(one.board.symmetry.n)]
 
 
-def believed(found: Found, survivors: Sequence[Answer], rng: np.random.Generator) -> Beliefs:
-    """What a search leaves to be believed of a board.
+def entropy(probabilities: Floats) -> Floats:
+    """Of explanations, nats: (n_draws,) array from (n_explanations, n_draws)."""
+    from scipy.special import entr
 
-    Parameters
-    ----------
-    found : Found
-    survivors : sequence of Answer
-        That of no effect with index 0.
-    rng : numpy.random.Generator
-        Picks the terms that stand for all.
-    """
-    baseline = found.ground.baseline
-    total = sum(one.support for one in survivors)
-    explanations = tuple(_explained(found, one, one.support / total, rng) for one in survivors)
-    return Beliefs(baseline.board, explanations, baseline.input_slopes.shape[1])
+    return np.asarray(entr(probabilities).sum(axis=0))
 
 
-def _explained(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Explanation:
-    """An answer of the search as terms: cells and levels of noise drawn by what they weigh now."""
-    hypothesis = found.ground.hypotheses[answer.index]
-    terms = hypothesis.terms(found.ground.whole)
-    seen = hypothesis.seen(found.ground.baseline, found.residual[None, :])
-    shares = normalised(terms.log_densities(seen)[:, 0])
-    picked = picked_by(shares, N_TERMS, rng)
-    levels, cells = np.divmod(picked, terms.table.n_cells)
-    noise = terms.noise.sd[levels]
-    mean, covariance = _conditioned(terms, seen[0], cells, noise)
-    log_moduli, gradient = _moduli(found, mean.shape[1])
-    by_constants = gradient[:, : found.ground.baseline.log_rigidities.size]
-    moved, slopes = terms.table.moved[cells], terms.table.moved_slopes[cells]
-    to_moduli = np.tile(gradient, (len(cells), 1, 1))
-    to_moduli[:, :, mean.shape[1] - slopes.shape[2] :] = by_constants @ slopes
-    words = answer_words(found, answer) if answer.members else NOTHING_LACKS
-    return Explanation(
-        members=hypothesis.members,
-        words=words,
-        probability=probability,
-        mean=mean,
-        covariance=covariance,
-        noise=noise,
-        log_moduli=log_moduli + moved @ by_constants.T,
-        to_moduli=to_moduli,
-        cells=cells,
-        hypothesis=answer.index,
-    )
+def laws_of(
+    board: Board, values: Values, prior: PriorCard | None, drawn: Sequence[Values] = (), *, is_elsewhere: bool = True
+) -> tuple[BareLaw, ...]:
+    """The modes of a board as it was held and, if asked for, as it never was; see `bare_law`."""
+    ways = [*old_stations(board, values), *(new_stations(board, values, prior) if is_elsewhere else ())]
+    return tuple(bare_law(board, one, values, drawn) for one in ways)
 
 
-def picked_by(shares: Floats, n: int, rng: np.random.Generator) -> Rows:
-    """Indices drawn by their shares with the least scatter (systematic): (n,) array."""
-    places = (np.arange(n) + rng.random()) / n
-    return np.asarray(np.minimum(np.searchsorted(np.cumsum(shares), places), shares.size - 1), dtype=np.intp)
+def levels(prior: Quantity, n: int, rng: np.random.Generator) -> Floats:
+    """Values of a prior at equally probable levels, in random order: (n,) array."""
+    from scipy.special import ndtri
+
+    return np.asarray(prior.value(rng.permutation(ndtri((np.arange(n) + 0.5) / n))))
 
 
-def _conditioned(terms: Terms, seen: Floats, cells: Rows, noise: Floats) -> tuple[Floats, Floats]:
-    """Mean and covariance of u in some terms, given the residuals of the readings that are used."""
-    base, used, table = terms.fold.baseline, terms.fold.used, terms.table
-    sides = np.concatenate([base.slopes, base.input_slopes], axis=1)[used]
-    tangents = table.slopes[cells][:, used]
-    design = np.concatenate([np.tile(sides, (len(cells), 1, 1)), tangents], axis=2)
-    variance = noise[:, base.setup_index[used]] ** 2 + base.own_variance[used]
-    weighted = design / variance[:, :, None]
-    precision = np.swapaxes(weighted, 1, 2) @ design
-    n = base.log_rigidities.size
-    prior = np.r_[np.zeros(n), np.ones(design.shape[2] - n)]
-    covariance = np.linalg.inv(precision + np.diag(prior))
-    told = np.einsum("tnu,tn->tu", weighted, seen[used] - table.shift[cells][:, used])
-    return np.einsum("tuv,tv->tu", covariance, told), covariance
-
-
-def _moduli(found: Found, n_u: int) -> tuple[Floats, Floats]:
-    """ln of the moduli at the baseline with inputs at the middle of their priors, and their slopes by x and z."""
-    baseline = found.ground.baseline
-    return moduli_at(baseline.board, baseline.log_rigidities, n_u)
-
-
-def moduli_at(board: Board, log_rigidities: Floats, n_u: int) -> tuple[Floats, Floats]:
-    """ln E_x, E_y, G_xy (Pa), (3,) array, and their slopes, (3, n_u) array, zero beyond the inputs.
+def log_moduli(board: Board, log_rigidities: Floats) -> tuple[Floats, Floats]:
+    """ln E_x, E_y, G_xy (Pa), the inputs at the middle of their priors: (3,) array, and slopes, (3, n_fitted) array.
 
     Parameters
     ----------
     board : Board
     log_rigidities : (n_constants,) array
-        Where the slopes are taken, the inputs at the middle of their priors.
-    n_u : int
-        Columns of u, at least the constants and the inputs.
     """
     parameters = Parameters(board)
     columns = parameters.fitted_columns
     theta = np.zeros((1 + 2 * columns.size, parameters.n_dim))
     theta[:, : parameters.n_constants] = log_rigidities
-    for i, column in enumerate(columns):
-        theta[1 + 2 * i, column] += _STEP
-        theta[2 + 2 * i, column] -= _STEP
+    theta[1 : 1 + columns.size, columns] += _STEP * np.eye(columns.size)
+    theta[1 + columns.size :, columns] -= _STEP * np.eye(columns.size)
     values = parameters.values(theta)
     D_x, D_y, D_s = (values[name] for name in RIGIDITIES)
     found = moduli(D_x, D_y, D_s, values["thickness"], values["poisson_xy"])
-    logs = np.stack([np.log(np.broadcast_to(one, len(theta))) for one in found], axis=1)
-    slopes = np.zeros((len(MODULI), n_u))
-    slopes[:, : columns.size] = ((logs[1::2] - logs[2::2]) / (2.0 * _STEP)).T
-    return logs[0], slopes
+    logs = np.stack([np.log(np.broadcast_to(one, len(theta))) for one in found])
+    middle, above, below = np.split(logs, [1, 1 + columns.size], axis=1)
+    return middle[:, 0], (above - below) / (2.0 * _STEP)

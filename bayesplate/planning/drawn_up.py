@@ -1,127 +1,67 @@
-"""A board's plan, drawn up: from a search, or from the prior where nothing was measured yet."""
+"""A plan, drawn up: proposals, sequences, the first line, and what to do at the bench."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict
 
-import numpy as np
-
+from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
-from bayesplate.diagnosis.decision.readings import wrong_reading
-from bayesplate.diagnosis.decision.verdict import Answer, answers
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.planning.before import prior_beliefs
-from bayesplate.planning.beliefs import Beliefs, believed
-from bayesplate.planning.gains import Gain
-from bayesplate.planning.proposals import Costs, Proposal, prior_proposals, proposals, sequences
-from bayesplate.planning.survivors import survivors
+from bayesplate.planning.beliefs import Beliefs
+from bayesplate.planning.bench import Bench, benches
+from bayesplate.planning.plan import FORMAT, ExplanationEntry, Plan
+from bayesplate.planning.proposals import Planner, Proposal
 from bayesplate.planning.words import first_line
-from bayesplate.plate.board import Board, Values
-
-_LINE = 17
-UNEXPLAINED = (
-    "no effect that is tried explains the readings, so that nothing is said of telling effects apart: what is planned "
-    "here takes the model for right, which it is not"
-)
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnUp:
-    """What could be measured next on a board, the best first.
-
-    Attributes
-    ----------
-    beliefs : Beliefs
-    values : dict of float
-        Rigidities and inputs about which the modes are computed.
-    proposals : tuple of Proposal
-    together : tuple of (tuple of Proposal, Gain)
-        The best two, and the best three; empty if they were not asked for.
-    first : str
-        The first line; empty where nothing would help.
-    notes : tuple of str
-    is_from_prior : bool
-        Whether the readings, if there are any, were left aside.
-    """
-
-    beliefs: Beliefs
-    values: Values
-    proposals: tuple[Proposal, ...]
-    together: tuple[tuple[tuple[Proposal, ...], Gain], ...]
-    first: str
-    notes: tuple[str, ...] = ()
-    is_from_prior: bool = False
 
 
 def drawn_up(
-    found: Found,
-    prior: PriorCard,
-    seed: int,
-    *,
-    goal: str | None = None,
-    costs: Costs | None = None,
-    among: Sequence[Answer] | None = None,
-    with_sequences: bool = True,
-) -> DrawnUp:
-    """The plan of a board that was searched.
+    planner: Planner,
+    name: str,
+    title: str,
+    card_sha256: str,
+    priors: Sequence[PriorCard] = (),
+    shared: Sequence[Shared] = (),
+) -> tuple[Plan, tuple[Bench, ...]]:
+    """The plan as plan.json has it, and the sheets for the bench.
 
     Parameters
     ----------
-    found : Found
-    prior : PriorCard
-    seed : int
-        Everything random follows from it.
-    goal : str, optional
-        See `bayesplate.planning.proposals.score`.
-    costs : Costs, optional
-    among : sequence of Answer, optional
-        Explanations that are to be told apart; by default those that survive.
-    with_sequences : bool
-        Whether proposals are joined to the best two and three.
-
-    Returns
-    -------
-    DrawnUp
+    planner : Planner
+    name, title, card_sha256 : str
+        Of the card.
+    priors, shared
+        See `bayesplate.planning.proposals.Planner.ranked`.
     """
-    rng = np.random.default_rng([seed, _LINE])
-    failed = among is None and is_unexplained(found)
-    left = (Answer((), 0, found.none),) if failed else survivors(found) if among is None else among
-    beliefs = believed(found, left, rng)
-    values = found.ground.baseline.values
-    listed = proposals(beliefs, values, costs or Costs(), goal, rng, found, prior)
-    joined = sequences(beliefs, listed, goal, rng) if with_sequences else ()
-    first = wrong_reading(found) if failed else first_of(listed, beliefs, goal)
-    return DrawnUp(beliefs, values, listed, joined, first, (UNEXPLAINED,) if failed else ())
+    beliefs, listed = planner.beliefs, planner.ranked(priors, shared)
+    together = planner.sequences(listed)
+    drawn = benches(beliefs, together[-1][0] if together else listed[:1])
+    made = Plan(
+        format=FORMAT,
+        name=name,
+        title=title,
+        seed=planner.seed,
+        card_sha256=card_sha256,
+        basis=beliefs.basis,
+        goal=planner.goal,
+        costs=asdict(planner.costs),
+        explanations=_entries(beliefs),
+        entropy=beliefs.entropy,
+        first=first_of(planner, listed),
+        proposals=tuple(one.entry for one in listed),
+        sequences=tuple(entry for _, entry in together),
+        bench=tuple(one.entry for one in drawn),
+        notes=beliefs.notes,
+    )
+    return made, drawn
 
 
-def first_of(listed: Sequence[Proposal], beliefs: Beliefs, goal: str | None) -> str:
-    """The first line of a plan: the best proposal that would help, in words; empty where none would."""
-    lines = (first_line(one.sentence, one.gain, beliefs, goal) for one in listed)
-    return next((line for line in lines if line), "")
+def first_of(planner: Planner, listed: Sequence[Proposal]) -> str:
+    """The first line of a plan: what to do next; empty where nothing would help."""
+    beliefs = planner.beliefs
+    if beliefs.wrong is not None:
+        return beliefs.wrong
+    return first_line([one.entry for one in listed], _entries(beliefs), beliefs.entropy, planner.goal)
 
 
-def is_unexplained(found: Found) -> bool:
-    """Whether the readings fail the gate without an effect and with the best that was found."""
-    if not found.ground.n_directions or found.p_value(0) >= PASSES:
-        return False
-    ranked = answers(found)
-    return not ranked or found.p_value(ranked[0].index) < PASSES
-
-
-def begun(board: Board, prior: PriorCard, seed: int, *, goal: str | None = None, costs: Costs | None = None) -> DrawnUp:
-    """The plan of a board of which nothing is known but its prior.
-
-    Parameters
-    ----------
-    board : Board
-    prior : PriorCard
-    seed, goal, costs
-        As of `drawn_up`.
-    """
-    rng = np.random.default_rng([seed, _LINE])
-    beliefs, values = prior_beliefs(board, prior, rng)
-    listed = prior_proposals(beliefs, prior, values, costs or Costs(), goal, rng)
-    joined = sequences(beliefs, listed, goal, rng)
-    return DrawnUp(beliefs, values, listed, joined, first_of(listed, beliefs, goal), is_from_prior=True)
+def _entries(beliefs: Beliefs) -> tuple[ExplanationEntry, ...]:
+    return tuple(ExplanationEntry(one.members, one.words, one.probability) for one in beliefs.explanations)

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
-from bayesplate.planning.beliefs import Beliefs, Explanation
+from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
+from bayesplate.planning.plan import Gain
 from bayesplate.plate.material import MODULI
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,8 @@ REFERENCES = (
     "K. J. Ryan: Estimating expected information gains for experimental designs with application to the random "
     "fatigue-limit model. J. Comput. Graph. Stat. 12, 585-603 (2003), doi:10.1198/1061860032012. [nested sampling]",
 )
+CONSTANTS, EXPLANATIONS = "constants", "explanations"
+GOALS = (*MODULI, CONSTANTS, EXPLANATIONS)
 N_DRAWS = 384
 _FEWEST_DRAWS = 32
 """Of one explanation, however improbable."""
@@ -55,61 +58,27 @@ class Readings:
 
     def some(self, rows: Sequence[int]) -> Readings:
         """Some of them, by their indices."""
-        kept = list(rows)
-        return Readings(
-            tuple(one[:, kept] for one in self.shift),
-            tuple(one[:, kept] for one in self.slopes),
-            tuple(one[:, kept] for one in self.variance),
-        )
+        parts = (self.shift, self.slopes, self.variance)
+        return Readings(*(tuple(one[:, list(rows)] for one in part) for part in parts))
 
 
 def together(every: Sequence[Readings]) -> Readings:
     """Several sets of readings as one."""
-    return Readings(
-        tuple(np.concatenate(parts, axis=1) for parts in zip(*(one.shift for one in every), strict=True)),
-        tuple(np.concatenate(parts, axis=1) for parts in zip(*(one.slopes for one in every), strict=True)),
-        tuple(np.concatenate(parts, axis=1) for parts in zip(*(one.variance for one in every), strict=True)),
-    )
+
+    def joined(parts: Sequence[tuple[Floats, ...]]) -> tuple[Floats, ...]:
+        return tuple(np.concatenate(of_one, axis=1) for of_one in zip(*parts, strict=True))
+
+    return Readings(*(joined([getattr(one, name) for one in every]) for name in ("shift", "slopes", "variance")))
 
 
-@dataclass(frozen=True)
-class Gain:
-    """What readings are expected to give.
-
-    Attributes
-    ----------
-    E_x, E_y, G_xy : float
-        Expected standard deviation of ln of the modulus after, over that before.
-    explanations : float
-        Expected drop of the entropy of the surviving explanations, nats.
-    explanations_error : float
-        Its standard error.
-    constants_error : float
-        Standard error of the mean shrinkage of the three intervals, ln.
-    information : float
-        Half the log determinant of what the moduli gain where the explanation is known, nats; of an isotropic board
-        of what E gains.
-    """
-
-    E_x: float
-    E_y: float
-    G_xy: float
-    explanations: float
-    explanations_error: float
-    constants_error: float
-    information: float
-
-    def shrinkage(self, name: str) -> float:
-        """ln of the standard deviation of a modulus before over that after."""
-        return float(-np.log(getattr(self, name)))
-
-    @property
-    def constants(self) -> float:
-        """Mean over the three moduli of that."""
-        return float(np.mean([self.shrinkage(name) for name in MODULI]))
-
-
-def expected_gain(beliefs: Beliefs, readings: Readings, rng: np.random.Generator, n_draws: int = N_DRAWS) -> Gain:
+def expected_gain(
+    beliefs: Beliefs,
+    readings: Readings,
+    rng: np.random.Generator,
+    goal: str | None = None,
+    minutes: float = 1.0,
+    n_draws: int = N_DRAWS,
+) -> Gain:
     """What some readings are expected to give.
 
     Parameters
@@ -117,6 +86,11 @@ def expected_gain(beliefs: Beliefs, readings: Readings, rng: np.random.Generator
     beliefs : Beliefs
     readings : Readings
     rng : numpy.random.Generator
+    goal : str, optional
+        One of `GOALS`: what the score counts. By default the drop of the explanations' entropy and the mean shrinkage,
+        both logarithms, of what the boards share, or of the constants where they share nothing.
+    minutes : float
+        That the readings take.
     n_draws : int
         Of what may be read.
 
@@ -124,36 +98,56 @@ def expected_gain(beliefs: Beliefs, readings: Readings, rng: np.random.Generator
     -------
     Gain
     """
-    updates = [_Update.of(one, readings, k, beliefs.board.symmetry.n) for k, one in enumerate(beliefs.explanations)]
+    updates = [_Update.of(one, readings, k, beliefs.free) for k, one in enumerate(beliefs.explanations)]
     weights = beliefs.probabilities
-    within = sum(p * one.after_variance.mean(axis=0) for p, one in zip(weights, updates, strict=True))
-    of_terms = sum(p**2 * _variance_of_mean(one.after_variance) for p, one in zip(weights, updates, strict=True))
-    before = _spread(beliefs)
     doubt, between = _simulated(beliefs, updates, rng, n_draws)
-    after = within + between.mean
-    ratios = np.sqrt(np.minimum(after / before, 1.0))
-    error = float(np.mean(0.5 * np.sqrt(of_terms + between.error**2) / after))
-    information = sum(p * float(one.information.mean()) for p, one in zip(weights, updates, strict=True))
-    E_x, E_y, G_xy = (float(one) for one in ratios)
-    dropped = beliefs.entropy - float(doubt.mean[0])
-    return Gain(E_x, E_y, G_xy, dropped, float(doubt.error[0]), error, information)
-
-
-def _variance_of_mean(values: Floats) -> Floats:
-    """Squared standard error of the mean over the first axis; zero of a single one."""
-    return np.asarray(values.var(axis=0, ddof=1) / len(values) if len(values) > 1 else np.zeros(values.shape[1:]))
-
-
-def _spread(beliefs: Beliefs) -> Floats:
-    """Variance of ln E_x, E_y, G_xy over all explanations now: (3,) array."""
-    means = np.concatenate([one.expected for one in beliefs.explanations])
     shares = np.concatenate([np.full(one.n_terms, one.probability / one.n_terms) for one in beliefs.explanations])
-    own = [
-        one.probability * np.einsum("tmu,tuv,tmv->tm", one.to_moduli, one.covariance, one.to_moduli).mean(axis=0)
-        for one in beliefs.explanations
-    ]
-    middle = shares @ means
-    return np.asarray(np.sum(own, axis=0) + shares @ (means - middle) ** 2)
+    now = _between(shares[:, None], np.concatenate([one.wanted for one in updates])[:, None])[0]
+    before = now + sum(p * one.before.mean(axis=0) for p, one in zip(weights, updates, strict=True))
+    within = _Mean.of_strata([one.after for one in updates], weights)
+    after = within.mean + between.mean
+    log_left = 0.5 * np.log(np.minimum(after / before, 1.0))
+    of_shared, of_moduli = np.split(log_left, [len(beliefs.shared)])
+    of_moduli = of_moduli.reshape(-1, len(MODULI)).mean(axis=0)
+    dropped = beliefs.entropy - float(doubt.mean[0])
+    is_in_doubt = len(beliefs.explanations) > 1
+    worth = {name: -float(one) for name, one in zip(MODULI, of_moduli, strict=True)}
+    worth |= {CONSTANTS: -float(of_moduli.mean()), EXPLANATIONS: dropped}
+    narrowed = -float(of_shared.mean()) if beliefs.shared else worth[CONSTANTS]
+    score = max(dropped, 0.0) + narrowed if goal is None else worth[goal]
+    return Gain(
+        **{name: float(np.exp(one)) for name, one in zip(MODULI, of_moduli, strict=True)},
+        constants=worth[CONSTANTS],
+        constants_error=float((0.5 * np.hypot(within.error, between.error) / after)[len(of_shared) :].mean()),
+        explanations=dropped if is_in_doubt else None,
+        explanations_error=float(doubt.error[0]) if is_in_doubt else None,
+        information=sum(p * float(one.information.mean()) for p, one in zip(weights, updates, strict=True)),
+        shared={name: float(np.exp(one)) for name, one in zip(beliefs.shared, of_shared, strict=True)},
+        score=score,
+        score_per_minute=score / minutes,
+    )
+
+
+def probabilities_after(beliefs: Beliefs, readings: Readings, read: Floats) -> Floats:
+    """Probability of each explanation after some readings: (n_explanations, n_draws) array from (n_draws, n)."""
+    updates = [_Update.of(one, readings, k, beliefs.free) for k, one in enumerate(beliefs.explanations)]
+    return _of_each(_log_joint(beliefs, updates, read))
+
+
+@dataclass(frozen=True, eq=False)
+class _Mean:
+    """A mean over several strata and its standard error: (n,) arrays."""
+
+    mean: Floats
+    error: Floats
+
+    @classmethod
+    def of_strata(cls, values: Sequence[Floats], weights: Floats) -> _Mean:
+        """Of one (n_draws, n) array a stratum; a single draw has no error."""
+        mean = sum(p * one.mean(axis=0) for p, one in zip(weights, values, strict=True))
+        many = ((p, one) for p, one in zip(weights, values, strict=True) if len(one) > 1)
+        variance = sum(p**2 * one.var(axis=0, ddof=1) / len(one) for p, one in many)
+        return cls(np.asarray(mean), np.sqrt(np.broadcast_to(variance, np.shape(mean))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +162,10 @@ class _Update:
         L with their covariance L L', and its inverse.
     log_size : (n_terms,) array
         ln of the determinant of L.
-    pull : (n_terms, 3, n) array
-        Takes whitened misses to what ln of the moduli change by.
-    moduli : (n_terms, 3) array
-    after_variance : (n_terms, 3) array
+    pull : (n_terms, n_wanted, n) array
+        Takes whitened misses to what the wanted numbers change by.
+    wanted, before, after : (n_terms, n_wanted) array
+        Their means, and their variances before and after.
     information : (n_terms,) array
     """
 
@@ -180,28 +174,29 @@ class _Update:
     whitening: Floats
     log_size: Floats
     pull: Floats
-    moduli: Floats
-    after_variance: Floats
+    wanted: Floats
+    before: Floats
+    after: Floats
     information: Floats
 
     @classmethod
-    def of(cls, one: Explanation, readings: Readings, k: int, n_free: int) -> _Update:
+    def of(cls, one: Explanation, readings: Readings, k: int, free: Sequence[int]) -> _Update:
         slopes, variance = readings.slopes[k], readings.variance[k]
-        n = variance.shape[1]
         expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, one.mean)
         along = slopes @ one.covariance
-        covariance = along @ np.swapaxes(slopes, 1, 2)
-        covariance[:, np.arange(n), np.arange(n)] += variance
+        covariance = along @ np.swapaxes(slopes, 1, 2) + variance[:, :, None] * np.eye(readings.n)
         factor = np.asarray(np.linalg.cholesky(covariance))
         whitening = np.asarray(np.linalg.inv(factor))
-        pull: Floats = one.to_moduli @ np.swapaxes(along, 1, 2) @ np.swapaxes(whitening, 1, 2)
-        before = one.to_moduli @ one.covariance @ np.swapaxes(one.to_moduli, 1, 2)
+        pull: Floats = one.wanted @ np.swapaxes(along, 1, 2) @ np.swapaxes(whitening, 1, 2)
+        before = one.wanted @ one.covariance @ np.swapaxes(one.wanted, 1, 2)
         after = before - pull @ np.swapaxes(pull, 1, 2)
-        first = (..., slice(n_free), slice(n_free))  # of an isotropic board the other moduli follow from E_x
-        information = np.asarray(0.5 * (np.linalg.slogdet(before[first])[1] - np.linalg.slogdet(after[first])[1]))
-        log_size = np.asarray(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1))
-        variances = np.asarray(np.diagonal(after, axis1=1, axis2=2))
-        return cls(expected, factor, whitening, log_size, pull, one.expected, variances, information)
+        rows, columns = np.ix_(free, free)
+        information = np.asarray(
+            0.5 * (np.linalg.slogdet(before[:, rows, columns])[1] - np.linalg.slogdet(after[:, rows, columns])[1])
+        )
+        sizes, then, later = (np.diagonal(each, axis1=1, axis2=2) for each in (factor, before, after))
+        log_size = np.log(sizes).sum(axis=1)
+        return cls(expected, factor, whitening, log_size, pull, one.expected, then, later, information)
 
     def drawn(self, rng: np.random.Generator, n_draws: int) -> Floats:
         """What may be read if the explanation holds: (n_draws, n) array, from its terms in turn."""
@@ -214,37 +209,25 @@ class _Update:
         return np.asarray((read - self.expected[:, None, :]) @ np.swapaxes(self.whitening, 1, 2))
 
 
-@dataclass(frozen=True, eq=False)
-class _Mean:
-    """A mean over simulated readings and its standard error: (n,) arrays."""
-
-    mean: Floats
-    error: Floats
-
-    @classmethod
-    def of_strata(cls, values: Floats, strata: Sequence[NDArray[np.intp]], weights: Floats) -> _Mean:
-        """Of (n_draws, n) values, so many of them drawn under each explanation."""
-        means = [values[rows].mean(axis=0) for rows in strata]
-        variances = [_variance_of_mean(values[rows]) for rows in strata]
-        mean = np.sum([p * one for p, one in zip(weights, means, strict=True)], axis=0)
-        return cls(mean, np.sqrt(np.sum([p**2 * one for p, one in zip(weights, variances, strict=True)], axis=0)))
-
-
 def _simulated(
     beliefs: Beliefs, updates: Sequence[_Update], rng: np.random.Generator, n_draws: int
 ) -> tuple[_Mean, _Mean]:
-    """What is left after readings: the entropy of the explanations, nats, and the moduli's variance between terms."""
+    """What is left after readings: the entropy of the explanations, nats, and the variance between terms."""
     weights = beliefs.probabilities
     counts = [max(round(n_draws * p), _FEWEST_DRAWS) for p in weights]
     read = np.concatenate([one.drawn(rng, n) for one, n in zip(updates, counts, strict=True)])
     logs = _log_joint(beliefs, updates, read)
-    means = [one.moduli[:, None, :] + one.misses(read) @ np.swapaxes(one.pull, 1, 2) for one in updates]
-    shares, constants = normalised(np.concatenate(logs)), np.concatenate(means)
-    middle = np.einsum("tn,tnm->nm", shares, constants)
-    between = np.einsum("tn,tnm->nm", shares, constants**2) - middle**2
-    strata = np.split(np.arange(len(read)), np.cumsum(counts)[:-1])
-    left = entropy(_of_each(logs))[:, None]
-    return _Mean.of_strata(left, strata, weights), _Mean.of_strata(between, strata, weights)
+    means = [one.wanted[:, None, :] + one.misses(read) @ np.swapaxes(one.pull, 1, 2) for one in updates]
+    between = _between(normalised(np.concatenate(logs)), np.concatenate(means))
+    ends = np.cumsum(counts)[:-1]
+    doubt, apart = (np.split(each, ends) for each in (entropy(_of_each(logs))[:, None], between))
+    return _Mean.of_strata(doubt, weights), _Mean.of_strata(apart, weights)
+
+
+def _between(shares: Floats, means: Floats) -> Floats:
+    """Variance between terms: (n_draws, n) array from (n_terms, n_draws) and (n_terms, n_draws, n)."""
+    middle = np.einsum("td,tdn->dn", shares, means)
+    return np.asarray(np.einsum("td,tdn->dn", shares, (means - middle) ** 2))
 
 
 def _log_joint(beliefs: Beliefs, updates: Sequence[_Update], read: Floats) -> list[Floats]:
@@ -258,16 +241,3 @@ def _log_joint(beliefs: Beliefs, updates: Sequence[_Update], read: Floats) -> li
 def _of_each(logs: Sequence[Floats]) -> Floats:
     """Probability of each explanation: (n_explanations, n_draws) array."""
     return normalised(np.stack([log_sum(log) for log in logs]))
-
-
-def entropy(probabilities: Floats) -> Floats:
-    """Of explanations, nats: (n_draws,) array from (n_explanations, n_draws)."""
-    from scipy.special import entr
-
-    return np.asarray(entr(probabilities).sum(axis=0))
-
-
-def probabilities_after(beliefs: Beliefs, readings: Readings, read: Floats) -> Floats:
-    """Probability of each explanation after some readings: (n_explanations, n_draws) array from (n_draws, n)."""
-    updates = [_Update.of(one, readings, k, beliefs.board.symmetry.n) for k, one in enumerate(beliefs.explanations)]
-    return _of_each(_log_joint(beliefs, updates, read))

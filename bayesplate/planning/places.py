@@ -15,8 +15,8 @@ Place = tuple[float, float]
 REFERENCES = (
     "D. J. Ewins: Modal Testing: Theory, Practice and Application. 2nd ed., Research Studies Press (2000). "
     "[the residue at the driving point, by which places are chosen]",
-    "D. C. Kammer: Sensor placement for on-orbit modal identification and correlation of large space structures. "
-    "J. Guid. Control Dyn. 14, 251-259 (1991), doi:10.2514/3.20635. [effective independence]",
+    "K. Manohar, B. W. Brunton, J. N. Kutz, S. L. Brunton: Data-driven sparse sensor placement for reconstruction. "
+    "IEEE Control Syst. Mag. 38, 63-86 (2018), doi:10.1109/MCS.2018.2810460. [places by pivoted QR]",
 )
 _APART = 0.25
 """Least distance between sensor and hammer, as a fraction of a side."""
@@ -34,7 +34,7 @@ class Placing:
     seen : tuple of float
         Residue of each mode between the two, over the largest that its figure could give: 0 on a nodal line.
     taps : tuple of (float, float)
-        Where to tap to tell the figures apart, as many as there are modes: the set of effective independence.
+        Where to tap to tell the figures apart, as many as there are modes: the first pivots of a QR decomposition.
     """
 
     sensor: Place
@@ -67,6 +67,8 @@ def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placin
     -------
     Placing
     """
+    from scipy.linalg import qr
+
     inner = (grid >= _MARGIN) & (grid <= 1.0 - _MARGIN)
     at = grid[inner]
     kept = shapes[:, inner][:, :, inner]
@@ -82,29 +84,6 @@ def placing(shapes: Floats, grid: Floats, sensor: Place | None = None) -> Placin
     can_be_seen = np.abs(flat[:, first]) >= NODAL_LINE
     weakest = residues[can_be_seen if can_be_seen.any() else slice(None)].min(axis=0)
     second = int(np.argmax(np.where(apart, weakest, -1.0)))
-    taps = tuple(places[i] for i in effective_independence(flat.T, len(shapes)))
+    taps = tuple(places[i] for i in qr(flat, mode="economic", pivoting=True)[2][: len(shapes)])
     seen = tuple(float(one) for one in residues[:, second])
     return Placing(places[first], places[second], seen, taps)
-
-
-def effective_independence(shapes: Floats, n: int) -> tuple[int, ...]:
-    """The places that keep figures most independent: one that adds least is taken out after the other.
-
-    Parameters
-    ----------
-    shapes : (n_places, n_modes) array
-    n : int
-        Places that are left, at least as many as modes.
-
-    Returns
-    -------
-    tuple of int
-        Their indices.
-    """
-    left = np.arange(len(shapes))
-    while len(left) > n:
-        rows = shapes[left]
-        leverages = np.einsum("ij,ij->i", rows @ np.linalg.pinv(rows.T @ rows), rows)
-        few = max(1, (len(left) - n) // 4) if len(left) > 8 * n else 1
-        left = np.delete(left, np.argsort(leverages)[:few])
-    return tuple(int(i) for i in left)

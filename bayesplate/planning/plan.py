@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -27,13 +28,14 @@ class ExplanationEntry:
 
 
 @dataclass(frozen=True)
-class GainEntry:
-    """What is expected of a proposal.
+class Gain:
+    """What readings are expected to give.
 
     Attributes
     ----------
     E_x, E_y, G_xy : float
-        Expected standard deviation of the constant's logarithm after, over that before.
+        Expected standard deviation of the constant's logarithm after, over that before; of several boards the geometric
+        mean.
     constants : float
         Mean of the logarithms of before over after, nats.
     constants_error : float
@@ -43,7 +45,8 @@ class GainEntry:
     explanations_error : float or None
         Its standard error.
     information : float
-        Half the log determinant of what the three constants gain, the explanation being known, nats.
+        Half the log determinant of what the constants gain, the explanation being known, nats; of an isotropic board
+        of what E gains; where boards share something, of what that gains.
     shared : dict of float
         Of a campaign: the same as E_x for each parameter that its boards share.
     score : float
@@ -63,6 +66,10 @@ class GainEntry:
     score: float
     score_per_minute: float
 
+    def shrinkage(self, name: str) -> float:
+        """ln of the standard deviation of a modulus before over that after."""
+        return -math.log(getattr(self, name))
+
 
 @dataclass(frozen=True)
 class ProposalEntry:
@@ -76,10 +83,11 @@ class ProposalEntry:
     setup : str
         Empty where no frequency is read.
     sentence : str
+        What to do, as an order.
     cost_minutes : float
     modes : tuple of str
         Labels of the modes to read.
-    gain : GainEntry
+    gain : Gain
     """
 
     what: str
@@ -88,7 +96,7 @@ class ProposalEntry:
     sentence: str
     cost_minutes: float
     modes: tuple[str, ...]
-    gain: GainEntry
+    gain: Gain
 
 
 @dataclass(frozen=True)
@@ -98,15 +106,15 @@ class SequenceEntry:
     Attributes
     ----------
     steps : tuple of str
-        Their sentences.
+        Their sentences, in the order in which they can be done.
     cost_minutes : float
-    gain : GainEntry
+    gain : Gain
         Of all together.
     """
 
     steps: tuple[str, ...]
     cost_minutes: float
-    gain: GainEntry
+    gain: Gain
 
 
 @dataclass(frozen=True)

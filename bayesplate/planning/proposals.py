@@ -1,34 +1,33 @@
-"""Everything that could be measured next on a board, each with what it is expected to give and what it costs."""
+"""Everything that could be measured next, each with what it is expected to give and what it costs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 
-import numpy as np
-
+from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.planning.before import prior_laws, prior_readings
-from bayesplate.planning.beliefs import Beliefs
-from bayesplate.planning.gains import Gain, Readings, expected_gain, together
-from bayesplate.planning.inputs_read import input_readings, measurements
-from bayesplate.planning.looks import LOOKS, look_readings
-from bayesplate.planning.modes_read import StationReadings, effect_shifts, station_readings
-from bayesplate.planning.shifts import nodes_of
-from bayesplate.planning.station_laws import BareLaw, bare_law, known_mass
-from bayesplate.planning.stations import Station, stations
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI
+from bayesplate.planning.beliefs import Beliefs, KnownBoard
+from bayesplate.planning.gains import N_DRAWS, Readings, expected_gain, together
+from bayesplate.planning.laws import known_mass
+from bayesplate.planning.modes_read import StationReadings, station_readings
+from bayesplate.planning.plan import Gain, ProposalEntry, SequenceEntry
+from bayesplate.planning.sizes_read import LOOKS, column_of, input_readings, look_readings, measurements
+from bayesplate.planning.together import further_boards
+from bayesplate.streams import stream
 
-EXPLANATIONS, CONSTANTS = "explanations", "constants"
-GOALS = (*MODULI, CONSTANTS, EXPLANATIONS)
-BEST = 3
-"""Further modes that are proposed together."""
+BELIEFS = "what is believed now"
+"""The random stream of the terms that stand for it."""
 FAINT = 2e-3
 """Nats below which a proposal is not listed."""
+BEST = (1, 3)
+"""Further modes of a board that are proposed together."""
 FIRST = (3, 6)
-"""Modes that are proposed together for a board that was not measured yet."""
+"""The same of a board that was not measured yet."""
+_TRIED, _JOINED = 128, 192
+"""Simulated readings by which modes, and sequences, are compared."""
+_LONGEST = 3
+"""Proposals in a sequence."""
 
 
 @dataclass(frozen=True)
@@ -61,287 +60,200 @@ class Proposal:
 
     Attributes
     ----------
-    what : str
-        "modes", "edges", "mass", "again", "size" or "board".
-    setup : str
-        In which it is measured; empty where no frequency is read.
-    sentence : str
-        What to do, as an order.
-    cost : float
-        Minutes.
+    entry : ProposalEntry
+        As it is written.
     readings : Readings
-    gain : Gain
-    law : BareLaw or None
-        Of the modes that are read.
+    about : str
+        The way to hold a board, the input, the effect or the board that it asks for.
+    known : KnownBoard or None
+        The board; None where it is one that is not there yet.
+    read : StationReadings or None
+        Everything that could be read in its station; None where no frequency is read.
     rows : tuple of int
-        Which of the modes of its station.
+        Which of the station's modes are read.
     spot : int
         Of its station, where a known mass stands.
-    about : str
-        The input or the effect that is looked at; empty where frequencies are read.
-    further : Readings or None
-        All modes of the session that could have been chosen, and `every_row` which they are.
     """
 
-    what: str
-    setup: str
-    sentence: str
-    cost: float
+    entry: ProposalEntry
     readings: Readings
-    gain: Gain
-    law: BareLaw | None = None
+    about: str
+    known: KnownBoard | None = None
+    read: StationReadings | None = None
     rows: tuple[int, ...] = ()
     spot: int = 0
-    about: str = ""
-    further: Readings | None = None
-    every_row: tuple[int, ...] = ()
 
     @property
     def ends_session(self) -> bool:
         """Whether the board leaves the place where it was measured, so that nothing goes on there."""
-        return self.what in ("edges", "again")
-
-    def excludes(self, other: Proposal) -> bool:
-        """Whether another proposal reads modes of the same way to hold the board, or looks at the same thing."""
-        return (self.law is not None and self.law is other.law) or (self.about != "" and self.about == other.about)
+        return self.entry.what in ("edges", "again")
 
 
-def score(gain: Gain, goal: str | None) -> float:
-    """What a gain is worth, nats: of what was asked for, or of explanations and constants together.
+@dataclass(frozen=True, eq=False)
+class Planner:
+    """What is believed, what is asked for, and what things cost.
 
-    Parameters
-    ----------
-    gain : Gain
-    goal : str or None
-        One of `GOALS`. None: the drop of the explanations' entropy and the mean shrinkage of the three intervals, both
-        logarithms.
-    """
-    if goal is None:
-        return max(gain.explanations, 0.0) + gain.constants
-    if goal == EXPLANATIONS:
-        return gain.explanations
-    return gain.constants if goal == CONSTANTS else gain.shrinkage(goal)
-
-
-def proposals(
-    beliefs: Beliefs,
-    values: Values,
-    costs: Costs,
-    goal: str | None,
-    rng: np.random.Generator,
-    found: Found | None = None,
-    prior: PriorCard | None = None,
-    *,
-    least: float = FAINT,
-) -> tuple[Proposal, ...]:
-    """Everything that could be measured next, the most promising first.
-
-    Parameters
+    Attributes
     ----------
     beliefs : Beliefs
-    values : dict of float
-        Rigidities and inputs about which the modes are computed, SI.
+    seed : int
+        Everything random follows from it; all gains are compared on the same simulated readings.
+    goal : str or None
+        See `bayesplate.planning.gains.expected_gain`.
     costs : Costs
-    goal : str or None
-        See `score`.
-    rng : numpy.random.Generator
-    found : Found, optional
-        The search that the explanations come from.
-    prior : PriorCard, optional
-    least : float
-        Nats above which a proposal is listed.
-
-    Returns
-    -------
-    tuple of Proposal
     """
-    listed = [*_of_modes(beliefs, values, costs, goal, rng, found, prior), *_of_sizes(beliefs, costs, rng, found)]
-    return _ranked(listed, goal, least)
 
+    beliefs: Beliefs
+    seed: int
+    goal: str | None = None
+    costs: Costs = Costs()
 
-def _ranked(listed: Sequence[Proposal], goal: str | None, least: float = FAINT) -> tuple[Proposal, ...]:
-    """The most promising first; those that give no more than the least are left out."""
-    kept = [one for one in listed if score(one.gain, goal) > least]
-    return tuple(sorted(kept, key=lambda one: -score(one.gain, goal)))
+    def gain(self, readings: Readings, minutes: float = 1.0, n_draws: int = N_DRAWS) -> Gain:
+        """What readings are expected to give."""
+        rng = stream(self.seed, "gains of further readings")
+        return expected_gain(self.beliefs, readings, rng, self.goal, minutes, n_draws)
 
+    def ranked(
+        self, priors: Sequence[PriorCard] = (), shared: Sequence[Shared] = (), least: float = FAINT
+    ) -> tuple[Proposal, ...]:
+        """Everything that could be measured next and gives more than the least, the most promising first.
 
-def _of_modes(
-    beliefs: Beliefs, values: Values, costs: Costs, goal: str | None, rng: np.random.Generator, found: Found | None,
-    prior: PriorCard | None,
-) -> list[Proposal]:  # fmt: skip
-    """Frequencies: further modes, again, with a known mass, held another way."""
-    effects = {name for one in beliefs.explanations for name in one.members}
-    nodes = {n: nodes_of(found, n) for n in sorted(effects) if n in found.ground.candidates} if found else {}
-    listed = []
-    for station in filter(lambda one: one.goes_on(beliefs.board), stations(beliefs.board, values, prior)):
-        law = bare_law(beliefs.board, station, values)
-        shifts = effect_shifts(found, nodes, law) if found else {}
-        every = station_readings(beliefs, law, rng, found, shifts)
-        listed += _of_station(beliefs, law, every, costs, goal, rng)
-    return listed
+        Parameters
+        ----------
+        priors : sequence of PriorCard
+            One per board, where more boards could be measured.
+        shared : sequence of Shared
+            What the boards have in common.
+        least : float
+            Nats.
+        """
+        listed = [one for known in self.beliefs.boards for one in (*self._of_modes(known), *self._of_sizes(known))]
+        listed += self._of_looks()
+        for one in further_boards(self.beliefs, priors, shared):
+            minutes = self.costs.board + len(one.labels) * self.costs.reading
+            about, where = one.sentence, ("board", "", one.like.setups[0].name)
+            listed.append(self._proposal(where, one.sentence, minutes, one.readings, about, labels=one.labels))
+        kept = [one for one in listed if one.entry.gain.score > least]
+        return tuple(sorted(kept, key=lambda one: -one.entry.gain.score))
 
+    def _proposal(
+        self, where: tuple[str, str, str], sentence: str, minutes: float, readings: Readings, about: str,
+        known: KnownBoard | None = None, read: StationReadings | None = None, rows: tuple[int, ...] = (), spot: int = 0,
+        labels: tuple[str, ...] = (),
+    ) -> Proposal:  # fmt: skip
+        if read is not None:
+            labels = tuple(str(read.law.station.setup.labels[i]) for i in rows)
+        entry = ProposalEntry(*where, sentence, minutes, labels, self.gain(readings, minutes))
+        return Proposal(entry, readings, about, known, read, rows, spot)
 
-def prior_proposals(
-    beliefs: Beliefs, prior: PriorCard, values: Values, costs: Costs, goal: str | None, rng: np.random.Generator
-) -> tuple[Proposal, ...]:
-    """Where to begin with a board that was not measured yet, the most promising first."""
-    listed = _of_sizes(beliefs, costs, rng, None)
-    for station in stations(beliefs.board, values, prior):
-        laws = prior_laws(beliefs, prior, station, values, rng)
-        every = prior_readings(beliefs, laws, rng)
-        told = _Sentences(beliefs.board, station)
-        new = tuple(range(station.n_old, every.n))
-        for few in best_modes(beliefs, every.some(new), goal, rng, FIRST) if new else ():
-            rows = tuple(new[i] for i in few)
-            some, cost = every.some(rows), costs.clamping + len(rows) * costs.reading
-            sentence, what = told.begin(rows), "edges" if station.is_new else "modes"
-            gain = expected_gain(beliefs, some, rng)
-            listed.append(Proposal(what, station.setup.name, sentence, cost, some, gain, laws[0], rows))
-    return _ranked(listed, goal)
+    def _of_modes(self, known: KnownBoard) -> Iterator[Proposal]:
+        """Frequencies: further modes, the same again, the same with a known mass, and the board held another way."""
+        rng = stream(self.seed, "noise of a further session")
+        for law in known.laws:
+            if law.station.goes_on(known.board):
+                yield from self._of_station(known, station_readings(self.beliefs, known, law, rng))
 
+    def _of_station(self, known: KnownBoard, read: StationReadings) -> Iterator[Proposal]:
+        station, costs, name = read.law.station, self.costs, known.board.name
+        is_alone = len(self.beliefs.boards) == 1
+        where = f" in setup {station.base.name}" if len(known.board.setups) > 1 else ""
+        of, its = ("", "the same board") if is_alone else (f" of board {name}", f"board {name}")
+        about = f"{name}, held as in {station.setup.name}"
 
-def _of_station(
-    beliefs: Beliefs, law: BareLaw, every: StationReadings, costs: Costs, goal: str | None, rng: np.random.Generator
-) -> list[Proposal]:
-    """What could be measured with the board held in one way."""
-    station, old = law.station, every.old
-    told = _Sentences(beliefs.board, station)
-    made: list[tuple[str, str, float, Readings, tuple[int, ...]]] = []
-    if station.is_new and every.rows:
-        made.append(("edges", told.elsewhere(every.rows), costs.clamping, every.further, every.rows))
-    elif every.rows:
-        for few in best_modes(beliefs, every.further, goal, rng):
-            rows = tuple(every.rows[i] for i in few)
-            made.append(("modes", told.further(rows), 0.0, every.further.some(few), rows))
-    if every.again is not None:
-        made.append(("again", told.again(old), costs.clamping, every.again, old))
-    listed = [
-        Proposal(
-            what, station.setup.name, sentence, cost + len(rows) * costs.reading, readings,
-            expected_gain(beliefs, readings, rng), law, rows, further=every.further, every_row=every.rows,
-        )
-        for what, sentence, cost, readings, rows in made
-    ]  # fmt: skip
-    gains = [expected_gain(beliefs, readings, rng) for readings in every.with_mass]
-    if gains:
-        best = max(range(len(gains)), key=lambda i: score(gains[i], goal))
-        cost = costs.reading * (1 + len(old))
-        sentence = told.with_mass(old, every.spots[best])
-        readings = every.with_mass[best]
-        listed.append(
-            Proposal("mass", station.setup.name, sentence, cost, readings, gains[best], law, old, every.spots[best])
-        )
-    return listed
+        def words(rows: Sequence[int]) -> str:
+            return f"mode{'s' * (len(rows) > 1)} {', '.join(str(station.setup.labels[i]) for i in rows)}"
 
+        def made(
+            what: str, told: str, minutes: float, readings: Readings, rows: tuple[int, ...], spot: int = 0
+        ) -> Proposal:
+            place, minutes = (what, name, station.setup.name), minutes + len(rows) * costs.reading
+            return self._proposal(place, told, minutes, readings, about, known, read, rows, spot)
 
-def best_modes(
-    beliefs: Beliefs, readings: Readings, goal: str | None, rng: np.random.Generator, sizes: Sequence[int] = (1, BEST)
-) -> list[tuple[int, ...]]:
-    """The best modes, so many together, found one by one: each goes with those found before it."""
-    found: list[int] = []
-    seed = int(rng.integers(2**31))
-    for _ in range(min(max(sizes), readings.n)):
-        left = [i for i in range(readings.n) if i not in found]
+        for some in self._best_modes(read):
+            rows, readings = tuple(read.rows[i] for i in some), read.further.some(some)
+            if station.is_new:
+                yield made("edges", f"Measure {its} {station.held}, {words(rows)}", costs.clamping, readings, rows)
+            elif station.n_old and not self.beliefs.is_prior:
+                yield made("modes", f"Measure {words(rows)}{of} as well{where}", 0.0, readings, rows)
+            else:
+                told = f"Measure {words(rows)}{of} in setup {station.base.name}"
+                yield made("modes", told, costs.clamping, readings, rows)
+        old = read.old
+        if read.again is not None:
+            these = words(old) if is_alone else f"all {len(old)} modes{of}"
+            told = f"Measure {these}{where} again on another day, the board taken out and put back"
+            yield made("again", told, costs.clamping, read.again, old)
+        if read.with_mass:
+            spot = max(read.with_mass, key=lambda spot: self.gain(read.with_mass[spot]).score)
+            (x, y), grams = station.places(known.board)[spot], 1e3 * known_mass(known.board)
+            at = f"at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
+            told = f"Stick a known mass of {grams:g} g on the board {at} and measure {words(old)}{where} again"
+            yield made("mass", told, costs.reading, read.with_mass[spot], old, spot)
 
-        def worth(i: int) -> float:
-            same = np.random.default_rng(seed)  # the same readings for all: only the differences count
-            return score(expected_gain(beliefs, readings.some([*found, i]), same, n_draws=128), goal)
+    def _best_modes(self, read: StationReadings) -> list[tuple[int, ...]]:
+        """The best modes, so many together, found one by one: each goes with those found before it."""
+        n, sizes = read.further.n, FIRST if self.beliefs.is_prior or not read.law.station.n_old else BEST
+        if read.law.station.is_new and not self.beliefs.is_prior:
+            return [tuple(range(n))] if n else []
+        chosen: list[int] = []
+        for _ in range(min(max(sizes), n)):
+            left = [i for i in range(n) if i not in chosen]
+            some = {i: self.gain(read.further.some([*chosen, i]), n_draws=_TRIED).score for i in left}
+            chosen.append(max(left, key=lambda i: some[i]))
+        told = sizes if len(self.beliefs.boards) == 1 else sizes[1:]
+        return list(dict.fromkeys(tuple(sorted(chosen[:size])) for size in told)) if chosen else []
 
-        found.append(max(left, key=worth))
-    return list(dict.fromkeys(tuple(sorted(found[:size])) for size in sizes))
+    def _of_sizes(self, known: KnownBoard) -> Iterator[Proposal]:
+        """Readings of a board itself; what all boards share alike is read once, on the first."""
+        name, n = known.board.name, len(self.beliefs.shared)
+        for one in measurements(known.board):
+            along = column_of(known, one.parameter)
+            is_shared = n > 0 and not along[:-n].any()
+            if is_shared and known is not self.beliefs.boards[0]:
+                continue
+            of = "" if is_shared or len(self.beliefs.boards) == 1 else f", board {name}"
+            told = one.sentence.replace("to the board", "to every board") if is_shared else one.sentence + of
+            where = ("size", "" if is_shared else name, "")
+            about, readings = f"{name}: {one.parameter.name}", input_readings(self.beliefs, known, one)
+            yield self._proposal(where, told, one.n * self.costs.reading, readings, about)
 
+    def _of_looks(self) -> Iterator[Proposal]:
+        """Effects that are looked at without a frequency."""
+        for effect, look in LOOKS.items():
+            readings, name = look_readings(self.beliefs, effect), self.beliefs.boards[0].board.name
+            if readings is not None:
+                minutes = look.n * self.costs.reading
+                yield self._proposal(("size", name, ""), look.sentence, minutes, readings, effect)
 
-def _of_sizes(beliefs: Beliefs, costs: Costs, rng: np.random.Generator, found: Found | None) -> list[Proposal]:
-    """Readings of the board itself, and of what is attached to it."""
-    listed = []
-    for one in measurements(beliefs.board):
-        readings = input_readings(beliefs, one)
-        gain = expected_gain(beliefs, readings, rng)
-        about = one.parameter.name
-        listed.append(Proposal("size", "", one.sentence, one.n * costs.reading, readings, gain, about=about))
-    for effect, look in LOOKS.items() if found else ():
-        seen = look_readings(beliefs, found, effect) if found and effect in found.ground.candidates else None
-        if seen is not None:
-            gain = expected_gain(beliefs, seen, rng)
-            listed.append(Proposal("size", "", look.sentence, look.n * costs.reading, seen, gain, about=effect))
-    return listed
+    def sequences(self, listed: Sequence[Proposal]) -> tuple[tuple[tuple[Proposal, ...], SequenceEntry], ...]:
+        """The best two and the best three together, found one by one: each goes with those found before it.
 
+        They stand in the order in which they can be done: what goes on in a session before the board is taken out. Two
+        that read modes of one way to hold a board, or the same size, are not put together.
 
-@dataclass(frozen=True)
-class _Sentences:
-    """What to do in a station, each as one order."""
+        Parameters
+        ----------
+        listed : sequence of Proposal
+            The best first.
 
-    board: Board
-    station: Station
-
-    def _modes(self, rows: Sequence[int]) -> str:
-        labels = ", ".join(str(self.station.setup.labels[i]) for i in rows)
-        return f"mode {labels}" if len(rows) == 1 else f"modes {labels}"
-
-    @property
-    def _where(self) -> str:
-        return f" in setup {self.station.base.name}" if len(self.board.setups) > 1 else ""
-
-    def further(self, rows: Sequence[int]) -> str:
-        """Modes that were not read."""
-        return f"Measure {self._modes(rows)} as well{self._where}"
-
-    def again(self, rows: Sequence[int]) -> str:
-        """Those that were, another day."""
-        return f"Measure {self._modes(rows)}{self._where} again on another day, the board taken out and put back"
-
-    def with_mass(self, rows: Sequence[int], spot: int) -> str:
-        """Those that were, with a known mass."""
-        (x, y), grams = self.station.places(self.board)[spot], 1e3 * known_mass(self.board)
-        at = f"at x = {1e3 * x:.0f}, y = {1e3 * y:.0f} mm"
-        return f"Stick a known mass of {grams:g} g on the board {at} and measure {self._modes(rows)}{self._where} again"
-
-    def begin(self, rows: Sequence[int]) -> str:
-        """The first modes of a board."""
-        if self.station.is_new:
-            return self.elsewhere(rows)
-        return f"Measure {self._modes(rows)} in setup {self.station.base.name}"
-
-    def elsewhere(self, rows: Sequence[int]) -> str:
-        """The board held another way."""
-        return f"Measure the same board {self.station.held}, {self._modes(rows)}"
-
-
-def sequences(
-    beliefs: Beliefs, listed: Sequence[Proposal], goal: str | None, rng: np.random.Generator, longest: int = 3
-) -> tuple[tuple[tuple[Proposal, ...], Gain], ...]:
-    """The best two and the best three together, found one by one: each goes with those found before it.
-
-    They stand in the order in which they can be done: what goes on in a session before the board is taken out.
-
-    Parameters
-    ----------
-    beliefs : Beliefs
-    listed : sequence of Proposal
-        The best first.
-    goal : str or None
-    rng : numpy.random.Generator
-    longest : int
-
-    Returns
-    -------
-    tuple of (tuple of Proposal, Gain)
-        The pair, then the three; fewer where there is nothing to add.
-    """
-    seed = int(rng.integers(2**31))
-    chosen = list(listed[:1])
-    result = []
-    while chosen and len(chosen) < longest:
-        left = [one for one in listed if not any(one.excludes(other) for other in chosen)]
-        if not left:
-            break
-        gains: Mapping[int, Gain] = {
-            i: expected_gain(
-                beliefs, together([each.readings for each in (*chosen, one)]), np.random.default_rng(seed), n_draws=192
-            )
-            for i, one in enumerate(left)
-        }
-        best = max(gains, key=lambda i: score(gains[i], goal))
-        chosen.append(left[best])
-        result.append((tuple(sorted(chosen, key=lambda one: one.ends_session)), gains[best]))
-    return tuple(result)
+        Returns
+        -------
+        tuple of (tuple of Proposal, SequenceEntry)
+            The pair, then the three; fewer where there is nothing to add.
+        """
+        chosen, made = list(listed[:1]), []
+        while chosen and len(chosen) < _LONGEST:
+            left = [one for one in listed if one.about not in {other.about for other in chosen}]
+            if not left:
+                break
+            minutes = [sum(each.entry.cost_minutes for each in (*chosen, one)) for one in left]
+            gains = [
+                self.gain(together([each.readings for each in (*chosen, one)]), cost, _JOINED)
+                for one, cost in zip(left, minutes, strict=True)
+            ]
+            best = max(range(len(left)), key=lambda i: gains[i].score)
+            chosen.append(left[best])
+            steps = tuple(sorted(chosen, key=lambda one: one.ends_session))
+            told = tuple(one.entry.sentence for one in steps)
+            made.append((steps, SequenceEntry(told, minutes[best], gains[best])))
+        return tuple(made)

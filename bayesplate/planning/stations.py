@@ -1,8 +1,8 @@
-"""Ways to read further modes: the board held as it is, held another way, or with a known mass on it."""
+"""Ways to read modes: the board held as it was, with all edges free, or as a cantilever."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,17 +82,20 @@ class Station:
 
     def system(self, board: Board) -> System:
         """The setup with the effects of a board that was made for its base."""
-        return System(self.setup, effects_of(_carrying(board, self.setup), self.setup))
+        if all(one.name != self.setup.name for one in board.setups):
+            acting = (one.in_setup(board, self.setup) for one in board.chosen if one.scope == "setup")
+            new = {one.name: one for one in acting if one is not None}
+            board = replace(board, setups=(*board.setups, self.setup), chosen=(*board.chosen, *new.values()))
+        return System(self.setup, effects_of(board, self.setup))
 
     def values(self, system: System, values: Values) -> dict[str, Floats]:
         """Values that also hold what the effects of a system take and the board was not asked for.
 
         What an effect of a setup is in another one is taken to be as large: the same sensor, the same clamp.
         """
-        of_base = [_renamed(effect, self) for effect in system.effects]
         by_key = {
             (effect.name, one.key): values[one.name]
-            for effect in of_base
+            for effect in map(self._in_base, system.effects)
             for one in effect.parameters()
             if one.name in values
         }
@@ -104,72 +107,52 @@ class Station:
         }
         return {**values, **missing}
 
-
-def _renamed(effect: Effect, station: Station) -> Effect:
-    """An effect under the names that it has in the setup from which a station comes."""
-    return replace(effect, owner=station.base.owner) if effect.owner == station.setup.owner else effect
-
-
-def _carrying(board: Board, setup: Setup) -> Board:
-    """A board with its chosen effects also in a setup that they do not know."""
-    if any(one.name == setup.name for one in board.setups):
-        return board
-    new = {
-        one.name: acting
-        for one in board.chosen
-        if one.scope == "setup" and (acting := one.in_setup(board, setup)) is not None
-    }
-    return replace(board, setups=(*board.setups, setup), chosen=(*board.chosen, *new.values()))
+    def _in_base(self, effect: Effect) -> Effect:
+        """An effect under the names that it has in the base."""
+        return replace(effect, owner=self.base.owner) if effect.owner == self.setup.owner else effect
 
 
-def stations(
-    board: Board, values: Values, prior: PriorCard | None = None, *, is_elsewhere: bool = True
-) -> tuple[Station, ...]:
-    """Every way to hold the board that is looked at: as it was held, free, and as a cantilever.
+def old_stations(board: Board, values: Values) -> Iterator[Station]:
+    """The ways in which the board was held, each with the modes that were not read.
 
     Parameters
     ----------
     board : Board
     values : dict of float
-        Where the modes are computed.
-    prior : PriorCard, optional
-        Its noise, where it states one, is that of an edge that was not tried yet.
-    is_elsewhere : bool
-        Whether ways in which the board was not held are looked at.
+        Where the modes are computed, SI.
     """
-    found: list[Station] = []
     for setup in board.setups:
         read = tuple(replace(one, frequency=Quantity.exact(one.frequency.mean), sign="") for one in setup.readings)
         empty = replace(setup, readings=(), peaks=(), published_coefficients=None)
         more = _next_modes(board, Station(empty, setup), values, FURTHER, {one.label for one in read})
-        found.append(Station(replace(empty, readings=(*read, *more)), setup, len(read)))
-    found += new_stations(board, values, prior) if is_elsewhere else ()
-    return tuple(one for one in found if one.setup.readings)
+        if read or more:
+            yield Station(replace(empty, readings=(*read, *more)), setup, len(read))
 
 
-def new_stations(board: Board, values: Values, prior: PriorCard | None = None) -> tuple[Station, ...]:
-    """The ways to hold the board in which it was never held: free, and as a cantilever."""
+def new_stations(board: Board, values: Values, prior: PriorCard | None = None) -> Iterator[Station]:
+    """The ways in which the board was never held: free, and as a cantilever.
+
+    Parameters
+    ----------
+    board : Board
+    values : dict of float
+        Where the modes are computed, SI.
+    prior : PriorCard, optional
+        Its noise, where it states one, is that of an edge that was not tried yet.
+    """
     ways: tuple[tuple[str, Ends], ...] = (("free", ("free", "free")), ("cantilever", ("clamped", "free")))
-    found: list[Station] = []
-    for name, ends_x in ways:
-        other = _elsewhere(board, name, ends_x, prior)
-        if other is not None:
-            more = _next_modes(board, Station(other, board.setups[0]), values, ELSEWHERE, set())
-            found.append(Station(replace(other, readings=more), board.setups[0]))
-    return tuple(one for one in found if one.setup.readings)
-
-
-def _elsewhere(board: Board, name: str, ends_x: Ends, prior: PriorCard | None) -> Setup | None:
-    """The board with y0 and y1 free, in a setup of its own; None where it was held so already, or nearly so."""
-    is_free = "clamped" not in ends_x
-    held = [setup.is_free if is_free else "clamped" in {*setup.ends_x, *setup.ends_y} for setup in board.setups]
-    if any(held):
-        return None
     taken, first = {setup.name for setup in board.setups}, board.setups[0]
-    while name in taken:
-        name += "-2"
-    noise = assumed_noise((*ends_x, "free", "free"), prior)
-    return Setup(name, ends_x, ("free", "free"), (), noise, attached=first.attached, fluid=first.fluid)
+    for name, ends_x in ways:
+        is_free = "clamped" not in ends_x
+        if any(one.is_free if is_free else "clamped" in {*one.ends_x, *one.ends_y} for one in board.setups):
+            continue
+        while name in taken:
+            name += "-2"
+        noise = assumed_noise((*ends_x, "free", "free"), prior)
+        empty = Setup(name, ends_x, ("free", "free"), (), noise, attached=first.attached, fluid=first.fluid)
+        readings = _next_modes(board, Station(empty, first), values, ELSEWHERE, set())
+        if readings:
+            yield Station(replace(empty, readings=readings), first)
 
 
 def _next_modes(
@@ -182,16 +165,14 @@ def _next_modes(
     system, first = station.system(board), station.setup.first_label
     there = station.values(system, values)
     modes, named = spectrum(system, there, SEARCHED)
-    sensor = None if station.is_new else station.base.sensor
-    at = (
-        np.ones(len(named))
-        if sensor is None
-        else np.abs(deflections(station.base, modes, there, sensor, system.shaped))
+    seen = np.ones(len(named))
+    if not station.is_new and station.base.sensor is not None:
+        seen = np.abs(deflections(station.base, modes, there, station.base.sensor, system.shaped))
+    new = (
+        (one.label, one.frequency)
+        for one, share in zip(named, seen, strict=True)
+        if share >= NODAL_LINE and one.label is not None and one.label not in taken
     )
-    seen = [one for one, share in zip(named, at, strict=True) if share >= NODAL_LINE]
-    new = [one for one in seen if one.label is not None and one.label not in taken]
     return tuple(
-        Reading(one.label, (one.label.m - first.m, one.label.n - first.n), Quantity.exact(one.frequency))
-        for one in new[:n]
-        if one.label is not None
+        Reading(label, (label.m - first.m, label.n - first.n), Quantity.exact(hertz)) for label, hertz in [*new][:n]
     )

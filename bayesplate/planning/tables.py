@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bayesplate.planning.plan import GainEntry, Plan
+from bayesplate.planning.plan import Gain, Plan
 from bayesplate.planning.words import shared_words
 from bayesplate.plate.material import MODULI
 from bayesplate.results.tables import Table
@@ -30,7 +30,7 @@ def _columns(plan: Plan) -> tuple[str, ...]:
     return (*doubt, *names, "min", "gain", "gain /min")
 
 
-def _cells(gain: GainEntry, cost: float, plan: Plan) -> tuple[str, ...]:
+def _cells(gain: Gain, cost: float, plan: Plan) -> tuple[str, ...]:
     doubt: tuple[str, ...] = ()
     if len(plan.explanations) > 1:
         told = gain.explanations is not None and gain.explanations_error is not None

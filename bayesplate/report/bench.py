@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayesplate.planning.assembled import Bench
+from bayesplate.planning.bench import Bench
 from bayesplate.report.chladni import Marks, chladni_sheet
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.sheet import Sheet
-from bayesplate.planning.assembled import Bench
+from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws

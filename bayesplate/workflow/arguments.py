@@ -17,7 +17,8 @@ from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
-from bayesplate.planning.proposals import GOALS, Costs
+from bayesplate.planning.gains import GOALS
+from bayesplate.planning.proposals import Costs
 from bayesplate.plate.board import Board
 from bayesplate.recordings.reading import CHANNELS
 from bayesplate.recordings.signals import MOTIONS

@@ -32,8 +32,9 @@ from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, indices_of, united
 from bayesplate.files import make_folder, write_text
-from bayesplate.planning.drawn_up import drawn_up
-from bayesplate.planning.survivors import survivors
+from bayesplate.planning.drawn_up import first_of
+from bayesplate.planning.explained import believed, survivors
+from bayesplate.planning.proposals import BELIEFS, Planner
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
@@ -43,6 +44,7 @@ from bayesplate.results.contract import json_text
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
 from bayesplate.results.store import attributes_of, posterior_archive
 from bayesplate.results.summary import Summary
+from bayesplate.streams import stream
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fit import refuse_unconverged, write_fit, write_page
@@ -282,4 +284,5 @@ def advice(found: Found, verdict: Verdict, prior: PriorCard, seed: int) -> str:
     if verdict.word == "unexplained":
         return wrong_reading(found)
     left = survivors(found, [one.members for one in verdict.stands_for])
-    return drawn_up(found, prior, seed, among=left, with_sequences=False).first
+    planner = Planner(believed(found, prior, stream(seed, BELIEFS), left), seed)
+    return first_of(planner, planner.ranked())

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from bayesplate.cards import is_campaign
+from bayesplate.campaigns.shared import Shared
+from bayesplate.cards import PriorCard, is_campaign
 from bayesplate.cards.words import EFFECT_NAMES, effect_named
 from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
@@ -21,22 +20,21 @@ from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.files import make_folder, require_new, write_text
-from bayesplate.planning.assembled import (
-    Bench,
-    benches,
-    explanation_entries,
-    proposal_entry,
-    sequence_entry,
-)
-from bayesplate.planning.drawn_up import DrawnUp, begun, drawn_up
-from bayesplate.planning.plan import FORMAT, Plan
-from bayesplate.planning.proposals import EXPLANATIONS, Costs
-from bayesplate.planning.survivors import asked, surviving
+from bayesplate.planning.beliefs import Beliefs
+from bayesplate.planning.bench import Bench
+from bayesplate.planning.drawn_up import drawn_up
+from bayesplate.planning.explained import asked, believed, surviving
+from bayesplate.planning.gains import EXPLANATIONS
+from bayesplate.planning.plan import Plan
+from bayesplate.planning.proposals import BELIEFS, Costs, Planner
+from bayesplate.planning.together import beliefs_together
+from bayesplate.planning.unmeasured import prior_beliefs
 from bayesplate.plate.board import Board
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import DIAGNOSIS
+from bayesplate.streams import stream
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.one_thread import one_thread_each
@@ -139,32 +137,45 @@ def plan(
         progress=progress,
     )  # fmt: skip
     between = None if between is None else [effect_named(name) for name in between]
-    classes = Costs(**(costs or {}))
     given = _given(card, effects)
     files = () if out is None else require_new(Path(out), _names(), force=force)
-    if isinstance(given, Campaign):
-        from bayesplate.workflow.campaign_plan import plan_campaign
-
-        if between is not None:
-            raise InputError(_untold("between", "a campaign"))
-        made, drawn = plan_campaign(given, goal, classes, seed, progress)
-    else:
-        found = _drawn_up(given, goal, classes, between, seed, out, progress)
-        made, drawn = _plan_of(given, found, goal, classes, seed)
+    asked = _Asked(goal, between, seed, None if out is None else Path(out), progress)
+    beliefs = asked.of_board(given.boards[0]) if len(given.boards) == 1 else asked.of_campaign(given)
+    planner = Planner(beliefs, seed, goal, Costs(**(costs or {})))
+    made, drawn = drawn_up(planner, given.name, given.title, given.card_sha256, given.priors, given.shared)
     if out is not None:
         _write(made, drawn, Path(out), files)
     return PlanResult(made, drawn, tuple(path for path in files if path.exists()))
 
 
-def _given(card: Problem | Card | Campaign, effects: Sequence[str] | None) -> Prepared | Campaign:
+@dataclass(frozen=True)
+class _Given:
+    """The boards to plan for: one, or those of a campaign, with what they share."""
+
+    name: str
+    title: str
+    card_sha256: str
+    boards: tuple[Prepared, ...]
+    shared: tuple[Shared, ...] = ()
+
+    @property
+    def priors(self) -> list[PriorCard]:
+        """Of the boards."""
+        return [one.prior for one in self.boards]
+
+
+def _given(card: Problem | Card | Campaign, effects: Sequence[str] | None) -> _Given:
     """What was given; a board that was not measured yet will do."""
+    if is_campaign(card) or isinstance(card, Campaign):
+        many = problem_or_campaign(card, effects=effects)
+        assert isinstance(many, Campaign)
+        boards = tuple(one.prepared for one in many.problems)
+        return _Given(many.name, many.card.title, many.card.sha256, boards, many.shared)
     if isinstance(card, Problem):
-        return as_problem(card, effects=effects).prepared
-    if isinstance(card, Campaign) or (isinstance(card, str | os.PathLike) and is_campaign(card)):
-        campaign = problem_or_campaign(card, effects=effects)
-        assert isinstance(campaign, Campaign)
-        return campaign
-    return prepare(card, effects, may_lack_frequencies=True)
+        prepared = as_problem(card, effects=effects).prepared
+    else:
+        prepared = prepare(card, effects, may_lack_frequencies=True)
+    return _Given(prepared.board.name, prepared.board.title, prepared.card.sha256, (prepared,))
 
 
 def _names() -> list[str]:
@@ -172,40 +183,55 @@ def _names() -> list[str]:
     return [PLAN, *(f"{stem}.{ending}" for stem in (_GAINS, _BENCH, f"{_BENCH}-2") for ending in ("png", "svg"))]
 
 
-def _drawn_up(
-    prepared: Prepared,
-    goal: str | None,
-    costs: Costs,
-    between: Sequence[str] | None,
-    seed: int,
-    out: str | os.PathLike[str] | None,
-    progress: Callable[[Progress], None] | None,
-) -> DrawnUp:
-    """The plan of a board: from a search, from a finished one, or from the prior."""
-    if between is not None:
-        _require_possible(prepared.board, between)
-    stages = Stages(progress, _POSE + _SEARCH + _PLAN)
-    stages.begin("estimate", _POSE)
-    problem = Problem(prepared)
-    asks_of_effects = between is not None or goal == EXPLANATIONS
-    if not any(setup.readings or setup.peaks for setup in prepared.board.setups):
-        if asks_of_effects:
-            raise InputError(_untold("between" if between else "goal", "a board without any"))
-        return begun(prepared.board, prepared.prior, seed, goal=goal, costs=costs)
-    try:
-        baseline = baseline_of(problem.posed)
-    except NotIdentifiableError as error:
-        if asks_of_effects:
-            raise
-        found = begun(prepared.board, prepared.prior, seed, goal=goal, costs=costs)
-        return replace(found, notes=(f"planned from the prior alone: {error}",))
-    finished = None if out is None or between else _finished(Path(out), prepared)
-    tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
-    stages.begin("search for effects", _SEARCH)
-    _, searched = full_search(baseline, tried, stages.reached)
-    among = _among(searched, between, finished)
-    stages.begin("gains of further readings", _PLAN)
-    return drawn_up(searched, prepared.prior, seed, goal=goal, costs=costs, among=among)
+@dataclass(frozen=True)
+class _Asked:
+    """What a plan was asked for: see `plan`."""
+
+    goal: str | None
+    between: Sequence[str] | None
+    seed: int
+    out: Path | None
+    progress: Callable[[Progress], None] | None
+
+    def of_board(self, prepared: Prepared) -> Beliefs:
+        """What is believed of a board: from a search, from a finished one, or from the prior."""
+        board, prior, between = prepared.board, prepared.prior, self.between
+        if between is not None:
+            _require_possible(board, between)
+        rng, stages = stream(self.seed, BELIEFS), Stages(self.progress, _POSE + _SEARCH + _PLAN)
+        stages.begin("estimate", _POSE)
+        asks_of_effects = between is not None or self.goal == EXPLANATIONS
+        if not any(setup.readings or setup.peaks for setup in board.setups):
+            if asks_of_effects:
+                raise InputError(_untold("between" if between else "goal", "a board without any"))
+            return prior_beliefs(board, prior, rng)
+        try:
+            baseline = baseline_of(Problem(prepared).posed)
+        except NotIdentifiableError as error:
+            if asks_of_effects:
+                raise
+            return prior_beliefs(board, prior, rng, (f"planned from the prior alone: {error}",))
+        finished = None if self.out is None or between else _finished(self.out, prepared)
+        tried = between or (None if finished is None else sorted({name for one in finished.support for name in one}))
+        stages.begin("search for effects", _SEARCH)
+        _, searched = full_search(baseline, tried, stages.reached)
+        among = _among(searched, between, finished)
+        stages.begin("gains of further readings", _PLAN)
+        return believed(searched, prior, rng, among)
+
+    def of_campaign(self, given: _Given) -> Beliefs:
+        """What is believed of several boards and of what their card shares: effects are not searched for."""
+        if self.between is not None:
+            raise InputError(_untold("between", "a campaign"))
+        if self.goal == EXPLANATIONS:
+            wanted = "E_x, E_y, G_xy or constants for a campaign, or none for what its boards share"
+            raise InputError(Fault("goal", wanted, EXPLANATIONS, "plan one of its boards to tell explanations apart"))
+        stages = Stages(self.progress, _SEARCH + _PLAN)
+        stages.begin("boards of the campaign", _SEARCH)
+        boards = [one.board for one in given.boards]
+        beliefs = beliefs_together(boards, given.priors, given.shared, stages.reached)
+        stages.begin("gains of further readings", _PLAN)
+        return beliefs
 
 
 def _untold(place: str, got: str) -> Fault:
@@ -258,33 +284,6 @@ def _among(found: Found, between: Sequence[str] | None, finished: _Finished | No
     if between:
         return asked(found, between)
     return None if finished is None else surviving(found, finished.support, finished.none, finished.rivals)
-
-
-def _plan_of(
-    prepared: Prepared, found: DrawnUp, goal: str | None, costs: Costs, seed: int
-) -> tuple[Plan, tuple[Bench, ...]]:
-    """A board's plan as it is written, and its sheets."""
-    beliefs, board = found.beliefs, prepared.board
-    steps = found.together[-1][0] if found.together else found.proposals[:1]
-    drawn = benches(beliefs, steps or found.proposals, found.values, np.random.default_rng([seed, 18]))
-    made = Plan(
-        format=FORMAT,
-        name=board.name,
-        title=board.title,
-        seed=seed,
-        card_sha256=prepared.card.sha256,
-        basis="prior" if found.is_from_prior else "readings",
-        goal=goal,
-        costs=asdict(costs),
-        explanations=explanation_entries(beliefs),
-        entropy=beliefs.entropy,
-        first=found.first,
-        proposals=tuple(proposal_entry(one, goal, beliefs) for one in found.proposals),
-        sequences=tuple(sequence_entry(*one, goal, beliefs) for one in found.together),
-        bench=tuple(one.entry for one in drawn),
-        notes=(*found.notes, *board.notes),
-    )
-    return made, drawn
 
 
 def _write(made: Plan, drawn: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:

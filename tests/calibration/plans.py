@@ -36,16 +36,16 @@ from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, Hypothesis
 from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.errors import BayesplateError
-from bayesplate.planning.beliefs import Beliefs
-from bayesplate.planning.drawn_up import drawn_up
-from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
-from bayesplate.planning.looks import LOOKS
+from bayesplate.planning.beliefs import entropy
+from bayesplate.planning.explained import believed, survivors
+from bayesplate.planning.gains import EXPLANATIONS, probabilities_after
+from bayesplate.planning.laws import known_mass
 from bayesplate.planning.modes_read import REPEATED
-from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, proposals
-from bayesplate.planning.station_laws import known_mass
-from bayesplate.planning.survivors import survivors
+from bayesplate.planning.proposals import BELIEFS, FAINT, Planner, Proposal
+from bayesplate.planning.sizes_read import LOOKS
 from bayesplate.plate.board import Board
 from bayesplate.plate.sessions import shared_share
+from bayesplate.streams import stream
 
 Record = dict[str, Any]
 
@@ -182,89 +182,88 @@ def _board(design: str) -> Board:
 
 def _measured(asked: Asked, rng: np.random.Generator) -> Record:
     """What is expected and what comes of the three ways to go on."""
-    prior = load_prior("weakly-informative")
     seed = int(rng.integers(2**31))
-    plan = drawn_up(asked.found, prior, seed, goal=EXPLANATIONS, with_sequences=False)
-    listed = plan.proposals
+    beliefs = believed(asked.found, load_prior("weakly-informative"), stream(seed, BELIEFS))
+    planner = Planner(beliefs, seed, EXPLANATIONS)
+    every = planner.ranked(least=float("-inf"))
+    listed = [one for one in every if one.entry.gain.score > FAINT]
     if not listed:
         return {"silent": True}
-    every = proposals(
-        plan.beliefs, plan.values, Costs(), EXPLANATIONS, rng, asked.found, prior, least=float("-inf")
-    )  # fmt: skip
     chosen = {
         "first": listed[0],
-        "random": _at_random(plan.beliefs, every, rng),
+        "random": _at_random(planner, every, rng),
         "listed": listed[int(rng.integers(len(listed)))],
-        "next": _next_up(plan.beliefs, every, rng),
+        "next": _next_up(planner, every),
     }
-    names = [list(one.members) for one in plan.beliefs.explanations]
-    record: Record = {"explanations": names, "before": [round(float(p), 5) for p in plan.beliefs.probabilities]}
+    names = [list(one.members) for one in beliefs.explanations]
+    record: Record = {"explanations": names, "before": [round(float(p), 5) for p in beliefs.probabilities]}
     for way in WAYS:
         one = chosen[way]
         read = _read(asked, one, rng)
-        after = probabilities_after(plan.beliefs, one.readings, read[None, :])[:, 0]
+        after = probabilities_after(beliefs, one.readings, read[None, :])[:, 0]
         own = float(after[[tuple(name) for name in names].index(asked.true)])
         record[way] = {
-            "what": one.what,
-            "cost": one.cost,
-            "expected": round(one.gain.explanations, 5),
-            "error": round(one.gain.explanations_error, 5),
-            "realised": round(plan.beliefs.entropy - float(entropy(after[:, None])[0]), 5),
+            "what": one.entry.what,
+            "cost": one.entry.cost_minutes,
+            "expected": round(one.entry.gain.explanations, 5),
+            "error": round(one.entry.gain.explanations_error, 5),
+            "realised": round(beliefs.entropy - float(entropy(after[:, None])[0]), 5),
             "true": round(own, 5),
         }
     return record
 
 
-def _at_random(beliefs: Beliefs, every: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
+def _at_random(planner: Planner, every: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
     """One of all the things that could be measured; where modes are chosen for it, others in their place."""
     one = every[int(rng.integers(len(every)))]
-    if one.what != "modes" or one.further is None:
+    if one.entry.what != "modes" or one.read is None:
         return one
-    rows = sorted(rng.choice(one.further.n, size=len(one.rows), replace=False).tolist())
-    readings = one.further.some(rows)
-    gain = expected_gain(beliefs, readings, rng)
-    return replace(one, readings=readings, rows=tuple(one.every_row[i] for i in rows), gain=gain)
+    return _of_modes(planner, one, sorted(rng.choice(one.read.further.n, size=len(one.rows), replace=False).tolist()))
 
 
-def _next_up(beliefs: Beliefs, every: Sequence[Proposal], rng: np.random.Generator) -> Proposal:
+def _next_up(planner: Planner, every: Sequence[Proposal]) -> Proposal:
     """The next modes up in the session that goes on, as a proposal."""
-    of_modes = [one for one in every if one.what == "modes" and one.further is not None]
+    of_modes = [one for one in every if one.entry.what == "modes" and one.read is not None]
     if not of_modes:
         raise RuntimeError("no mode is left to be read in the session that goes on")
     best = max(of_modes, key=lambda one: len(one.rows))
-    assert best.further is not None
-    further: Readings = best.further
-    rows = list(range(min(NEXT, further.n)))
-    readings = further.some(rows)
-    first = best.every_row[0]
-    kept = tuple(best.every_row[i] for i in rows)
-    assert first == min(best.every_row)
-    return replace(best, readings=readings, rows=kept, gain=expected_gain(beliefs, readings, rng))
+    assert best.read is not None
+    assert list(best.read.rows) == sorted(best.read.rows)
+    return _of_modes(planner, best, list(range(min(NEXT, best.read.further.n))))
+
+
+def _of_modes(planner: Planner, one: Proposal, some: Sequence[int]) -> Proposal:
+    """A proposal of further modes with others in their place."""
+    assert one.read is not None
+    readings, rows = one.read.further.some(some), tuple(one.read.rows[i] for i in some)
+    entry = replace(one.entry, gain=planner.gain(readings, one.entry.cost_minutes))
+    return replace(one, entry=entry, readings=readings, rows=rows)
 
 
 def _read(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
     """What the generator's board shows: ln f (Hz) of the modes, or the sizes that are looked at."""
-    if one.law is None:
+    what = one.entry.what
+    if one.read is None:
         return _looked_at(asked, one, rng)
-    station, design, truth = one.law.station, asked.planted.design, asked.planted.truth
+    station, design, truth = one.read.law.station, asked.planted.design, asked.planted.truth
     setup = station.setup
     beams = tuple(setup.readings[i].beams for i in one.rows)
     covered = design.setups[0].covered if not station.is_new else 0.0
     held = Held(setup.name, setup.edges, beams, covered=covered)
     acting = [RECIPES[name].make(dict(values)) for name, values in truth.effects.items() if RECIPES[name].acts(held)]
-    if one.what == "mass":
+    if what == "mass":
         board = asked.found.ground.baseline.board
         place = station.places(board)[one.spot]
         acting.append(planted_effects.AttachedMass(known_mass(board), (place,)))
     exact = _solved(design, held, truth.constants, acting)
     first = truth.drawn_noise[design.setups[0].name] * np.log(2.0) / 1200.0
-    if one.what not in ("again", "mass"):
-        noise = first if one.what == "modes" else drawn(setup.noise, rng)
+    if what not in ("again", "mass"):
+        noise = first if what == "modes" else drawn(setup.noise, rng)
         return np.asarray(exact + noise * rng.standard_normal(len(exact)))
     before = asked.found.ground.baseline.board.setup(station.base.name)
-    bare = exact if one.what == "again" else _solved(design, held, truth.constants, acting[:-1])
+    bare = exact if what == "again" else _solved(design, held, truth.constants, acting[:-1])
     off = np.log(before.measured) - bare
-    if one.what == "mass":
+    if what == "mass":
         return np.asarray(exact + off + REPEATED * rng.standard_normal(len(exact)))
     share, noise = shared_share(before), drawn(setup.noise, rng)
     discrepancy = share * off + (share * (1.0 - share)) ** 0.5 * first * rng.standard_normal(len(exact))
@@ -282,7 +281,7 @@ def _solved(design: Design, held: Held, constants: Mapping[str, float], acting: 
 
 def _looked_at(asked: Asked, one: Proposal, rng: np.random.Generator) -> np.ndarray:
     """The sizes of an effect as they are, zero where the board does not have it, with the error of the look."""
-    effect = next(name for name, look in LOOKS.items() if look.sentence == one.sentence)
+    effect = next(name for name, look in LOOKS.items() if look.sentence == one.entry.sentence)
     keys = [free.key for free in asked.found.ground.candidates[effect].laws[0].form.free]
     true = asked.planted.truth.effects.get(effect, {})
     sd = LOOKS[effect].sd(asked.found.ground.baseline.board)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from calibration.plans import WAYS, bars, calibration, is_calibrated, settled, wrongly
 
-from bayesplate.planning.beliefs import Beliefs, Explanation
-from bayesplate.planning.gains import Readings, entropy, expected_gain, probabilities_after
+from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
+from bayesplate.planning.gains import Readings, expected_gain, probabilities_after
 from bayesplate.plate.material import ORTHOTROPIC
 
 N_BOARDS, N_TERMS = 120, 24
@@ -21,8 +21,7 @@ def explanation(rng, members, probability):
     return Explanation(
         members=members, words="", probability=probability, mean=np.zeros((N_TERMS, 4)),
         covariance=np.tile(np.diag([1.0, 1.0, 1.0, 0.1]), (N_TERMS, 1, 1)), noise=np.full((N_TERMS, 1), NOISE),
-        log_moduli=np.zeros((N_TERMS, 3)), to_moduli=np.tile(np.eye(3, 4), (N_TERMS, 1, 1)),
-        cells=np.zeros(N_TERMS, dtype=np.intp),
+        middle=np.zeros((N_TERMS, 3)), wanted=np.tile(np.eye(3, 4), (N_TERMS, 1, 1)),
     )  # fmt: skip
 
 
@@ -30,9 +29,8 @@ def board(rng):
     """Two explanations and two readings, the second effect of a size that is drawn."""
     share = rng.uniform(0.2, 0.8)
     beliefs = Beliefs(
-        SimpleNamespace(symmetry=ORTHOTROPIC),
+        (SimpleNamespace(board=SimpleNamespace(symmetry=ORTHOTROPIC)),),
         (explanation(rng, (), share), explanation(rng, ("made",), 1.0 - share)),
-        0,
     )
     size = rng.uniform(0.5, 4.0) * np.abs(rng.standard_normal(N_TERMS))
     shift = (np.zeros((N_TERMS, 2)), np.outer(size, rng.standard_normal(2)))

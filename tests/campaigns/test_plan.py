@@ -10,9 +10,10 @@ import pytest
 
 import bayesplate
 from bayesplate.campaigns.scatter import expected_width
-from bayesplate.planning.campaign import Reading, benches, joint_of, readings
-from bayesplate.planning.joint import board_in_joint
-from bayesplate.planning.proposals import Costs
+from bayesplate.planning.bench import bands, benches
+from bayesplate.planning.proposals import Costs, Planner
+from bayesplate.planning.together import _linear, beliefs_together
+from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
 
 SHARED = "attached_mass.mass"
@@ -48,95 +49,111 @@ def test_two_steps_give_more_than_one_and_three_more_than_two(planned):
 
 
 @pytest.fixture(scope="module")
-def joint(campaign):
-    """All boards to first order."""
+def posed(campaign):
+    """Boards, priors and what they share."""
     boards = [one.prepared.board for one in campaign.problems]
-    return joint_of(boards, [one.prior for one in campaign.problems], campaign.shared)
+    return boards, [one.prior for one in campaign.problems], campaign.shared
 
 
 @pytest.fixture(scope="module")
-def listed(campaign, joint):
-    """What could be read next, for the sake of E_y."""
-    return readings(joint, [one.prior for one in campaign.problems], campaign.shared, Costs(), "E_y")
+def planner(posed):
+    """All boards to first order, for the sake of E_y."""
+    return Planner(beliefs_together(*posed), 1, "E_y")
 
 
-def test_a_board_whose_number_scatters_says_less_of_the_middle(campaign, joint):
+@pytest.fixture(scope="module")
+def listed(posed, planner):
+    """What could be read next."""
+    return planner.ranked(*posed[1:])
+
+
+def test_a_board_whose_number_scatters_says_less_of_the_middle(posed, planner):
     """Its precision and the variance of the scatter, joined as of a sum; not where nothing scatters."""
-    problem, alone = campaign.problems[0], joint.boards[0]
-    shared = tuple(replace(one, scatter=0.5) for one in campaign.shared)
-    scattered = board_in_joint(problem.prepared.board, problem.prior, shared)
-    width = expected_width(shared)
+    (board, *_), (prior, *_), shared = posed
+    alone = planner.beliefs.boards[0].pull
+    scattering = tuple(replace(one, scatter=0.5) for one in shared)
+    scattered = _linear(board, prior, scattering).known.pull
+    width = expected_width(scattering)
 
-    assert scattered.of_shared == pytest.approx(np.linalg.inv(np.linalg.inv(alone.of_shared) + np.diag(width**2)))
-    assert scattered.of_shared[0, 0] < 0.9 * alone.of_shared[0, 0]
+    assert scattered == pytest.approx(np.linalg.inv(np.linalg.inv(alone) + np.diag(width**2)))
+    assert scattered[0, 0] < 0.9 * alone[0, 0]
 
 
-def test_a_reading_counts_with_the_uncertainty_that_it_was_stated_with(campaign, joint):
-    problem = campaign.problems[0]
-    (setup,) = problem.prepared.board.setups
+def test_a_reading_counts_with_the_uncertainty_that_it_was_stated_with(posed):
+    """In the precision of the board: by hand, a row with its own variance in place of the noise alone."""
+    (board, *_), (prior, *_), shared = posed
+    (setup,) = board.setups
     first = setup.readings[0]
     rough = replace(first, frequency=Quantity.from_mean(first.frequency.mean, 0.03 * first.frequency.mean))
-    board = replace(problem.prepared.board, setups=(replace(setup, readings=(rough, *setup.readings[1:])),))
-    made = board_in_joint(board, problem.prior, campaign.shared)
+    made = replace(board, setups=(replace(setup, readings=(rough, *setup.readings[1:])),))
+    known, noise, precision = _linear(made, prior, shared)
 
-    assert made.variance(0)[0] - made.variance(0)[1] == pytest.approx(0.03**2, rel=0.01)
-    assert joint.boards[0].variance(0)[0] == joint.boards[0].variance(0)[1]
-
-
-def test_two_ways_to_know_one_size_better_are_not_proposed_together(joint):
-    row = np.ones((1, 3))
-    more, finer, other = (
-        Reading("size", "board-0", "", name, 1.0, (), values, np.ones(1))
-        for name, values in (("more", row), ("finer", row.copy()), ("another", 2.0 * row))
-    )
-
-    assert more.excludes(finer)
-    assert more.excludes(more)
-    assert not more.excludes(other)
-    assert not replace(more, what="modes").excludes(replace(finer, what="modes"))
+    (law,) = known.laws
+    rows = law.slopes[0, : law.station.n_old] @ known.columns
+    variance = np.full(len(rows), noise[0] ** 2)
+    variance[0] += np.log1p(0.03**2)
+    n = made.symmetry.n
+    own = np.diag([*np.zeros(n), *np.ones(len(precision) - n - len(shared)), *np.zeros(len(shared))])
+    assert precision == pytest.approx(own + rows.T @ (rows / variance[:, None]), rel=1e-3)
 
 
-def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(campaign, joint, listed):
-    found = [one.entry for one in benches(joint, listed)]
+def test_peaks_that_stand_by_a_mode_are_taken_for_it(posed):
+    """Two labels taken from a board: their peaks tell as much, and none of the two is proposed."""
+    (board, *_), (prior, *_), shared = posed
+    (setup,) = board.setups
+    peaks = tuple(Peak(one.frequency) for one in setup.readings[-2:])
+    bare = replace(board, setups=(replace(setup, readings=setup.readings[:-2], peaks=peaks),))
+    (law,) = _linear(bare, prior, shared).known.laws
+
+    assert law.station.n_old == len(setup.readings)
+    assert set(law.station.setup.labels[: law.station.n_old]) == set(setup.labels)
+    assert set(law.station.base.labels) == set(setup.labels)
+
+
+def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(posed, planner, listed):
+    found = [one.entry for one in benches(planner.beliefs, listed)]
 
     assert len(found) == 2
     for bench in found:
-        (asked,) = [one for one in listed if one.further and (one.board, one.setup) == (bench.board, bench.setup)]
-        assert {mode.label for mode in bench.modes} == set(asked.labels)
+        (asked,) = [one.entry for one in listed if (one.entry.board, one.entry.setup) == (bench.board, bench.setup)
+                    and one.entry.what in ("modes", "edges")]  # fmt: skip
+        assert {mode.label for mode in bench.modes} == set(asked.modes)
         assert all(mode.low_hz < mode.hz < mode.high_hz for mode in bench.modes)
         if asked.what == "edges":
             continue
-        board = next(one.prepared.board for one in campaign.problems if one.prepared.board.name == bench.board)
-        ((x, y),) = board.setups[0].attached[0].places
+        ((x, y),) = next(one for one in posed[0] if one.name == bench.board).setups[0].attached[0].places
         assert bench.sensor_mm == pytest.approx((1e3 * x, 1e3 * y), abs=25)  # the grid of places
 
 
-def test_boards_that_tell_most_may_be_held_another_way(joint, listed):
+def test_boards_that_tell_most_may_be_held_another_way(planner, listed):
     """What it leaves of the shared parameter, by a normal update by hand."""
-    other = [one for one in listed if one.what == "edges"]
-    order = sorted(joint.boards, key=lambda one: -np.trace(one.of_shared))
-    assert {one.board for one in other} == {one.board.name for one in order[:2]}
+    other = [one for one in listed if one.entry.what == "edges"]
+    beliefs = planner.beliefs
+    order = sorted(beliefs.boards, key=lambda one: -np.trace(one.pull))
+    assert {one.entry.board for one in other} == {one.board.name for one in order[:2]}
     for one in other:
-        assert one.sentence.startswith(f"Measure board {one.board} ")
-        assert one.cost == Costs().clamping + len(one.labels) * Costs().reading
-        place = [each.board.name for each in joint.boards].index(one.board)
-        law = joint.boards[place].laws[one.further.setup]
-        assert law.station.is_new
-        assert not joint.boards[place].was_read(one.further.setup).any()
-        noise = law.station.setup.noise.median
-        assert one.variance == pytest.approx(np.full(len(one.labels), noise**2))
-    one = other[0]
-    known = np.linalg.inv(joint.covariance) + one.rows.T @ (one.rows / one.variance[:, None])
-    before, after = (np.diagonal(joint.wanted @ c @ joint.wanted.T) for c in (joint.covariance, np.linalg.inv(known)))
-    of_shared, _, _ = joint.ratios(one.rows, one.variance)
-    assert of_shared == pytest.approx(np.sqrt(after / before)[: joint.n_shared])
+        assert one.entry.sentence.startswith(f"Measure board {one.entry.board} ")
+        assert one.entry.cost_minutes == Costs().clamping + len(one.entry.modes) * Costs().reading
+        assert one.read.law.station.is_new
+        assert one.read.again is None
+        noise = one.read.law.station.setup.noise.median
+        assert one.readings.variance[0][0] == pytest.approx(np.full(len(one.entry.modes), noise**2))
+    one, (now,) = other[0], beliefs.explanations
+    rows, variance = one.readings.slopes[0][0], one.readings.variance[0][0]
+    known = np.linalg.inv(now.covariance[0]) + rows.T @ (rows / variance[:, None])
+    wanted = now.wanted[0]
+    before, after = (np.diagonal(wanted @ c @ wanted.T) for c in (now.covariance[0], np.linalg.inv(known)))
+    of_shared = list(one.entry.gain.shared.values())
+    assert of_shared == pytest.approx(np.sqrt(after / before)[: len(of_shared)])
     assert of_shared[0] < 1.0
 
 
-def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, listed, tmp_path, monkeypatch):
+def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, tmp_path, monkeypatch):
     """Where modes are all that could be read, the best three are of three boards; two of them get a sheet."""
-    of_modes = tuple(one for one in listed if one.further)
-    monkeypatch.setattr("bayesplate.workflow.campaign_plan.readings", lambda *_: of_modes)
+    every = Planner.ranked
+    monkeypatch.setattr(
+        Planner, "ranked", lambda *given: tuple(one for one in every(*given) if one.entry.what in ("modes", "edges"))
+    )
     found = bayesplate.plan(campaign, goal="E_y", out=tmp_path / "out")
     asked = found.summary.sequences[-1].steps
 
@@ -147,20 +164,17 @@ def test_the_sheets_are_those_of_the_steps_that_are_proposed_together(campaign, 
     assert {"plan-bench.png", "plan-bench-2.svg"} <= {path.name for path in found.files}
 
 
-def test_the_band_of_a_mode_has_what_is_not_known_of_the_board_and_the_noise(joint, listed):
+def test_the_band_of_a_mode_has_what_is_not_known_of_the_board_and_the_noise(planner, listed):
     """Two times in three, so 0.967 standard deviations either way; of a board that were known, the noise alone."""
-    (reading, *_) = [one for one in listed if one.further]
-    known = replace(joint)
-    known.__dict__["covariance"] = np.zeros_like(joint.covariance)
-    widths = []
-    for one in (joint, known):
-        (bench,) = benches(one, [reading])
-        by_label = {mode.label: np.log(mode.high_hz / mode.low_hz) for mode in bench.entry.modes}
-        widths.append(np.array([by_label[label] for label in reading.labels]))
+    reading = next(one for one in listed if one.entry.what == "modes").readings
+    (now,) = planner.beliefs.explanations
+    known = replace(planner.beliefs, explanations=(replace(now, covariance=np.zeros_like(now.covariance)),))
+    of_both, of_noise = (np.diff(bands(one, reading)[:, [0, 2]])[:, 0] for one in (planner.beliefs, known))
 
-    assert widths[1] == pytest.approx(2.0 * 0.9674 * np.sqrt(reading.variance), rel=1e-3)
-    of_board = np.einsum("nu,uv,nv->n", reading.rows, joint.covariance, reading.rows)
-    assert widths[0] / widths[1] == pytest.approx(np.sqrt(1.0 + of_board / reading.variance))
+    rows, variance = reading.slopes[0][0], reading.variance[0][0]
+    assert of_noise == pytest.approx(2.0 * 0.9674 * np.sqrt(variance), rel=1e-3)
+    of_board = np.einsum("nu,uv,nv->n", rows, now.covariance[0], rows)
+    assert of_both / of_noise == pytest.approx(np.sqrt(1.0 + of_board / variance))
 
 
 def test_a_plan_without_modes_to_look_for_has_no_sheet(planned):

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ritz
-from made_boards import CANTILEVER_LABELS, board_of, setup_of
+from made_boards import CANTILEVER_LABELS, setup_of
 
-from bayesplate.diagnosis.evidence.hypotheses import Swap
+from bayesplate.planning.beliefs import AtHand, Explanation
 from bayesplate.planning.gains import Readings
-from bayesplate.planning.modes_read import REPEATED, _as_read, _given_first
+from bayesplate.planning.modes_read import REPEATED, _expected, given_first
 from bayesplate.plate.parameter import Owner
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import shared_share
@@ -30,13 +30,10 @@ FIRST, SECOND = 0.005, 0.003
 
 def once_more(setup, share, noise=SECOND):
     """Readings of one term, given the first."""
-    board = board_of(ritz.FINNISH, [setup])
     station = SimpleNamespace(base=setup, setup=setup, n_old=N)
     own = ReadingErrors.of(setup).own_variance
     alone = Readings((SHIFT[None],), (SLOPES[None],), ((noise**2 + own)[None],))
-    return _given_first(
-        SimpleNamespace(board=board), station, range(N), alone, [np.array([FIRST**2])], [np.array([share])]
-    )
+    return given_first(station, range(N), alone, [np.array([FIRST**2])], [np.array([share])])
 
 
 def test_both_days_tell_what_their_joint_covariance_says():
@@ -89,32 +86,37 @@ def test_the_same_day_once_more_tells_of_the_constants_no_more_than_better_readi
     assert (np.diagonal(after) < 1.001 * np.diagonal(of_mean)).all()
 
 
-def read_as(hypothesis):
-    """Shift and slopes of the readings at hand as an explanation takes them; one further mode, one known mass."""
-    baseline = SimpleNamespace(
-        board=SimpleNamespace(setups=(SimpleNamespace(name="other"), SETUP)), rows=np.arange(2, 4 + N),
-        setup_index=np.r_[0, 0, np.ones(N, dtype=int)],
+def read_as(taken):
+    """What is expected of the readings at hand as an explanation takes them; one further mode, one known mass."""
+    other = SimpleNamespace(name="other", readings=(None, None))
+    known = SimpleNamespace(columns=np.eye(1), board=SimpleNamespace(setups=(other, SETUP)))
+    at_hand = None
+    if taken is not None:
+        every = np.r_[0, 1, taken]
+        at_hand = AtHand(100.0 + every[None], 0.5 * every[None, :, None], every)
+    one = Explanation(
+        members=(), words="", probability=1.0, mean=np.zeros((1, 1)), covariance=np.eye(1)[None],
+        noise=np.full((1, 2), FIRST), middle=np.zeros((1, 0)), wanted=np.zeros((1, 0, 1)), again=at_hand,
     )  # fmt: skip
-    found = SimpleNamespace(ground=SimpleNamespace(baseline=baseline, hypotheses=(hypothesis,)))
-    law = SimpleNamespace(station=SimpleNamespace(base=SETUP, n_old=N, setup=SimpleNamespace(readings=range(N + 1))))
-    shift, slopes = np.arange(2.0 * (N + 1))[None], np.arange(N + 1.0)[None, :, None]
-    return _as_read(SimpleNamespace(hypothesis=0), law, found, shift, slopes)
+    solved = np.arange(2.0 * (N + 1)).reshape(2, -1)
+    station = SimpleNamespace(base=SETUP, n_old=N)
+    law = SimpleNamespace(station=station, middle=solved[0], solved=solved, slopes=np.arange(N + 1.0)[None, :, None])
+    return _expected(one, known, law)
 
 
 def test_where_labels_are_exchanged_each_peak_is_found_again_as_the_other_mode():
-    """With and without a known mass; of the further mode nothing changes."""
-    shift, slopes = read_as(SimpleNamespace(swap=Swap(3, 5), own=None))  # two readings of another setup come first
+    """With and without a known mass; of the further mode nothing changes. Two readings of another setup come first."""
+    shift, slopes = read_as(np.array([2, 5, 4, 3, 6, 7]))
 
-    taken = np.array([0, 3, 2, 1, 4, 5, 6])
-    assert shift[0] == pytest.approx(np.r_[taken, taken + N + 1])
-    assert slopes[0, :, 0] == pytest.approx(taken)
+    taken = np.array([0, 3, 2, 1, 4, 5])
+    assert shift[0] == pytest.approx(np.r_[102.0 + taken, N, taken + N + 1, 2 * N + 1])
+    assert slopes[0, : N + 1, 0] == pytest.approx(np.r_[1.0 + 0.5 * taken, N])
+    assert not slopes[0, N + 1 :].any()
 
 
 def test_a_reading_that_is_no_mode_or_an_unread_one_says_nothing_of_another_day():
-    own = SimpleNamespace(rows=np.array([2, 3, 5, 4, 30, -1, 8, 9]))
-    shift, _ = read_as(SimpleNamespace(swap=None, own=own))
+    shift, _ = read_as(np.array([3, 2, -1, -1, 6, 7]))
 
-    taken = np.array([1, 0, np.nan, np.nan, 4, 5, 6])
-    assert shift[0] == pytest.approx(np.r_[taken, taken + N + 1], nan_ok=True)
-    plain, _ = read_as(SimpleNamespace(swap=None, own=None))
-    assert plain[0] == pytest.approx(np.arange(2.0 * (N + 1)))
+    taken = np.array([1, 0, np.nan, np.nan, 4, 5])
+    assert shift[0] == pytest.approx(np.r_[102.0 + taken, N, taken + N + 1, 2 * N + 1], nan_ok=True)
+    assert read_as(None)[0][0] == pytest.approx(np.arange(2.0 * (N + 1)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import made_searches as made
 import numpy as np
@@ -11,9 +12,9 @@ import pytest
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.search import search
-from bayesplate.planning.beliefs import believed
+from bayesplate.planning.beliefs import Beliefs
+from bayesplate.planning.explained import asked, explanations_of, survivors
 from bayesplate.planning.gains import Readings, probabilities_after
-from bayesplate.planning.survivors import asked, survivors
 from bayesplate.plate.material import RIGIDITIES
 
 N_READ, N_MODES = 6, 9
@@ -58,20 +59,26 @@ def unmoved(one, direction):
     return replace(one, fine=raw)
 
 
-def further(found, beliefs, whole, directions):
-    """The last three modes as readings, each term in the cell that it stands for."""
+def believed(found, effects):
+    """What the search leaves to be believed of some effects."""
+    explanations = explanations_of(found, asked(found, effects), np.random.default_rng(1))
+    return Beliefs((SimpleNamespace(board=found.ground.baseline.board),), explanations)
+
+
+def further(beliefs, whole, directions):
+    """The last three modes as readings, each term linear about the size that it expects."""
     rows = slice(N_READ, N_MODES)
     shift, slopes, variance = [], [], []
     for one in beliefs.explanations:
-        table = found.ground.hypotheses[one.hypothesis].table
         moved = np.zeros((one.n_terms, N_MODES - N_READ))
         along = np.zeros((one.n_terms, N_MODES - N_READ, one.mean.shape[1]))
         along[:, :, : len(RIGIDITIES)] = whole.slopes[rows]
         if one.members:
-            z, step = table.z[one.cells, 0], table.z_slopes[one.cells, 0]
-            moved = np.outer(made.HALF_NORMAL.value(z), directions[one.members[0]][rows])
-            change = 0.5 * (made.HALF_NORMAL.value(z + step) - made.HALF_NORMAL.value(z - step))
-            along[:, :, -1] = np.outer(change, directions[one.members[0]][rows])
+            z, step = one.mean[:, -1], np.sqrt(one.covariance[:, -1, -1])
+            change = made.HALF_NORMAL.value(z + step) - made.HALF_NORMAL.value(z - step)
+            slope, direction = change / (2.0 * step), directions[one.members[0]][rows]
+            moved = np.outer(made.HALF_NORMAL.value(z) - slope * z, direction)
+            along[:, :, -1] = np.outer(slope, direction)
         shift.append(moved)
         slopes.append(along)
         variance.append(np.tile(one.noise**2, (1, N_MODES - N_READ)))
@@ -80,7 +87,7 @@ def further(found, beliefs, whole, directions):
 
 def test_probabilities_now_are_those_of_the_search(boards):
     found = boards[0][N_READ]
-    beliefs = believed(found, asked(found, NAMES), np.random.default_rng(1))
+    beliefs = believed(found, NAMES)
 
     by_name = {one.members: one.probability for one in beliefs.explanations}
     assert by_name == pytest.approx({(): found.none} | {(name,): found.inclusion(name) for name in NAMES})
@@ -90,27 +97,28 @@ def test_probabilities_now_are_those_of_the_search(boards):
 def test_after_further_modes_they_are_those_of_a_search_that_has_them(boards):
     """Terms stand for cells and levels, so that a few per cent remain; without the size in them it is off by far."""
     found, whole = boards[0][N_READ], boards[0][N_MODES]
-    beliefs = believed(found, asked(found, NAMES), np.random.default_rng(1))
-    readings = further(found, beliefs, boards[1], boards[2])
+    beliefs = believed(found, NAMES)
+    readings = further(beliefs, boards[1], boards[2])
     read = whole.residual[None, N_READ:]
 
     after = probabilities_after(beliefs, readings, read)[:, 0]
 
     wanted = [whole.none if not one.members else whole.inclusion(one.members[0]) for one in beliefs.explanations]
     assert after == pytest.approx(wanted, abs=0.03)
-    control = replace(readings, shift=tuple(np.zeros_like(one) for one in readings.shift))
+    without = tuple(np.where(np.arange(one.shape[2]) < len(RIGIDITIES), one, 0.0) for one in readings.slopes)
+    control = replace(readings, shift=tuple(np.zeros_like(one) for one in readings.shift), slopes=without)
     assert np.abs(probabilities_after(beliefs, control, read)[:, 0] - wanted).max() > 0.1
 
 
 def test_moduli_have_the_variance_of_the_weighted_fit_without_an_effect(boards):
     """Their logarithms are those of the rigidities but for constants, where nu_xy hardly matters."""
     found = boards[0][N_READ]
-    beliefs = believed(found, asked(found, ()), np.random.default_rng(1))
+    beliefs = believed(found, ())
     (one,) = beliefs.explanations
 
     slopes = found.ground.baseline.slopes
     wanted = [np.linalg.inv(slopes.T @ slopes) * noise[0] ** 2 for noise in one.noise]
-    drawn = one.to_moduli @ one.covariance @ np.swapaxes(one.to_moduli, 1, 2)
+    drawn = one.wanted @ one.covariance @ np.swapaxes(one.wanted, 1, 2)
     assert np.diagonal(drawn, axis1=1, axis2=2)[:, 2] == pytest.approx([w[2, 2] for w in wanted], rel=1e-6)
 
 
@@ -128,3 +136,17 @@ def test_survivors_are_those_within_a_factor_ten_and_no_effect(boards):
     assert left(0.01, 0.8, 0.1) == {("first",), ("second",)}
     assert left(0.01, 0.9, 0.01) == {("first",)}
     assert left(0.01, 0.9, 0.01, [("second",)]) == {("first",), ("second",)}
+
+
+def test_the_readings_at_hand_are_expected_where_the_search_has_them(boards):
+    """Given them each term expects the first readings but for what it leaves as noise, whatever the cell."""
+    found = boards[0][N_READ]
+    read = found.residual + found.ground.baseline.middle
+    for one in believed(found, NAMES).explanations:
+        expected = one.again.shift + np.einsum("tru,tu->tr", one.again.slopes, one.mean)
+        pull = np.einsum("tru,tr->tu", one.again.slopes, (read - expected) / one.noise**2)
+        assert list(one.again.taken) == list(range(N_READ))
+        # normal equations: what is left over does not lean on the constants, whose prior is flat
+        assert pull[:, : len(RIGIDITIES)] == pytest.approx(
+            0.0, abs=1e-6 * np.abs(read - expected).max() / made.NOISE**2
+        )

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bayesplate.planning.beliefs import Beliefs, Explanation
-from bayesplate.planning.gains import Readings, expected_gain, probabilities_after, together
-from bayesplate.plate.material import ORTHOTROPIC
+from bayesplate.planning.gains import GOALS, Readings, expected_gain, probabilities_after, together
+from bayesplate.plate.material import MODULI, ORTHOTROPIC
 
 SIGMA = 0.3
 
@@ -21,13 +22,12 @@ def explanation(mean=0.0, probability=1.0, variance=(4.0, 1.0, 0.25), n_terms=1,
     return Explanation(
         members=(words,), words=words, probability=probability, mean=means,
         covariance=np.tile(np.diag(variance), (n_terms, 1, 1)), noise=np.full((n_terms, 1), SIGMA),
-        log_moduli=np.zeros((n_terms, 3)), to_moduli=np.tile(np.eye(3), (n_terms, 1, 1)),
-        cells=np.zeros(n_terms, dtype=np.intp),
+        middle=np.zeros((n_terms, 3)), wanted=np.tile(np.eye(3), (n_terms, 1, 1)),
     )  # fmt: skip
 
 
 def beliefs(*explanations):
-    return Beliefs(SimpleNamespace(symmetry=ORTHOTROPIC), explanations, 0)
+    return Beliefs((SimpleNamespace(board=SimpleNamespace(symmetry=ORTHOTROPIC)),), explanations)
 
 
 def reading(of, row, variance=SIGMA**2, shift=0.0):
@@ -50,7 +50,7 @@ def test_what_is_linear_and_normal_is_exact():
     assert (gain.E_y, gain.G_xy) == (pytest.approx(1.0), pytest.approx(1.0))
     assert gain.information == pytest.approx(0.5 * np.log(4.0 / after), rel=1e-10)
     assert gain.constants == pytest.approx(gain.information / 3.0, rel=1e-10)
-    assert (gain.constants_error, gain.explanations_error) == (0.0, 0.0)
+    assert (gain.constants_error, gain.explanations, gain.explanations_error) == (0.0, None, None)
 
 
 def test_readings_together_have_half_the_log_determinant_of_what_all_say():
@@ -147,3 +147,26 @@ def test_a_known_constant_added_to_a_reading_changes_nothing():
 
     assert moved.explanations == pytest.approx(plain.explanations, abs=1e-9)
     assert moved.E_x == pytest.approx(plain.E_x, abs=1e-9)
+
+
+def test_a_score_is_what_was_asked_for():
+    """Of a board the doubt and the mean of all three; where boards share something, the mean of that."""
+    now = beliefs(explanation(0.0, 0.5), explanation(3.0, 0.5))
+    one, rng = reading(now, [1, 0.5, 0]), np.random.default_rng
+    found = {goal: expected_gain(now, one, rng(1), goal) for goal in (*GOALS, None)}
+
+    for name in MODULI:
+        assert found[name].score == pytest.approx(-np.log(getattr(found[name], name)))
+    assert found["constants"].score == found["constants"].constants
+    assert found["constants"].constants == pytest.approx(np.mean([found[name].score for name in MODULI]))
+    assert found["explanations"].score == found["explanations"].explanations
+    assert found[None].score == pytest.approx(found["explanations"].score + found["constants"].score)
+    shared = replace(now, shared=("one",), explanations=tuple(with_one_more(each) for each in now.explanations))
+    gain = expected_gain(shared, one, rng(1), None, 4.0)
+    assert gain.score == pytest.approx(gain.explanations - np.log(gain.shared["one"]))
+    assert gain.score_per_minute == pytest.approx(gain.score / 4.0)
+
+
+def with_one_more(one):
+    """The same with the first constant, under another name, before the three."""
+    return replace(one, middle=one.middle[:, [0, 0, 1, 2]], wanted=one.wanted[:, [0, 0, 1, 2]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesplate.planning.places import effective_independence, placing
+from bayesplate.planning.places import placing
 
 GRID = np.linspace(0.0, 1.0, 25)
 
@@ -43,13 +43,6 @@ def test_a_sensor_that_stands_on_a_nodal_line_is_told():
     assert found.seen[0] > 0.6  # the hammer goes where it helps those that can be seen
     assert found.seen[1] == pytest.approx(0.0, abs=1e-12)
     assert not found.are_all_seen
-
-
-def test_effective_independence_keeps_places_that_tell_figures_apart():
-    """Of five places two see the first figure alone, two the second alone, and one sees them both alike."""
-    shapes = np.array([[1.0, 0.0], [0.3, 0.0], [0.0, 1.0], [0.0, 0.3], [0.2, 0.2]])
-
-    assert set(effective_independence(shapes, 2)) == {0, 2}
 
 
 def test_taps_tell_all_figures_apart():

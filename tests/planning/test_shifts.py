@@ -1,4 +1,4 @@
-"""What an effect does between the sizes at which it was solved: polynomials through as many nodes as there are."""
+"""What an effect does between the sizes at which it is solved: a parabola along each, and a line for every term."""
 
 from __future__ import annotations
 
@@ -7,40 +7,78 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.shifts.tables import cells_along
-from bayesplate.planning.shifts import _along, _lagrange, _middle
+from bayesplate.planning import shifts as home
+from bayesplate.planning.beliefs import Explanation, FormTerms
+from bayesplate.quantities import Quantity
+
+N_TERMS = 12
+LINEAR, SQUARE = np.array([[0.02, -0.01], [0.003, 0.004]]), np.array([[0.001, 0.002], [-0.001, 0.0]])
+"""Of two sizes, on two modes."""
+OF_CONSTANTS = 0.05
 
 
-@pytest.mark.parametrize("n", [1, 2, 3])
-def test_a_polynomial_of_the_order_that_the_nodes_allow_comes_out(n):
-    at, value = np.array([-1.0, 0.5, 2.0])[:n], np.linspace(-1.0, 2.0, 7)
-    weights = _lagrange(at, value)
-
-    for power in range(n):
-        assert weights @ at**power == pytest.approx(value**power)
-    assert weights.sum(axis=1) == pytest.approx(1.0)
+def exact(sizes, constants):
+    return sizes @ LINEAR + sizes**2 @ SQUARE + OF_CONSTANTS * constants[0] * np.ones(2)
 
 
-def table(n_parameters, n_cells):
-    axis = np.linspace(-1.0, 1.0, n_cells) if n_cells > 1 else np.zeros(1)
-    z = np.stack(np.meshgrid(*[axis] * n_parameters, indexing="ij"), axis=-1).reshape(-1, n_parameters)
-    return SimpleNamespace(form=np.zeros(len(z), dtype=int), z=z)
+@pytest.fixture
+def added(monkeypatch):
+    """Terms of one constant and two sizes, at which the constant stands by the sizes; and what is added to them."""
+    rng = np.random.default_rng(3)
+    sizes = rng.normal(0.3, 0.5, (N_TERMS, 2))
+    mean = np.column_stack([0.1 + sizes @ [0.2, -0.1], sizes])
+    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    parameters = tuple(SimpleNamespace(name=name, prior=prior) for name in "ab")
+    form = FormTerms(np.arange(N_TERMS), None, ("made",) * 2, parameters, np.array([1, 2]))
+    one = Explanation(
+        members=("made",), words="", probability=1.0, mean=mean, covariance=np.tile(0.01 * np.eye(3), (N_TERMS, 1, 1)),
+        noise=np.ones((N_TERMS, 1)), middle=np.zeros((N_TERMS, 0)), wanted=np.zeros((N_TERMS, 0, 3)), forms=(form,),
+    )  # fmt: skip
+    asked = []
+
+    def solved(known, law, form, sizes, constants):
+        asked.append(sizes)
+        return exact(sizes, constants)
+
+    monkeypatch.setattr(home, "_beside", solved)
+    known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
+    shift, slopes = np.zeros((N_TERMS, 2)), np.zeros((N_TERMS, 2, 3))
+    home.add_effects(one, known, SimpleNamespace(middle=np.zeros(2)), shift, slopes)
+    return mean, shift, slopes, asked
 
 
-@pytest.mark.parametrize(("n_parameters", "n_cells"), [(1, 9), (2, 5), (6, 2), (9, 1)])
-def test_nodes_along_a_parameter_are_distinct_however_few_cells_there_are(n_parameters, n_cells):
-    """Six setups with a size of their own each leave two cells along each, nine leave one."""
-    made = table(n_parameters, n_cells)
-    for peak in (0, len(made.z) // 2, len(made.z) - 1):
-        shares = np.full(len(made.z), 1e-12)
-        shares[peak] = 1.0
-        for j in range(n_parameters):
-            found = _along(made, shares / shares.sum(), 0, j)
-            values = made.z[found, j]
-            assert len(found) == min(n_cells, 3)
-            assert (np.diff(values) > 0).all()
-            assert 0 <= _middle(found) < len(found)
+def test_each_term_is_linear_about_its_own_place_on_the_parabola(added):
+    mean, shift, slopes, asked = added
+    inside = np.all([(one >= np.min(asked, axis=0)) & (one <= np.max(asked, axis=0)) for one in mean[:, 1:]], axis=1)
+    expected = shift + np.einsum("tnu,tu->tn", slopes, mean)
+
+    wanted = np.stack([exact(one[1:], one[:1]) for one in mean])
+    assert inside.sum() > N_TERMS // 2
+    assert expected[inside] == pytest.approx(wanted[inside], abs=1e-12)
+    of_constants = OF_CONSTANTS * np.array([[0.2], [-0.1]])
+    along = LINEAR + 2.0 * mean[:, 1:, None] * SQUARE + of_constants
+    assert slopes[inside][:, :, 1:] == pytest.approx(np.swapaxes(along, 1, 2)[inside], abs=1e-12)
+    assert not slopes[:, :, 0].any()
 
 
-def test_so_few_cells_do_occur():
-    assert [cells_along(n, (17, 9, 256)) for n in (6, 9)] == [2, 1]
+def test_two_solutions_along_each_size_and_one_in_the_middle_are_all_it_takes(added):
+    assert len(added[3]) == 5
+
+
+def test_a_mode_that_is_lost_to_one_side_goes_on_straight_and_what_a_mass_adds_to_it_is_not_told(monkeypatch):
+    """One mode and one spot, one size; the mode has lost its name where the effect is large."""
+    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    form = FormTerms(np.arange(3), None, ("made",), (SimpleNamespace(name="a", prior=prior),), np.array([1]))
+    mean = np.column_stack([np.zeros(3), [-0.5, 0.0, 0.5]])
+    one = Explanation(
+        members=("made",), words="", probability=1.0, mean=mean, covariance=np.tile(0.01 * np.eye(2), (3, 1, 1)),
+        noise=np.ones((3, 1)), middle=np.zeros((3, 0)), wanted=np.zeros((3, 0, 2)), forms=(form,),
+    )  # fmt: skip
+    monkeypatch.setattr(home, "_beside", lambda *a: np.full(2, np.nan if a[3][0] > 0.2 else 0.1 * a[3][0]))
+    known = SimpleNamespace(board=SimpleNamespace(symmetry=SimpleNamespace(n=1)))
+    shift, slopes = np.zeros((3, 2)), np.zeros((3, 2, 2))
+
+    home.add_effects(one, known, SimpleNamespace(middle=np.zeros(1)), shift, slopes)
+
+    assert shift[:, 0] + slopes[:, 0, 1] * mean[:, 1] == pytest.approx(0.1 * np.clip(mean[:, 1], -0.47, 0.47))
+    assert np.isnan(shift[:, 1]).all()

@@ -12,11 +12,12 @@ from generator.plate import Plate
 from made_boards import setup_of
 
 from bayesplate.cards import load_prior
-from bayesplate.planning.assembled import bench_of
-from bayesplate.planning.before import prior_beliefs
+from bayesplate.planning.beliefs import KnownBoard
+from bayesplate.planning.bench import bench_of
+from bayesplate.planning.laws import PLACED, SolvedStation, bare_law, known_mass
 from bayesplate.planning.modes_read import station_readings
-from bayesplate.planning.station_laws import PLACED, SolvedStation, bare_law, known_mass
-from bayesplate.planning.stations import stations
+from bayesplate.planning.stations import new_stations, old_stations
+from bayesplate.planning.unmeasured import prior_beliefs
 from bayesplate.plate.board import made_board
 from bayesplate.plate.material import rigidities
 from bayesplate.plate.sessions import unknown_discrepancies, with_discrepancies
@@ -39,6 +40,10 @@ def values():
     inputs = {name: np.asarray(value) for name, value in SIZES.items()}
     found = rigidities(*(np.asarray(MODULI[n]) for n in ("E_x", "E_y", "G_xy")), inputs["thickness"], np.asarray(0.4))
     return {**inputs, **found._asdict()}
+
+
+def stations(board, values):
+    return [*old_stations(board, values), *new_stations(board, values)]
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +102,7 @@ def test_a_mode_that_no_session_read_departs_from_the_plate_as_one_that_was_read
     new = station.setup.readings[station.n_old]
     read = with_discrepancies(replace(held, setups=tuple(replace(d, readings=(*d.readings, new)) for d in days)))
     at = read.nominal() | values()
-    slopes = bare_law(read, next(one for one in stations(read, at) if one.goes_on(read)), at).slopes
+    slopes = bare_law(read, next(one for one in old_stations(read, at) if one.goes_on(read)), at).slopes[0]
     column = 3 + [one.key for one in read.uncertain].index(f"discrepancy {new.label}")
 
     unknown = unknown_discrepancies(held, station.setup)
@@ -110,9 +115,10 @@ def test_planned_readings_carry_it():
     made = board(FREE)
     days = tuple(replace(made.setups[0], name=name) for name in ("monday", "friday"))
     held = with_discrepancies(replace(made, setups=days))
-    believed, at = prior_beliefs(held, load_prior("spruce"), np.random.default_rng(1))
-    last = next(one for one in stations(held, at) if one.goes_on(held))
-    further = station_readings(believed, bare_law(held, last, at), np.random.default_rng(1)).further
+    believed = prior_beliefs(held, load_prior("spruce"), np.random.default_rng(1))
+    (known,) = believed.boards
+    law = next(one for one in known.laws if one.station.goes_on(held))
+    last, further = law.station, station_readings(believed, known, law, np.random.default_rng(1)).further
     noise = believed.explanations[0].noise[:, 1] ** 2
 
     assert further.variance[0] - noise[:, None] == pytest.approx(
@@ -188,7 +194,7 @@ def test_the_sheet_shows_every_mode_that_is_to_be_found_and_the_sensor_alone_as_
     rows = range(station.n_old, len(station.setup.readings))
     law = bare_law(read, station, values())
     ends = law.solved[0, list(rows), None] + np.array([-0.01, 0.0, 0.01])
-    bench = bench_of(read, law, rows, ends, values(), "", goes_on=True).entry
+    bench = bench_of(KnownBoard(read, values(), (law,), np.eye(3)), law, rows, ends, "").entry
 
     assert len(beams) == 20
     assert {one.label for one in bench.modes} == {str(station.setup.labels[i]) for i in rows}

@@ -16,8 +16,9 @@ def asked(monkeypatch):
     kept = []
     monkeypatch.setattr("bayesplate.workflow.diagnose.wrong_reading", lambda _: "Read (1,1) again.")
     monkeypatch.setattr("bayesplate.workflow.diagnose.survivors", lambda _, rivals: kept.append(rivals) or ())
-    plan = SimpleNamespace(first="Measure more.")
-    monkeypatch.setattr("bayesplate.workflow.diagnose.drawn_up", lambda *_, **__: plan)
+    monkeypatch.setattr("bayesplate.workflow.diagnose.believed", lambda *_: None)
+    monkeypatch.setattr("bayesplate.workflow.diagnose.Planner", lambda *_: SimpleNamespace(ranked=tuple))
+    monkeypatch.setattr("bayesplate.workflow.diagnose.first_of", lambda *_: "Measure more.")
     return kept
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ from bayesplate.diagnosis.evidence.known import known_fit
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
-from bayesplate.planning.before import prior_beliefs
+from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Readings, expected_gain
+from bayesplate.planning.unmeasured import prior_explanation
 from bayesplate.plate.material import isotropic_moduli, moduli, rigidities
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import as_json
@@ -147,11 +149,11 @@ def test_a_plate_clamped_all_round_does_not_tell_its_poisson_ratio():
 def test_a_reading_to_come_informs_of_one_modulus():
     """Of moduli that follow from one it is that one's information: half the log of how its variance shrinks."""
     problem = bayesplate.Problem.from_card(sheet({(2, 0): 144.0}))
-    beliefs, _ = prior_beliefs(problem.prepared.board, problem.prior, np.random.default_rng(0))
-    (one,) = beliefs.explanations
+    one = prior_explanation(problem.prepared.board, problem.prior, np.random.default_rng(0))
+    beliefs = Beliefs((SimpleNamespace(board=problem.prepared.board),), (one,))
     n = one.n_terms
     reading = Readings((np.zeros((n, 1)),), (np.full((n, 1, 1), 0.5),), (np.full((n, 1), 0.01**2),))
-    found = expected_gain(beliefs, reading, np.random.default_rng(0), 64)
+    found = expected_gain(beliefs, reading, np.random.default_rng(0), n_draws=64)
     before, after = np.log(20.0) ** 2, 1.0 / (np.log(20.0) ** -2 + (0.5 / 0.01) ** 2)
 
     assert one.covariance[0] == pytest.approx(np.array([[before]]))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_boards import setup_of
 
-from bayesplate.planning.inputs_read import GRID, MORE, measurements
+from bayesplate.planning.sizes_read import GRID, MORE, measurements
 from bayesplate.plate.board import made_board
 from bayesplate.plate.random_field import THICKNESS, PlacedReadings, Surface, conditioned, sd_after
 from bayesplate.quantities import Quantity

@@ -1,14 +1,15 @@
-"""What a station teaches: its modes and how they change with constants, inputs, and a known mass on the board."""
+"""The modes of a station: how they change with constants, inputs, and a known mass on the board."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.effects.attached_items import board_mass
+from bayesplate.errors import BayesplateError
 from bayesplate.estimates.refit import sensitivities
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
@@ -80,62 +81,39 @@ class SolvedStation:
 
     @property
     def off_place(self) -> Floats:
-        """Standard deviation of what a known mass at each spot adds, for it is not put quite there.
-
-        An (n_spots, n_modes) array.
-        """
+        """Standard deviation of what a known mass adds, for it stands off its spot: (n_spots, n_modes) array."""
         variance = np.zeros((len(self.station.spots), len(self.modes.eigenvalues)))
         for axis, side in enumerate(vibrating_lengths(self.values, self.station.setup)):
             step = np.eye(2)[axis] * PLACED / float(np.ravel(side)[0])
-            far, near = (
-                self._added([(s + sign * step[0], t + sign * step[1]) for s, t in self.station.spots])
-                for sign in (1.0, -1.0)
-            )
+            spots = np.reshape(self.station.spots, (-1, 2))
+            far, near = (self._added(spots + sign * step) for sign in (1.0, -1.0))
             variance += (0.5 * (far - near)) ** 2
         return np.sqrt(variance[:, self.rows])
 
-    def _added(self, spots: Sequence[tuple[float, float]]) -> Floats:
+    def _added(self, spots: Sequence[tuple[float, float]] | Floats) -> Floats:
         """What a known mass at each of some spots adds to ln f of each mode: (n_spots, n_modes) array.
 
         Solved among the modes at hand, and the rigid motions of a free board, whose shapes it mixes.
         """
-        added = np.empty((len(spots), len(self.modes.eigenvalues)))
+        from scipy.linalg import eigh
+        from scipy.optimize import linear_sum_assignment
+
+        eigenvalues = self.modes.eigenvalues
+        added = np.empty((len(spots), len(eigenvalues)))
         for row, (s, t) in zip(added, spots, strict=True):
             moved = self.modes.displacement(np.array([s]), np.array([t]))[:, 0, 0]
             rigid = [1.0, np.sqrt(12.0) * (s - 0.5), np.sqrt(12.0) * (t - 0.5)] if self.station.setup.is_free else []
-            row[:] = with_point_mass(self.modes.eigenvalues, moved, np.array(rigid), self.share)
-        return added
+            at, squared = np.r_[rigid, moved], np.r_[np.zeros(len(rigid)), eigenvalues]
+            found, shapes = eigh(np.diag(squared), np.eye(at.size) + self.share * np.outer(at, at))
+            _, same = linear_sum_assignment(shapes**2, maximize=True)
+            row[:] = 0.5 * np.log(found[same[len(rigid) :]])
+        return added - 0.5 * np.log(eigenvalues)
 
 
 def known_mass(board: Board) -> float:
     """A weight of a set that has about a fiftieth of the board's mass, kg."""
     wanted = _SHARE * board_mass(board)
     return min(_HANDY, key=lambda one: abs(np.log(one / wanted)))
-
-
-def with_point_mass(eigenvalues: Floats, moved: Floats, rigid: Floats, share: float) -> Floats:
-    """What a point mass adds to ln f of each mode, solved among them: (n_modes,) array.
-
-    Parameters
-    ----------
-    eigenvalues : (n_modes,) array
-        omega^2, s^-2.
-    moved : (n_modes,) array
-        Mass-normalised deflection of each at the place.
-    rigid : (n_rigid,) array
-        That of the motions without stiffness.
-    share : float
-        The mass over that of what vibrates.
-    """
-    from scipy.linalg import eigh
-    from scipy.optimize import linear_sum_assignment
-
-    at = np.concatenate([rigid, moved])
-    squared = np.concatenate([np.zeros(rigid.size), eigenvalues])
-    found, shapes = eigh(np.diag(squared), np.eye(at.size) + share * np.outer(at, at))
-    rows, columns = linear_sum_assignment(shapes**2, maximize=True)
-    same = found[columns[np.argsort(rows)]][rigid.size :]
-    return np.asarray(0.5 * np.log(same / eigenvalues))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +127,9 @@ class BareLaw:
         Of `SolvedStation.bare_and_added`, at the estimate.
     middle : (n_modes,) array
         ln f (Hz) with the inputs at the middle of their priors.
-    slopes : (n_modes, n_constants + n_inputs) array
-        By the logarithms of the free rigidities and the inputs' standard coordinates.
+    slopes : (n_plates, n_modes, n_constants + n_inputs) array
+        By the logarithms of the free rigidities and the inputs' standard coordinates, at the estimate; where nothing
+        was read, at plates drawn from the prior.
     off_place : (n_spots, n_modes) array
         Of `SolvedStation`, at the estimate.
     """
@@ -162,7 +141,7 @@ class BareLaw:
     off_place: Floats
 
 
-def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> BareLaw:
+def bare_law(board: Board, station: Station, values: Values, drawn: Sequence[Values] = ()) -> BareLaw:
     """Solve a station at an estimate.
 
     Parameters
@@ -170,13 +149,30 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
     board : Board
     station : Station
     values : dict of float
-        Rigidities and the board's inputs.
+        Rigidities and the board's inputs, SI.
+    drawn : sequence of dict of float
+        Plates at which the slopes are taken instead; one on which a mode is not to be found is passed over.
 
     Raises
     ------
     KeyError
-        If one of its modes is no mode of the plate.
+        If one of its modes is no mode of the plate at the estimate.
     """
+    slopes, inputs, offset = _linear(board, station, values)
+    found = SolvedStation.of(station, board, values)
+    solved, n = found.bare_and_added, board.symmetry.n
+    middle = solved[0] + offset - slopes[:, n:] @ inputs
+    others = []
+    for one in drawn:
+        try:
+            others.append(_linear(board, station, one)[0])
+        except (KeyError, BayesplateError):
+            continue
+    return BareLaw(station, solved, middle, np.stack(others or [slopes]), found.off_place)
+
+
+def _linear(board: Board, station: Station, values: Values) -> tuple[Floats, Floats, Floats]:
+    """Slopes of ln f by constants and inputs, the inputs, and how far the board is off its plate: at some values."""
     parameters = Parameters(board)
     n = parameters.n_constants
     centre = parameters.theta(values, np.array([setup.noise.median for setup in board.setups]))
@@ -190,9 +186,6 @@ def bare_law(board: Board, station: Station, values: Mapping[str, Floats]) -> Ba
 
     start = centre[parameters.fitted_columns]
     slopes = sensitivities(Predictor(at, [model], "linear"), start)
-    found = SolvedStation.of(station, board, values)
-    solved = found.bare_and_added
-    there = solved[0] + model.discrepancies(at(start[None, :]))[0]
     of_inputs, inputs = under_prior_scales(board, values, slopes[:, n:], start[n:])
     every = np.concatenate([slopes[:, :n], of_inputs], axis=1)
-    return BareLaw(station, solved, there - of_inputs @ inputs, every, found.off_place)
+    return every, inputs, model.discrepancies(at(start[None, :]))[0]

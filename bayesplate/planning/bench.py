@@ -1,0 +1,138 @@
+"""What to do at the bench: the modes to look for, and where sensor and hammer go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.effects import Effect
+from bayesplate.effects.attached_items import fractions_on, places_on
+from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, points, sheet
+from bayesplate.frequencies.prior_bands import WITHIN
+from bayesplate.planning.beliefs import Beliefs, KnownBoard
+from bayesplate.planning.gains import Readings
+from bayesplate.planning.laws import BareLaw
+from bayesplate.planning.places import Placing, placing
+from bayesplate.planning.plan import BenchEntry, ModeToFind
+from bayesplate.planning.proposals import Proposal
+from bayesplate.planning.stations import SEARCHED, Station
+from bayesplate.plate.board import Board
+
+Floats = NDArray[np.float64]
+
+BAND = (WITHIN[0], 0.5, WITHIN[1])
+"""Probabilities of the ends of a band and of its middle."""
+_EVERY = 5
+"""Of the grid of a sheet: so far apart places for sensor and hammer are tried."""
+_MOST = 2
+_LEVELS = 401
+"""Equally probable readings that stand for each term."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What to do at the bench for one way to hold the board.
+
+    Attributes
+    ----------
+    entry : BenchEntry
+    sheet : Sheet
+        Of the modes to look for alone.
+    placing : Placing
+    """
+
+    entry: BenchEntry
+    sheet: Sheet
+    placing: Placing
+
+
+def benches(beliefs: Beliefs, steps: Sequence[Proposal]) -> tuple[Bench, ...]:
+    """For each way to hold a board that proposals ask for, two at most, the modes to look for."""
+    likely = "over all explanations that survive" if len(beliefs.explanations) > 1 else "by what is known now"
+    made: list[Bench] = []
+    for one in steps:
+        if one.known is not None and one.read is not None and one.entry.what != "again" and len(made) < _MOST:
+            made.append(bench_of(one.known, one.read.law, one.rows, bands(beliefs, one.readings), likely))
+    return tuple(made)
+
+
+def bands(beliefs: Beliefs, readings: Readings, within: Sequence[float] = BAND) -> Floats:
+    """Where each reading will lie, over all explanations: (n, n_within) array in the unit of the readings.
+
+    Parameters
+    ----------
+    beliefs : Beliefs
+    readings : Readings
+    within : sequence of float
+        Probabilities.
+    """
+    from scipy.special import ndtri
+
+    levels = ndtri((np.arange(_LEVELS) + 0.5) / _LEVELS)[:, None, None]
+    drawn, weights = [], []
+    for k, one in enumerate(beliefs.explanations):
+        slopes = readings.slopes[k]
+        variance = np.einsum("tnu,tuv,tnv->tn", slopes, one.covariance, slopes) + readings.variance[k]
+        expected = readings.shift[k] + np.einsum("tnu,tu->tn", slopes, one.mean)
+        drawn.append((expected + np.sqrt(variance) * levels).reshape(-1, readings.n))
+        weights.append(np.full(len(drawn[-1]), one.probability / len(drawn[-1])))
+    values, shares = np.concatenate(drawn), np.concatenate(weights)
+    ends = np.empty((readings.n, len(within)))
+    for i, order in enumerate(np.argsort(values, axis=0).T):
+        ends[i] = np.interp(within, np.cumsum(shares[order]) - 0.5 * shares[order], values[order, i])
+    return ends
+
+
+def bench_of(known: KnownBoard, law: BareLaw, rows: Sequence[int], ends: Floats, likely: str) -> Bench:
+    """The sheet for some modes of a board; the sensor stands where it stood in a session that goes on.
+
+    Parameters
+    ----------
+    known : KnownBoard
+    law : BareLaw
+    rows : sequence of int
+        Which of its modes.
+    ends : (n_rows, 3) array
+        ln of the frequencies (Hz) at the probabilities of `BAND`.
+    likely : str
+        By what the bands are judged.
+    """
+    board, station = known.board, law.station
+    system = station.system(board)
+    numbers = (*NUMBERS_OF_MODES, SEARCHED)
+    drawn = sheet(board, system, station.values(system, known.values), "where they are expected", numbers=numbers)
+    by_name = {mode.name: mode for mode in drawn.modes}
+    wanted = [str(station.setup.labels[i]) for i in rows]
+    there = [(by_name[name], end) for name, end in zip(wanted, np.exp(ends), strict=True) if name in by_name]
+    shown = tuple(
+        replace(mode, hertz=float(end[1]), measured_hz=None, band_hz=(float(end[0]), float(end[2])))
+        for mode, end in sorted(there, key=lambda pair: float(pair[1][1]))
+    )
+    shapes = np.stack([mode.shape[::_EVERY, ::_EVERY] for mode in shown])
+    sensor = None if station.is_new else _sensor(board, station, drawn, system.shaped)
+    placed = placing(shapes, points()[::_EVERY], sensor)
+    seen_at = (drawn.drawn_at(*place) for place in (placed.sensor, placed.hammer, *placed.taps))
+    stated = seen_at if system.shaped is None else (system.shaped.as_stated(*place) for place in seen_at)
+    marks = places_on(board, station.setup, tuple(stated))
+    at_sensor, at_hammer, *taps = ((round(1e3 * x), round(1e3 * y)) for x, y in marks)
+    modes = tuple(
+        ModeToFind(mode.name, mode.hertz, *(mode.band_hz or (0.0, 0.0)), seen)
+        for mode, seen in zip(shown, placed.seen, strict=True)
+    )
+    edges = dict(station.setup.edges)
+    entry = BenchEntry(board.name, station.setup.name, edges, at_sensor, at_hammer, tuple(taps), modes)
+    return Bench(entry, replace(drawn, modes=shown, combined=(), likely=likely), placed)
+
+
+def _sensor(board: Board, station: Station, drawn: Sheet, shaped: Effect | None) -> tuple[float, float] | None:
+    """Where the one sensor stands, as fractions of what vibrates; None where there is none, or there are several."""
+    if station.base.sensor is None:
+        return None
+    ((x, y),) = fractions_on(board, station.setup, (station.base.sensor,))
+    if shaped is not None:
+        x, y = shaped.placed(x, y)
+    low, high = drawn.drawn_at(x, 0.0)[1], drawn.drawn_at(x, 1.0)[1]
+    return x, (y - low) / (high - low)
