@@ -13,13 +13,20 @@ from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import shared_name
 from bayesplate.plate.material import MODULI
 from bayesplate.plate.parameter import unit_of_people
-from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREY,
+    LIGHT,
+    ORANGE,
     ROW,
+    SKY,
+    VERMILLION,
     Picture,
     drawable,
     heading,
+    in_figure,
     in_rows,
     key,
     legend_below,
@@ -28,7 +35,6 @@ from bayesplate.report.style import (
     stacked,
     whisker,
 )
-from bayesplate.report.symbols import in_figure
 from bayesplate.results.contract import Spread
 from bayesplate.results.words import GPA, interval, plus_minus
 

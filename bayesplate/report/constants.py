@@ -9,9 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
-from bayesplate.report.colours import PAPER, POSTERIOR, WEIGHTED
-from bayesplate.report.style import WORDS, Picture, heading, hump, legend_below, limits, plain_axes, stacked
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.style import (
+    PAPER,
+    POSTERIOR,
+    WEIGHTED,
+    WORDS,
+    Picture,
+    heading,
+    hump,
+    in_figure,
+    legend_below,
+    limits,
+    plain_axes,
+    stacked,
+)
 from bayesplate.results.summary import Percentile, Summary
 from bayesplate.results.words import GPA, STIFFNESS, STIFFNESS_OF_ISOTROPIC, interval, plus_minus
 

@@ -14,11 +14,9 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.report.colours import BLACK, ORANGE, POSTERIOR
 from bayesplate.report.priors import input_words
 from bayesplate.report.saving import drawing, save_figure
-from bayesplate.report.style import SMALL, WIDTH, Picture, limits, short
-from bayesplate.report.symbols import in_figure, is_symbol
+from bayesplate.report.style import BLACK, ORANGE, POSTERIOR, SMALL, WIDTH, Picture, in_figure, is_symbol, limits, short
 from bayesplate.results.budget import input_shares
 from bayesplate.results.words import GPA
 

@@ -11,9 +11,22 @@ import numpy as np
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
 from bayesplate.plate.material import MODULI
-from bayesplate.report.colours import BLUE, DARK, GREEN, LIGHT, ORANGE, SKY, VERMILLION
-from bayesplate.report.style import SMALL, Picture, drawable, heading, legend_below, placed
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    SKY,
+    SMALL,
+    VERMILLION,
+    Picture,
+    drawable,
+    heading,
+    in_figure,
+    legend_below,
+    placed,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,13 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI
-from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    LIGHT,
+    ORANGE,
+    SKY,
     SMALL,
+    VERMILLION,
     Picture,
     drawable,
     heading,
+    in_figure,
     in_rows,
     key,
     legend_below,
@@ -25,7 +33,6 @@ from bayesplate.report.style import (
     stacked,
     whisker,
 )
-from bayesplate.report.symbols import in_figure
 from bayesplate.results.grading import Grading
 from bayesplate.results.grading_table import best_first, marked
 from bayesplate.results.log_figures import FIGURES
@@ -180,7 +187,7 @@ def pairs_picture(graded: Grading) -> Picture:
             apart, spread = float(mean[1] - mean[0]), _NINETY * float(np.sqrt((sd**2).sum()))
             ends = 100.0 * np.expm1(apart + spread * np.array([-1.0, 0.0, 1.0]))
             whisker(panel, row + step, tuple(ends), *_STYLES[name])
-        panel.annotate(percent(pair.probability), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
+        panel.annotate(str(percent(pair.probability)), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
                        va="center", fontsize=SMALL, weight="bold", annotation_clip=False)  # fmt: skip
     for width in sorted({graded.request.match_percent.get(name, 0.0) for name in names}):
         panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)

@@ -6,9 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.posterior.inference import Inference
-from bayesplate.report.colours import BLUE, GREEN, LIGHT, ORANGE, VERMILLION
-from bayesplate.report.style import SMALL, Picture, legend_below, limits, stacked
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.style import (
+    BLUE,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    SMALL,
+    VERMILLION,
+    Picture,
+    in_figure,
+    legend_below,
+    limits,
+    stacked,
+)
 
 _COLOURS = (BLUE, ORANGE, GREEN, VERMILLION)
 _MOST_POINTS = 240

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Histogram, NullControlSummary
-from bayesplate.report.colours import BLUE, DARK, LIGHT, VERMILLION
-from bayesplate.report.style import SMALL, Picture, legend_below, stacked
+from bayesplate.report.style import BLUE, DARK, LIGHT, SMALL, VERMILLION, Picture, legend_below, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,9 +14,8 @@ from bayesplate.estimates.percentile import PercentileEstimate, percentile_estim
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.report.colours import PAPER
 from bayesplate.report.constants import modulus_title
-from bayesplate.report.style import Picture, heading, hump, legend_below, limits, stacked
+from bayesplate.report.style import PAPER, Picture, heading, hump, legend_below, limits, stacked
 from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:

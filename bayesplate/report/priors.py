@@ -15,9 +15,7 @@ from bayesplate.plate.sessions import DISCREPANCY
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.quantities import Quantity
-from bayesplate.report.colours import BLACK
-from bayesplate.report.style import SMALL, WIDTH, Picture, hump, legend_below, limits, placed, short
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.style import BLACK, SMALL, WIDTH, Picture, hump, in_figure, legend_below, limits, placed, short
 from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:

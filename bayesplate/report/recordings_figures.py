@@ -10,10 +10,17 @@ import numpy as np
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.modes_found import Path
 from bayesplate.recordings.responses import Averaged
-from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.spectrum import short_label
 from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    LIGHT,
+    ORANGE,
+    SKY,
     SMALL,
+    VERMILLION,
     Picture,
     drawable,
     hertz_axis,

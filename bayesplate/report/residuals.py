@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.frequencies.laws import cents
-from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE
-from bayesplate.report.style import SMALL, WORDS, Picture, in_rows, legend_below, short
+from bayesplate.report.style import BLUE, DARK, GREY, LIGHT, ORANGE, SMALL, WORDS, Picture, in_rows, legend_below, short
+from bayesplate.results.fit_tables import noise_cents
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary
-from bayesplate.results.tables import noise_cents
 from bayesplate.results.words import mode_name
 
 if TYPE_CHECKING:

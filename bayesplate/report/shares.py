@@ -7,9 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesplate.estimates.identifiability import Identifiability
-from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, ORANGE
-from bayesplate.report.style import SMALL, WORDS, Picture, in_rows, legend_below, short
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    ORANGE,
+    SMALL,
+    WORDS,
+    Picture,
+    in_figure,
+    in_rows,
+    legend_below,
+    short,
+)
 from bayesplate.results.checking import CheckedMode, CheckReport
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.summary import Summary

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bayesplate.report.colours import BLUE, GREY, ORANGE
-from bayesplate.report.style import Picture, hertz_axis, stacked, upright_names
+from bayesplate.report.style import BLUE, GREY, ORANGE, Picture, hertz_axis, stacked, upright_names
 from bayesplate.results.peaks import UNNAMED, Spectrum
 from bayesplate.results.summary import Summary
 

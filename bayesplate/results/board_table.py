@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO, Literal
+from typing import Any, BinaryIO, Literal, TypeVar
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.files import whole_file, writing
 from bayesplate.results.board_rows import NUMBERS, WORDS, BoardRow
-from bayesplate.results.exports import csv_text
+from bayesplate.results.tables import csv_text
 
 TableKind = Literal["csv", "parquet"]
+T = TypeVar("T")
 _AT_ONCE = 1000
 _WHOLE = "seed"
 
@@ -70,10 +71,10 @@ def _write_csv(stream: BinaryIO, rows: Iterable[BoardRow]) -> None:
 
 
 def write_rows(stream: BinaryIO, header: list[Any], rows: Iterable[list[Any]]) -> None:
-    """Write CSV row after row; a text that looks like a formula begins with an apostrophe."""
-    stream.write(csv_text([header]).encode())
-    for row in rows:
-        stream.write(csv_text([row]).encode())
+    """Write CSV part after part."""
+    stream.write(csv_text(header, []).encode())
+    for some in _in_parts(rows, _AT_ONCE):
+        stream.write(csv_text((), some).encode())
 
 
 def _write_parquet(stream: BinaryIO, rows: Iterable[BoardRow]) -> None:
@@ -86,7 +87,7 @@ def _write_parquet(stream: BinaryIO, rows: Iterable[BoardRow]) -> None:
             writer.write_table(arrow.table(dict(zip(schema.names, map(list, columns), strict=True)), schema=schema))
 
 
-def _in_parts(rows: Iterable[BoardRow], n: int) -> Iterator[list[BoardRow]]:
+def _in_parts(rows: Iterable[T], n: int) -> Iterator[list[T]]:
     source = iter(rows)
     while some := list(islice(source, n)):
         yield some

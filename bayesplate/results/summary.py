@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from html import escape
 from typing import Literal
 
 from bayesplate.estimates.leave_one_out import CarryingMode
@@ -12,7 +11,8 @@ from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
 from bayesplate.results.joint import Joint
 from bayesplate.results.modes import ModeRow
 from bayesplate.results.peaks import AssignedPeak, Spectrum
-from bayesplate.results.words import GPA, constant_name, interval, plus_minus
+from bayesplate.results.tables import constants_table, render
+from bayesplate.results.words import GPA, plus_minus
 
 FORMAT = 1
 TOO_FEW_LEFT = "too few modes to leave one out"
@@ -222,10 +222,5 @@ class Summary(Run):
 
     def _repr_html_(self) -> str:
         """The constants as a notebook shows them."""
-        rows = "".join(
-            f"<tr><th>{constant_name(name, isotropic=self.model.isotropic)}</th>"
-            f"<td>{plus_minus(entry, GPA)}</td><td>{interval(entry, GPA)}</td></tr>"
-            for name, entry in self.elastic.items()
-        )
-        head = "<tr><th>GPa</th><th>mean ± sd</th><th>90 % interval</th></tr>"
-        return f"<table><caption>{escape(self.name)}</caption>{head}{rows}</table>"
+        table = constants_table(f"{self.name}, GPa", self.elastic, isotropic=self.model.isotropic)
+        return render(table, "html")

@@ -226,9 +226,9 @@ def test_a_board_in_doubt_is_marked_and_the_last_and_neither_paired_nor_counted(
 
     assert {p.first for p in graded.pairs} | {p.second for p in graded.pairs} <= {0, 2, 3}
     assert (graded.pairs[0].first, graded.pairs[0].second) == (0, 3)
-    assert [row[0] for row in tables["constants"].rows] == ["b3", "z-0", "b2", "a-1 ?"]
+    assert [row[0] for row in tables["constants"].texts] == ["b3", "z-0", "b2", "a-1 ?"]
     assert tables["constants"].title.endswith("; ? in doubt")
-    assert "a-1" not in {row[0].split()[0] for row in tables["limits"].rows}
+    assert "a-1" not in {row[0].split()[0] for row in tables["limits"].texts}
     assert tables["doubts"].rows == (("a-1", "20 Hz too high"),)
     assert doubts_sentence(graded).startswith("1 board is in doubt")
     with write_grading(tmp_path, graded).open() as stream:
