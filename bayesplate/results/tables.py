@@ -131,8 +131,8 @@ _IN_LATEX = {
     "$": r"\$",
     "&": r"\&",
     "#": r"\#",
-    "%": r"\%",
     " %": r"\,\%",
+    "%": r"\%",
     "_": r"\_",
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
@@ -144,9 +144,7 @@ _IN_LATEX = {
     "–": "--",
     "\N{NARROW NO-BREAK SPACE}": r"\,",
 }
-_OF_LATEX = re.compile(
-    rf"{_SYMBOL}|(?<=\d) %|(?P<signed>(?<![\w.])[+-]\d[\d.]*)|[{re.escape(''.join(key for key in _IN_LATEX if len(key) == 1))}]"
-)
+_OF_LATEX = re.compile("|".join([_SYMBOL, r"(?P<signed>(?<![\w.])[+-]\d[\d.]*)", *map(re.escape, _IN_LATEX)]))
 JOINERS = "\u200c\u200d"
 """Format characters that shape letters and join emoji; they steer nothing."""
 
