@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bayesplate.cards import PriorCard
+from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter, unit_of_people
@@ -10,8 +11,7 @@ from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.quantities import Quantity
-from bayesplate.report.priors import input_words
-from bayesplate.report.words import effect_sentence
+from bayesplate.report.posterior import input_words
 from bayesplate.results.budget import budget, row_words
 from bayesplate.results.contract import Spread
 from bayesplate.results.fit_tables import modes_table, peaks_table
@@ -115,7 +115,7 @@ def _measured(entry: Spread) -> tuple[Cell, Cell]:
 
 def effect_sentences(summary: Summary) -> list[str]:
     """One plain sentence a declared effect."""
-    return [f"{effect_name(name)}: {effect_sentence(name)}" for name in summary.model.effects]
+    return [f"{effect_name(name)}: {EFFECTS[name].sentence}" for name in summary.model.effects]
 
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:

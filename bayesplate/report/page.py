@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import gc
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib.resources import files
@@ -20,18 +18,18 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
 from bayesplate.report.board import board_picture
-from bayesplate.report.constants import constants_picture
-from bayesplate.report.corner_plot import corner_picture, load_corner
-from bayesplate.report.fitted_modes import modes_pictures
-from bayesplate.report.health import health_picture
-from bayesplate.report.null_control import null_picture
-from bayesplate.report.percentiles import percentiles_pictures
-from bayesplate.report.priors import priors_picture
-from bayesplate.report.residuals import predictive_picture, residuals_picture
+from bayesplate.report.constants import constants_picture, percentiles_pictures
+from bayesplate.report.corner_plot import corner_picture
+from bayesplate.report.diagnosis import before_after_picture, null_picture, signatures_picture
+from bayesplate.report.modes import (
+    modes_pictures,
+    predictive_picture,
+    residuals_picture,
+    shares_picture,
+    spectrum_pictures,
+)
+from bayesplate.report.posterior import health_picture, priors_picture
 from bayesplate.report.saving import drawing, save_pictures
-from bayesplate.report.shares import shares_picture
-from bayesplate.report.signatures import before_after_picture, signatures_picture
-from bayesplate.report.spectrum import spectrum_pictures
 from bayesplate.report.style import Picture
 from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, quoted_constants, short_sentences
 from bayesplate.results.fit_tables import write_constants
@@ -54,15 +52,6 @@ class PagePicture:
     width: int
     height: int
     source: str
-
-
-def load_libraries() -> None:
-    """Import what draws and lays out, so that a page written later does not wait for it."""
-    import jinja2  # noqa: F401
-    from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
-    from matplotlib.figure import Figure  # noqa: F401
-
-    load_corner()
 
 
 @drawing()
@@ -93,16 +82,13 @@ def write_report(
     Path
         Of report.html. It shows the SVG figures, and is there before the PNG files are.
     """
-    with _uncollected():
-        title = inference.problem.board.title or summary.name
-        make_folder(folder)
-        write_constants(folder, quoted(summary, diagnosis), title)
-        if diagnosis is not None:
-            write_diagnosis_tables(folder, diagnosis, title)
-        groups = pictures(inference, draws, summary, diagnosis)
-        return save_page(
-            folder / PAGE, groups, lambda shown: fit_page(card, inference, draws, summary, shown, diagnosis)
-        )
+    title = inference.problem.board.title or summary.name
+    make_folder(folder)
+    write_constants(folder, quoted(summary, diagnosis), title)
+    if diagnosis is not None:
+        write_diagnosis_tables(folder, diagnosis, title)
+    groups = pictures(inference, draws, summary, diagnosis)
+    return save_page(folder / PAGE, groups, lambda shown: fit_page(card, inference, draws, summary, shown, diagnosis))
 
 
 def save_page(
@@ -129,18 +115,6 @@ def save_page(
     write_text(path, text({place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}))
     save_pictures(every, path.parent / FIGURES, "png")
     return path
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Without looking for garbage: what is drawn lives until it is written, and the search takes a fifth longer."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 def pictures(

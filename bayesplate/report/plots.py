@@ -17,21 +17,15 @@ from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.report.bench import bench_sheet
 from bayesplate.report.board import board_picture
-from bayesplate.report.campaign_figures import boards_picture, common_picture, left_out_picture, shared_picture
+from bayesplate.report.campaign import boards_picture, common_picture, left_out_picture, shared_picture
 from bayesplate.report.chladni import chladni_sheet
-from bayesplate.report.constants import constants_figure
+from bayesplate.report.constants import constants_figure, percentiles_pictures
 from bayesplate.report.corner_plot import axis_labels, corner_figure, corner_picture, words_and_factor
-from bayesplate.report.fitted_modes import modes_pictures
-from bayesplate.report.gains import gains_picture
-from bayesplate.report.health import health_picture
-from bayesplate.report.null_control import null_picture
-from bayesplate.report.percentiles import percentiles_pictures
-from bayesplate.report.priors import priors_picture
-from bayesplate.report.residuals import predictive_picture, residuals_picture
-from bayesplate.report.shares import shares_picture
-from bayesplate.report.signatures import before_after_picture, signatures_picture
+from bayesplate.report.diagnosis import before_after_picture, null_picture, signatures_picture
+from bayesplate.report.modes import modes_pictures, predictive_picture, residuals_picture, shares_picture
+from bayesplate.report.planning import bench_sheet, gains_picture
+from bayesplate.report.posterior import health_picture, priors_picture
 from bayesplate.report.style import Picture
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.summary import Summary

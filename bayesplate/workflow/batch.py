@@ -168,7 +168,7 @@ def _write_grading(folder: Path, graded: Grading, summary: BatchSummary, *, fold
 
     write_grading(folder, graded)
     if report:
-        from bayesplate.report.grading_page import write_grading_page
+        from bayesplate.report.grading import write_grading_page
 
         write_grading_page(folder, graded, summary, has_pages=folders)
 

@@ -118,7 +118,7 @@ class CampaignFitResult:
 
 def write_campaign_pages(folder: Path, result: CampaignFitResult, diagnosis: CampaignDiagnosis | None = None) -> None:
     """Write the page of the campaign, and that of each board in its own folder."""
-    from bayesplate.report.campaign_page import write_campaign_report
+    from bayesplate.report.campaign import write_campaign_report
 
     for name, one in result.boards.items():
         write_page(folder / BOARDS / name, one)

@@ -149,10 +149,6 @@ def fit(
 
         return fit_campaign(problem, out=out, report=report, seed=seed, force=force, resume=resume, progress=progress)
     run = opened(problem, seed, out, force=force, resume=resume)
-    if run.folder is not None and report:
-        from bayesplate.report.page import load_libraries
-
-        load_libraries()  # while nobody waits for the page yet
 
     def refuse(inference: Inference) -> None:
         refuse_unconverged(inference, seed, problem, run.path)

@@ -15,9 +15,8 @@ from bayesplate.campaigns.diagnosis import CampaignDiagnosis, PooledErrors, clai
 from bayesplate.campaigns.search import Explanation
 from bayesplate.campaigns.tables import shared_table
 from bayesplate.errors import InputError
-from bayesplate.report import campaign_page as home
-from bayesplate.report.campaign_figures import shared_picture
-from bayesplate.report.campaign_page import write_campaign_report
+from bayesplate.report import campaign as home
+from bayesplate.report.campaign import shared_picture, write_campaign_report
 from bayesplate.results.contract import Spread
 from bayesplate.workflow.shown import show_diagnosis, show_fit
 

@@ -19,16 +19,13 @@ from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
 from bayesplate.report.board import board_picture
 from bayesplate.report.chladni import chladni_sheet
-from bayesplate.report.constants import modulus_title
+from bayesplate.report.constants import modulus_title, percentiles_pictures
 from bayesplate.report.content import inputs_table
 from bayesplate.report.corner_plot import axis_label
-from bayesplate.report.fitted_modes import modes_pictures
-from bayesplate.report.health import health_picture
-from bayesplate.report.null_control import null_picture
+from bayesplate.report.diagnosis import null_picture
+from bayesplate.report.modes import modes_pictures, predictive_picture
 from bayesplate.report.page import pictures
-from bayesplate.report.percentiles import percentiles_pictures
-from bayesplate.report.priors import Compared, compared
-from bayesplate.report.residuals import predictive_picture
+from bayesplate.report.posterior import Compared, compared, health_picture
 from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
 from bayesplate.results.words import MISSING
 from bayesplate.workflow.prepare import prepare

@@ -9,8 +9,7 @@ import pytest
 from payloads import DIRECTION_MARKS, EVERY, shown
 from read_pages import Read, faults
 
-from bayesplate.report.grading_figures import MOST_NAMED, speed_picture
-from bayesplate.report.grading_page import write_grading_page
+from bayesplate.report.grading import MOST_NAMED, speed_picture, write_grading_page
 from bayesplate.results.batch_summary import BatchSummary, Failure
 from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.grading import GradingRequest, grade

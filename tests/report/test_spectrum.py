@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_summaries import SUMMARY
 
-from bayesplate.report.spectrum import spectrum_pictures
+from bayesplate.report.modes import spectrum_pictures
 from bayesplate.report.style import BLUE, ORANGE
 from bayesplate.results.modes import Prediction
 from bayesplate.results.peaks import AssignedPeak, Assignment, PredictedMode, Spectrum

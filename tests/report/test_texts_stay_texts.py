@@ -18,7 +18,7 @@ from read_pages import Read, faults
 
 from bayesplate.cli import main
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
-from bayesplate.report import recordings_page as home
+from bayesplate.report import recordings as home
 from bayesplate.report.style import Picture, stacked
 
 UNMEASURED = Path(__file__).parents[2] / "docs" / "cards" / "half-top-unmeasured.toml"
