@@ -9,6 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.grading.boards import BatchSummary
+from bayesplate.grading.figures import FIGURES, limit_told
+from bayesplate.grading.matching import LEAST_PROBABILITY, TARGET, Grading
+from bayesplate.grading.tables import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
 from bayesplate.plate.material import MODULI
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.page import from_template, save_page
@@ -36,12 +40,7 @@ from bayesplate.report.style import (
     stacked,
     whisker,
 )
-from bayesplate.results.batch_summary import BatchSummary
 from bayesplate.results.folder import PAGE
-from bayesplate.results.grading import TARGET, Grading
-from bayesplate.results.grading_table import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
-from bayesplate.results.log_figures import FIGURES, limit_told
-from bayesplate.results.pairs import LEAST_PROBABILITY
 from bayesplate.results.tables import Table
 from bayesplate.results.words import percent
 

@@ -38,8 +38,7 @@ from bayesplate.report.style import (
 )
 from bayesplate.results.checking import CheckedMode, CheckReport
 from bayesplate.results.fit_tables import noise_cents
-from bayesplate.results.modes import ModeRow
-from bayesplate.results.peaks import UNNAMED, Spectrum
+from bayesplate.results.modes import UNNAMED, ModeRow, Spectrum
 from bayesplate.results.summary import Summary
 from bayesplate.results.words import mode_name
 

@@ -10,8 +10,7 @@ from bayesplate.files import write_text
 from bayesplate.frequencies.laws import cents
 from bayesplate.results.contract import ByConstant, Spread
 from bayesplate.results.folder import CONSTANTS
-from bayesplate.results.modes import ModeRow
-from bayesplate.results.peaks import LEAST
+from bayesplate.results.modes import LEAST, ModeRow
 from bayesplate.results.summary import Percentile, PercentileValue, Summary
 from bayesplate.results.tables import Row, Table, constants_table, render
 from bayesplate.results.words import GPA, Value, chances, decimals, mode_name, number, two_digits

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from typing import Literal
 
 from bayesplate.estimates.leave_one_out import CarryingMode
-from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
-from bayesplate.results.joint import Joint
-from bayesplate.results.modes import ModeRow
-from bayesplate.results.peaks import AssignedPeak, Spectrum
+from bayesplate.results.contract import Constants, Elastic, Joint, Rigidity, Spread
+from bayesplate.results.modes import AssignedPeak, ModeRow, Spectrum
 from bayesplate.results.tables import constants_table, render
 from bayesplate.results.words import GPA, plus_minus
 
@@ -224,3 +224,17 @@ class Summary(Run):
         """The constants as a notebook shows them."""
         table = constants_table(f"{self.name}, GPa", self.elastic, isotropic=self.model.isotropic)
         return render(table, "html")
+
+
+PACKAGES = ("bayesplate", "numpy", "scipy", "emcee", "scikit-fem")
+
+
+def versions() -> dict[str, str]:
+    """Version of Python and of every package that has a part in the numbers."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found

@@ -27,7 +27,7 @@ from bayesplate.report.plots import ComparePlots
 from bayesplate.results.archive import posterior_tree, to_arviz
 from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, judged_alike, theory_row
 from bayesplate.results.contract import NOT_IN_JSON, json_text
-from bayesplate.results.versions import versions
+from bayesplate.results.summary import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.check import expected_sd
 from bayesplate.workflow.fitting import not_converged

@@ -20,8 +20,7 @@ from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz, 
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, run_of_its_own
 from bayesplate.results.summarise import unconverged_summary
-from bayesplate.results.summary import Summary
-from bayesplate.results.versions import versions
+from bayesplate.results.summary import Summary, versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fitting import Fitted, fitted, not_converged, opened

@@ -19,11 +19,13 @@ from bayesplate.diagnosis.wording.told import (
 )
 from bayesplate.effects.words import effect_names
 from bayesplate.estimates.leave_one_out import carrying_sentence
+from bayesplate.grading.boards import BatchSummary
+from bayesplate.grading.matching import Grading
+from bayesplate.grading.tables import MOST_ON_TERMINAL, doubts_sentence, grading_tables
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.batch_summary import BatchSummary
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.command_tables import (
     METHODS_REMARK,
@@ -36,8 +38,6 @@ from bayesplate.results.command_tables import (
 from bayesplate.results.comparison import Comparison
 from bayesplate.results.contract import json_text
 from bayesplate.results.fit_tables import fitted_constants, modes_table, peaks_table
-from bayesplate.results.grading import Grading
-from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table, notebook, render

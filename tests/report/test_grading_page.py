@@ -9,11 +9,10 @@ import pytest
 from payloads import DIRECTION_MARKS, EVERY, shown
 from read_pages import Read, faults
 
+from bayesplate.grading.boards import BatchSummary, BoardRow, Failure
+from bayesplate.grading.matching import GradingRequest, grade
 from bayesplate.report.grading import MOST_NAMED, speed_picture, write_grading_page
-from bayesplate.results.batch_summary import BatchSummary, Failure
-from bayesplate.results.board_rows import BoardRow
-from bayesplate.results.grading import GradingRequest, grade
-from bayesplate.results.joint import JOINT, Joint
+from bayesplate.results.contract import JOINT, Joint
 
 LOG = np.log([12e9, 0.9e9, 0.7e9, 25.0, 2.0, 5.0, 440.0])
 EVIL = "<script>alert(1)</script>"

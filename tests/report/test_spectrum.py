@@ -10,8 +10,7 @@ from made_summaries import SUMMARY
 
 from bayesplate.report.modes import spectrum_pictures
 from bayesplate.report.style import BLUE, ORANGE
-from bayesplate.results.modes import Prediction
-from bayesplate.results.peaks import AssignedPeak, Assignment, PredictedMode, Spectrum
+from bayesplate.results.modes import AssignedPeak, Assignment, PredictedMode, Prediction, Spectrum
 
 
 def peak(hertz, *assignments, spurious=0.0):
