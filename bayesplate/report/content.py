@@ -123,18 +123,24 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
     board = inference.problem.board
     shares = budget(draws, board)
     alone = dict(zip(CONSTANTS, inference.problem.identifiability.errors_of_rigidities, strict=True))
-    rows = []
-    for name in CONSTANTS:
-        entry = summary.elastic[name]
+    named = {one.name: input_words(one, board)[0] for one in board.uncertain}
+
+    def inputs(name: str) -> str | None:
         largest = sorted(shares[name].items(), key=lambda item: -item[1])[:2]
-        named = {one.name: input_words(one, board)[0] for one in board.uncertain}
-        told = [
+        told = (
             f"{named.get(key) or row_words(key, board)} {percent(share)}" for key, share in largest if share >= 0.05
-        ]
-        both = (f"{two_digits(entry.sd / entry.mean, 100)} %", f"{two_digits(alone[name], 100)} %")
-        rows.append((name, *both, ", ".join(told) or None))
-    columns = ("constant", "sd", "from the expected noise alone", "share of the variance from inputs")
-    return Table("Where the uncertainty comes from", columns, tuple(rows))
+        )
+        return ", ".join(told) or None
+
+    return by_constant(
+        "Where the uncertainty comes from",
+        {
+            "sd": lambda name: f"{two_digits(summary.elastic[name].sd / summary.elastic[name].mean, 100)} %",
+            "from the expected noise alone": lambda name: f"{two_digits(alone[name], 100)} %",
+            "share of the variance from inputs": inputs,
+        },
+        isotropic=summary.model.isotropic,
+    )
 
 
 def inputs_table(board: Board, summary: Summary) -> Table:

@@ -131,7 +131,6 @@ _IN_LATEX = {
     "$": r"\$",
     "&": r"\&",
     "#": r"\#",
-    " %": r"\,\%",
     "%": r"\%",
     "_": r"\_",
     "~": r"\textasciitilde{}",
@@ -144,7 +143,9 @@ _IN_LATEX = {
     "–": "--",
     "\N{NARROW NO-BREAK SPACE}": r"\,",
 }
-_OF_LATEX = re.compile("|".join([_SYMBOL, r"(?P<signed>(?<![\w.])[+-]\d[\d.]*)", *map(re.escape, _IN_LATEX)]))
+_OF_LATEX = re.compile(
+    "|".join([_SYMBOL, r"(?P<signed>(?<![\w.])[+-]\d[\d.]*)", r"(?<=\d) %", *map(re.escape, _IN_LATEX)])
+)
 JOINERS = "\u200c\u200d"
 """Format characters that shape letters and join emoji; they steer nothing."""
 
@@ -188,7 +189,7 @@ def _escaped_html(text: str) -> Markup:
 def _latex_of(found: re.Match[str]) -> str:
     if found["letter"]:
         return f"${GREEK.get(found['letter'], ('', found['letter']))[1]}_{{{found['index']}}}$"
-    return f"${found[0]}$" if found["signed"] else _IN_LATEX[found[0]]
+    return f"${found[0]}$" if found["signed"] else _IN_LATEX.get(found[0], r"\,\%")
 
 
 def _text(cell: Cell) -> str:

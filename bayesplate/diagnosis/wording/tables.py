@@ -15,7 +15,7 @@ from bayesplate.effects.words import effect_name
 from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.fit_tables import write_tables
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
-from bayesplate.results.tables import Cell, Row, Table, constants_table, notebook
+from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_table, notebook
 from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, plus_minus
 
 _WORTH_A_ROW = 0.01
@@ -79,9 +79,15 @@ def shift_table(diagnosis: Diagnosis) -> Table | None:
     """Each modulus before and after; None where nothing was added."""
     if not diagnosis.is_refitted:
         return None
-    rows = tuple((name, *_shifted(diagnosis, name)) for name in diagnosis.elastic_shift)
-    title = f"Shift of the constants by {diagnosis.refitted_words}, GPa"
-    return Table(title, ("constant", "before", "after", "shift, sd"), rows)
+    return by_constant(
+        f"Shift of the constants by {diagnosis.refitted_words}, GPa",
+        {
+            "before": lambda name: _shifted(diagnosis, name)[0],
+            "after": lambda name: _shifted(diagnosis, name)[1],
+            "shift, sd": lambda name: _shifted(diagnosis, name)[2],
+        },
+        isotropic=is_isotropic(diagnosis.elastic_averaged),
+    )
 
 
 def _shifted(diagnosis: Diagnosis, name: str) -> tuple[Value, Value, Value]:

@@ -272,7 +272,7 @@ def test_errors_before_and_after_or_as_they_are():
 
 
 def test_constants_shift_only_where_something_was_added():
-    assert shift_table(NAMED).texts[0] == ("E_x", "10.25", "11.50", "+2.5")
+    assert shift_table(NAMED).texts[0] == ("E_x, along grain", "10.25", "11.50", "+2.5")
     assert shift_table(DIAGNOSES["none needed"]) is None
     assert averaged_table(NAMED).texts[0] == ("E_x, along grain", "10.2 ± 1.0", "8.7 to 11.8")
 
