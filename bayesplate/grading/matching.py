@@ -129,7 +129,7 @@ MATCH_PERCENT = 10.0
 TARGET = "target_thickness"
 SHOWN = ("density", "wave_speed_x", "wave_speed_y", "radiation_ratio_x", "anisotropy")
 """Figures of makers that every grading has."""
-_NINETY = 1.6448536269514722
+NINETY = 1.6448536269514722
 """Half the width of a normal 90 % interval, standard deviations."""
 
 
@@ -193,7 +193,7 @@ class Grading:
     def spread(self, figure: LogFigure, boards: slice | Sequence[int] = slice(None)) -> tuple[Floats, Floats, Floats]:
         """Median, and the ends of the 90 % interval of some boards, in the unit of people: (n,) arrays."""
         mean, sd = figure.log(self.log_mean[boards], self.triangles[boards])
-        middle, low, high = (np.exp(mean + at * sd) / figure.per_unit for at in (0.0, -_NINETY, _NINETY))
+        middle, low, high = (np.exp(mean + at * sd) / figure.per_unit for at in (0.0, -NINETY, NINETY))
         return middle, low, high
 
     @property

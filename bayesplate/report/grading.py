@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.grading.boards import BatchSummary
 from bayesplate.grading.figures import FIGURES, limit_told
-from bayesplate.grading.matching import LEAST_PROBABILITY, TARGET, Grading
+from bayesplate.grading.matching import LEAST_PROBABILITY, NINETY, TARGET, Grading
 from bayesplate.grading.tables import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
 from bayesplate.plate.material import MODULI
 from bayesplate.report.constants import modulus_title
@@ -58,7 +58,6 @@ _ASIDE, _ABOVE, _LINE = 8.0, 3.0, SMALL + 2.0
 """Points from a point to its name, beside and above its bar, and from one name to the next."""
 _MOST_VECTORS = 1000
 """Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
-_NINETY = 1.645
 _STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
@@ -191,7 +190,7 @@ def pairs_picture(graded: Grading) -> Picture:
         at = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
             mean, sd = FIGURES[name].log(graded.log_mean[at], graded.triangles[at])
-            apart, spread = float(mean[1] - mean[0]), _NINETY * float(np.sqrt((sd**2).sum()))
+            apart, spread = float(mean[1] - mean[0]), NINETY * float(np.sqrt((sd**2).sum()))
             ends = 100.0 * np.expm1(apart + spread * np.array([-1.0, 0.0, 1.0]))
             whisker(panel, row + step, tuple(ends), *_STYLES[name])
         panel.annotate(str(percent(pair.probability)), (1.02, row), xycoords=("axes fraction", "data"), ha="left",

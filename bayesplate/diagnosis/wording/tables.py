@@ -66,7 +66,7 @@ def claim_table(diagnosis: Diagnosis) -> Table | None:
     for one in diagnosis.conditions:
         words = CONDITIONS[one.name]
         wanted = words.wanted.format(limit=words.shown(one.limit))
-        found = words.shown(one.value)
+        found = str(words.shown(one.value))
         if one.name == "chance selection" and diagnosis.null_control.nested_ratio_percentile is not None:
             found += f", smaller than on {diagnosis.null_control.nested_ratio_percentile:.0f} % of them"
         rows.append((words.title, found, wanted, "yes" if one.is_met else "no"))

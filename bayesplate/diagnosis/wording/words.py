@@ -10,7 +10,7 @@ from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Errors
 from bayesplate.effects.words import effect_name, effect_names, joined
-from bayesplate.results.words import MISSING, Value, number, percent
+from bayesplate.results.words import Value, number, percent
 
 TOO_FEW = "the readings are too few to choose anew without each of them"
 NONE_LEFT = "hardly a mode is left that does not carry a constant or a size alone"
@@ -130,11 +130,11 @@ class ConditionWords:
     title: str
     wanted: str
     lacking: str
-    digits: str = "{:.2f}"
+    digits: int = 2
 
-    def shown(self, value: float | None) -> str:
+    def shown(self, value: float | None) -> Value:
         """A number of it as people read it."""
-        return MISSING if value is None else self.digits.format(value)
+        return number(value, self.digits)
 
 
 CONDITIONS: dict[ConditionName, ConditionWords] = {
@@ -152,16 +152,16 @@ CONDITIONS: dict[ConditionName, ConditionWords] = {
         "probability that nothing is lacking, at its largest with the sizes' priors halved or doubled",
         "below {limit}",
         "the probability that nothing is lacking is too large",
-        "{:.3f}",
+        3,
     ),
     "probability of another": ConditionWords(
         "probability of what is not named here, at its largest with the sizes' priors halved or doubled",
         "below {limit}",
         "the probability of another effect is too large",
-        "{:.3f}",
+        3,
     ),
     "prior predictive": ConditionWords(
-        "p-value of the misfit that is left", "at least {limit}", "the misfit that is left is too large", "{:.3f}"
+        "p-value of the misfit that is left", "at least {limit}", "the misfit that is left is too large", 3
     ),
 }
 
