@@ -69,6 +69,8 @@ class Value:
         Whether a positive number has its sign.
     unit : str
         Printed after it.
+    times : float
+        What it is multiplied by in print: 100 for a share in per cent.
     """
 
     mean: float | None = None
@@ -77,6 +79,7 @@ class Value:
     digits: int = 0
     signed: bool = False
     unit: str = ""
+    times: float = 1.0
 
     def __str__(self) -> str:
         if self.ends is not None:
@@ -89,7 +92,7 @@ class Value:
 
     def _fixed(self, number: float) -> str:
         """Fixed decimals, zero without a sign."""
-        return _unsigned_zero(f"{number:{'+' if self.signed else ''}.{self.digits}f}")
+        return _unsigned_zero(f"{number * self.times:{'+' if self.signed else ''}.{self.digits}f}")
 
 
 def constant_name(name: str, *, isotropic: bool = False) -> str:
@@ -157,7 +160,7 @@ def _unsigned_zero(text: str) -> str:
 
 def percent(share: float | None, digits: int = 0) -> Value:
     """A share of one in per cent."""
-    return Value(None if share is None else 100 * share, digits=digits, unit=" %")
+    return Value(share, digits=digits, unit=" %", times=100.0)
 
 
 def mode_name(label: str, setup: str, *, several: bool) -> str:

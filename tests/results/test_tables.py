@@ -11,7 +11,7 @@ from payloads import DIRECTION_MARKS, PAYLOADS, shown
 from read_pages import Read, faults
 
 from bayesplate.results.tables import Table, escape, notebook, render, visible
-from bayesplate.results.words import Value
+from bayesplate.results.words import Value, percent
 
 FORMULAS = ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1")
 STEERS = ("\x1b[2J\x1b]0;owned\x07", "a\rb", "\x9b31m")
@@ -81,20 +81,20 @@ def test_programs_read_numbers_at_full_precision():
     third = 1.0 / 3.0
     table = Table(
         "made",
-        ("constant", "mean ± sd", "90 % interval", "n", "shift, sd"),
+        ("constant", "mean ± sd", "90 % interval", "n", "share"),
         (
-            ("E_x", Value(third, 0.25), Value(ends=(0.1, third)), 3, Value(-1.25, digits=1)),
+            ("E_x", Value(third, 0.25), Value(ends=(0.1, third)), 3, percent(0.125)),
             ("D_x", None, None, None, 2.5),
         ),
-        keys=("constant", "mean", "interval", "n", "shift"),
+        keys=("constant", "mean", "interval", "n", "share"),
     )
 
     assert render(table, "csv") == (
-        "constant,mean,mean_sd,interval_q05,interval_q95,n,shift\n"
-        f"E_x,{third!r},0.25,0.1,{third!r},3,-1.25\n"
+        "constant,mean,mean_sd,interval_q05,interval_q95,n,share\n"
+        f"E_x,{third!r},0.25,0.1,{third!r},3,0.125\n"
         "D_x,,,,,,2.5\n"
     )
-    assert table.texts == (("E_x", "0.33 ± 0.25", "0 to 0", "3", "-1.2"), ("D_x", "–", "–", "–", "2.5"))
+    assert table.texts == (("E_x", "0.33 ± 0.25", "0 to 0", "3", "12 %"), ("D_x", "–", "–", "–", "2.5"))
 
 
 def test_latex_needs_no_package():
