@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         NotConvergedError,
         NotIdentifiableError,
     )
+    from bayesplate.grading.matching import Grading, GradingRequest
     from bayesplate.labels import Label
     from bayesplate.planning.plan import Plan
     from bayesplate.plate.board import Board
@@ -61,7 +62,6 @@ if TYPE_CHECKING:
     from bayesplate.recordings.contract import PickReport
     from bayesplate.results.checking import CheckReport
     from bayesplate.results.comparison import Comparison
-    from bayesplate.results.grading import Grading, GradingRequest
     from bayesplate.results.sheets import ModesReport
     from bayesplate.results.summary import Summary
     from bayesplate.workflow.batch import BatchResult, batch
@@ -158,8 +158,8 @@ _HOMES = {
     "Fault": "bayesplate.errors",
     "FitRequest": "bayesplate.workflow.fit_board",
     "FitResult": "bayesplate.workflow.fit",
-    "Grading": "bayesplate.results.grading",
-    "GradingRequest": "bayesplate.results.grading",
+    "Grading": "bayesplate.grading.matching",
+    "GradingRequest": "bayesplate.grading.matching",
     "InputError": "bayesplate.errors",
     "Label": "bayesplate.labels",
     "ModesReport": "bayesplate.results.sheets",

@@ -9,13 +9,11 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from io import StringIO
 from time import monotonic
 from typing import IO, TYPE_CHECKING, Any, TextIO, cast
 
 import click
 
-from bayesplate.columns import laid_out
 from bayesplate.errors import BayesplateError, Fault, UnwritableError, plain
 
 if TYPE_CHECKING:
@@ -30,18 +28,11 @@ _NARROWEST, _USUAL = 20, 80
 def print_shown(shown: Shown) -> None:
     """Tables, remarks, warnings and the closing words on the standard output."""
     from rich.console import Console
-    from rich.text import Text
 
     # Laid out apart from the output: rich itself would end the program where a reader like `head` has closed the pipe.
-    output, printed = Console(), StringIO()
+    output = Console()
     width = output.width if output.width >= _NARROWEST else _USUAL  # COLUMNS=0 is no terminal
-    console = Console(file=printed, width=width, force_terminal=output.is_terminal, soft_wrap=False, highlight=False)
-    for table in shown.tables:
-        console.print(laid_out(table, width))
-    for sentence in [*(f"- {text}" for text in shown.remarks), *(f"! {text}" for text in shown.warnings)]:
-        console.print(Text(sentence))
-    console.print(Text(shown.closing))
-    _write(printed.getvalue())
+    _write(shown.printed(width, styled=output.is_terminal))
 
 
 def print_json(content: Any) -> None:

@@ -27,7 +27,7 @@ CAMPAIGN = "spruce-half-tops"
 
 def markdown(table: Table) -> str:
     """A table as Markdown, its title above."""
-    lines = [table.columns, tuple("---" for _ in table.columns), *table.rows]
+    lines = [table.columns, tuple("---" for _ in table.columns), *table.texts]
     return f"{table.title}:\n\n" + "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 

@@ -73,18 +73,18 @@ class Moments:
 
     def watch_journal(self) -> None:
         """Count the lines of a batch's journal, and end in the middle of one."""
-        from bayesplate.results import board_journal
+        from bayesplate.grading import storage
 
-        whole = board_journal.Journal.append
+        whole = storage.Journal.append
 
         def append(journal: Any, key: str, row: Any) -> int:
             if self.reached():
-                line = board_journal._line(key, row)
+                line = storage._line(key, row)
                 journal._stream.write(line[: len(line) * self.last // 7 % len(line)])
                 end()
             return whole(journal, key, row)
 
-        board_journal.Journal.append = append  # type: ignore[method-assign]
+        storage.Journal.append = append  # type: ignore[method-assign]
 
 
 def end() -> None:

@@ -14,7 +14,7 @@ from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import SamplerSettings
-from bayesplate.report.page import render, write_report
+from bayesplate.report.page import fit_page, write_report
 from bayesplate.results.summary import Summary
 from bayesplate.workflow.fit import fit
 from bayesplate.workflow.prepare import prepare
@@ -42,7 +42,7 @@ class Fit:
         board = replace(problem.board, title=title, source=source)
         inference = replace(self.inference, problem=replace(problem, board=board))
         card = self.card.model_copy(update={"title": title, "source": source})
-        return render(card, inference, self.draws, self.summary, {}, diagnosis)
+        return fit_page(card, inference, self.draws, self.summary, {}, diagnosis)
 
 
 def fitted(card: str) -> Fit:

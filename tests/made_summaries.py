@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from bayesplate.results.contract import Elastic, Rigidity, Spread
-from bayesplate.results.joint import JOINT, Joint
-from bayesplate.results.modes import ModeRow, Prediction, over
-from bayesplate.results.peaks import AssignedPeak, Assignment, PredictedMode, Spectrum
+from bayesplate.results.contract import JOINT, Elastic, Joint, Rigidity, Spread
+from bayesplate.results.modes import AssignedPeak, Assignment, ModeRow, PredictedMode, Prediction, Spectrum, over
 from bayesplate.results.summary import (
     ErrorFigures,
     LawMeans,

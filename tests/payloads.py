@@ -35,6 +35,9 @@ PAYLOADS = (
     "日本の楓, 한국 가문비나무, Ελάτη",
 )
 
+EVERY = " ".join(one for one in PAYLOADS if len(one) < 300)
+"""All of them at once: what `tests/results/test_tables.py` tries one by one, at the places that a page has."""
+
 DIRECTION_MARKS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u200e\u200f\u061c"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from bayesplate.campaigns.learning import Learnt
 from bayesplate.campaigns.together import values_of
 from bayesplate.posterior.inference import MOST_DRAWS_A_CHAIN
 from bayesplate.posterior.thinning import thin_walker_major
-from bayesplate.results.archive import Archive
+from bayesplate.results.archive import DRAWN, tree_of
 
 
 def archive_name(name: str) -> str:
@@ -18,7 +19,7 @@ def archive_name(name: str) -> str:
     return name.replace(" / ", " over ")
 
 
-def shared_archive(learnt: Learnt, attributes: Mapping[str, str]) -> Archive:
+def shared_tree(learnt: Learnt, attributes: Mapping[str, str]) -> Any:
     """Draws of the shared numbers and their scatters, SI, each board's log likelihood of them, the sampler's health.
 
     Parameters
@@ -29,7 +30,7 @@ def shared_archive(learnt: Learnt, attributes: Mapping[str, str]) -> Archive:
 
     Returns
     -------
-    Archive
+    xarray.DataTree
     """
     chains, convergence, together = learnt.chains, learnt.convergence, learnt.together
     thinned = [
@@ -39,21 +40,15 @@ def shared_archive(learnt: Learnt, attributes: Mapping[str, str]) -> Archive:
     z, log_posterior = thinned
     likelihood = together.log_likelihoods(z.reshape(-1, z.shape[-1])).T.reshape(*z.shape[:2], -1)
     values = values_of(together.coordinates, z)
-    return Archive(
-        groups={
-            "posterior": {archive_name(name): np.asarray(each) for name, each in values.items()},
-            "log_likelihood": {"board": likelihood},
+    return tree_of(
+        {
+            "posterior": {archive_name(name): (DRAWN, np.asarray(each)) for name, each in values.items()},
+            "log_likelihood": {"board": ((*DRAWN, "name"), likelihood)},
             "sample_stats": {
-                "lp": log_posterior,
-                "tau": convergence.tau,
-                "rhat": convergence.rhat,
-                "ess": convergence.ess,
+                "lp": (DRAWN, log_posterior),
+                **{name: (("parameter",), getattr(convergence, name)) for name in ("tau", "rhat", "ess")},
             },
         },
-        coords={
-            "name": list(together.names),
-            "parameter": [archive_name(one.name) for one in together.coordinates],
-        },
-        dims={"board": ["name"], "tau": ["parameter"], "rhat": ["parameter"], "ess": ["parameter"]},
-        attributes=attributes,
+        {"name": together.names, "parameter": [archive_name(one.name) for one in together.coordinates]},
+        attributes,
     )

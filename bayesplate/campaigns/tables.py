@@ -9,9 +9,8 @@ from bayesplate.campaigns.common import CommonResidual
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, words_of
 from bayesplate.campaigns.summary import CampaignSummary, PopulationSummary, SharedNumber
 from bayesplate.plate.parameter import unit_of_people
-from bayesplate.results.contract import Spread
-from bayesplate.results.tables import Table
-from bayesplate.results.words import GPA, MISSING, interval, narrow_name, number, percent, plus_minus
+from bayesplate.results.tables import Row, Table, by_constant
+from bayesplate.results.words import GPA, interval, number, percent, plus_minus
 
 _MOST_LISTED = 8
 
@@ -36,11 +35,11 @@ def campaign_check_tables(report: CampaignCheck) -> tuple[Table, ...]:
         factor, unit = unit_of_people(one.unit)
         prior = f"{one.prior_q05 * factor:.3g} to {one.prior_q95 * factor:.3g} {unit}".rstrip()
         best = min(one.boards.values(), default=1.0)
-        shared.append((name.replace("_", " ", 1), prior, f"{best:.2f}", f"{one.expected_sd:.2f}"))
-    boards = []
+        shared.append((name.replace("_", " ", 1), prior, number(best, 2), number(one.expected_sd, 2)))
+    boards: list[Row] = []
     for board, each in report.boards.items():
-        expected = (f"{percent:.1f}" for _, percent in each.expected_sd_percent.items())
-        boards.append((board, str(len(each.modes)), f"{each.in_sample_rms_cents:.1f}", *expected, each.law))
+        expected = (number(share, 1) for _, share in each.expected_sd_percent.items())
+        boards.append((board, len(each.modes), number(each.in_sample_rms_cents, 1), *expected, each.law))
     tables = [
         Table(
             "Boards; error of weighted least squares, cents; sd to expect, %",
@@ -74,8 +73,8 @@ def searched_tables(diagnosis: CampaignDiagnosis) -> tuple[Table, ...]:
             (
                 board,
                 number(one.log_score_gain, 1, signed=True),
-                f"{one.before_rms_cents:.1f}",
-                f"{one.after_rms_cents:.1f}",
+                number(one.before_rms_cents, 1),
+                number(one.after_rms_cents, 1),
                 f"{one.p_value:.2g}" + (" refuses" if one.refuses else ""),
             )
             for board, one in diagnosis.left_out_boards.items()
@@ -122,10 +121,10 @@ def taught_table(summary: CampaignSummary, name: str) -> Table:
 
 def boards_table(summary: CampaignSummary) -> Table:
     """The boards' constants side by side, GPa."""
-    rows = []
+    rows: list[Row] = []
     for board, one in summary.boards.items():
         constants = (plus_minus(entry, GPA) for _, entry in one.elastic.items())
-        rows.append((board, *constants, f"{one.error.in_sample_rms_cents:.1f}"))
+        rows.append((board, *constants, number(one.error.in_sample_rms_cents, 1)))
     return Table("Boards, GPa; error rms, cents", ("board", "E_x", "E_y", "G_xy", "error"), tuple(rows))
 
 
@@ -133,9 +132,9 @@ def common_table(common: Mapping[str, CommonResidual]) -> Table:
     """What is left over on all boards alike, cents."""
     rows = []
     for label, one in common.items():
-        each = ", ".join(number(value, 0, signed=True) for value in one.boards.values())
+        each = ", ".join(str(number(value, 0, signed=True)) for value in one.boards.values())
         mean = f"{number(one.mean_cents, 1, signed=True)} ± {one.error_cents:.1f}"
-        rows.append((label, mean, number(one.scatter_cents, 1), str(len(one.boards)), each))
+        rows.append((label, mean, number(one.scatter_cents, 1), len(one.boards), each))
     return Table(
         "What is left over on all boards alike: measured over predicted, cents",
         ("mode", "mean ± error", "scatter", "boards", "each board"),
@@ -145,14 +144,12 @@ def common_table(common: Mapping[str, CommonResidual]) -> Table:
 
 def population_table(population: PopulationSummary) -> Table:
     """The distribution of the boards' constants, and the board that comes next."""
-    rows = []
-    for name, entry in population.mean.items():
-        sd: Spread = population.sd_percent[name]
-        rows.append(
-            (narrow_name(name), plus_minus(entry, GPA), plus_minus(sd), interval(population.next_board[name], GPA))
-        )
-    return Table(
+    return by_constant(
         "Population of the boards, GPa",
-        ("constant", "median ± sd", "spread, %", "90 % of the next board"),
-        tuple(rows) or ((MISSING,) * 4,),
+        {
+            "median ± sd": lambda name: plus_minus(population.mean[name], GPA),
+            "spread, %": lambda name: plus_minus(population.sd_percent[name]),
+            "90 % of the next board": lambda name: interval(population.next_board[name], GPA),
+        },
+        names=population.mean,
     )

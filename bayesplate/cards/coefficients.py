@@ -16,16 +16,7 @@ from bayesplate.cards.reading import read_file, read_table
 from bayesplate.cards.schema import Section, validated
 from bayesplate.cards.setup import Edges
 from bayesplate.cards.shelf import find
-from bayesplate.cards.values import (
-    Complaint,
-    Number,
-    Refusal,
-    read_each,
-    read_format,
-    read_list,
-    read_name,
-    read_text,
-)
+from bayesplate.cards.values import Complaint, Number, Refusal, read_each, read_format, read_list, read_name, read_text
 from bayesplate.cards.values import read_table as read_entries
 from bayesplate.cards.words import shown
 from bayesplate.errors import plain

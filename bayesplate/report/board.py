@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from bayesplate.frequencies.system import System, system_of
 from bayesplate.plate.board import Board, Values, vibrating_lengths
 from bayesplate.plate.setup import EDGES, Setup
-from bayesplate.report.colours import DARK, GREY, LIGHT, VERMILLION
-from bayesplate.report.style import SMALL, WIDTH, WORDS, Picture, placed, short
+from bayesplate.report.style import DARK, GREY, LIGHT, SMALL, VERMILLION, WIDTH, WORDS, Picture, placed, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

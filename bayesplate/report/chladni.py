@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from bayesplate.estimates.sheet import CombinedMode, Sheet, SheetMode, points
 from bayesplate.frequencies.system import Limits
-from bayesplate.report.colours import BLUE, DARK, GREEN, VERMILLION
-from bayesplate.report.style import SMALL, WORDS, drawable, placed
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.style import BLUE, DARK, GREEN, SMALL, VERMILLION, WORDS, drawable, in_figure, placed
 from bayesplate.results.words import STIFFNESS, STIFFNESS_OF_ISOTROPIC
 
 if TYPE_CHECKING:

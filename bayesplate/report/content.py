@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bayesplate.cards import PriorCard
+from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.plate.board import Board
 from bayesplate.plate.parameter import Parameter, unit_of_people
@@ -10,23 +11,20 @@ from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.quantities import Quantity
-from bayesplate.report.priors import input_words
-from bayesplate.report.words import effect_sentence
+from bayesplate.report.posterior import input_words
 from bayesplate.results.budget import budget, row_words
 from bayesplate.results.contract import Spread
-from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Percentile, Summary
-from bayesplate.results.tables import Table, modes_table, peaks_table
+from bayesplate.results.fit_tables import modes_table, peaks_table
+from bayesplate.results.summary import NONE_JUDGED, TOO_FEW_LEFT, Summary
+from bayesplate.results.tables import Cell, Row, Table, by_constant
 from bayesplate.results.words import (
     CONSTANTS,
     GPA,
-    MISSING,
+    Value,
     constant_name,
-    decimals,
-    interval,
     number,
     percent,
     plus_minus,
-    rounded,
     two_digits,
 )
 
@@ -61,7 +59,7 @@ def summary_sentences(summary: Summary) -> list[str]:
         return [*sentences, f"The modulus is known to ± {two_digits(entry.sd / entry.mean, 100)} %."]
     share, weakest = max((entry.sd / entry.mean, name) for name, entry in summary.elastic.items())
     told = two_digits(share, 100)
-    alike = all(two_digits(entry.sd / entry.mean, 100) == told for _, entry in summary.elastic.items())
+    alike = all(str(two_digits(entry.sd / entry.mean, 100)) == str(told) for _, entry in summary.elastic.items())
     which = "All three are known equally well" if alike else f"Least well known is {constant_name(weakest)}"
     return [*sentences, f"{which}: ± {told} %."]
 
@@ -70,35 +68,10 @@ def _cents(value: float) -> str:
     return f"{two_digits(value)} cents ({two_digits(2 ** (value / 1200) - 1, 100)} %)"
 
 
-def constants_table(summary: Summary, title: str) -> Table:
-    """The constants beside the older methods."""
-    rows = []
-    for name in CONSTANTS:
-        entry = summary.elastic[name]
-        digits = decimals(entry.sd * GPA)
-        points = (summary.least_squares, summary.weighted_least_squares)
-        cells = (number(estimate[name], digits, factor=GPA) for estimate in points)
-        trimmed = _trimmed(summary.percentile, name)
-        told = constant_name(name, isotropic=summary.model.isotropic)
-        rows.append((told, plus_minus(entry, GPA), interval(entry, GPA), *cells, trimmed))
-    columns = ("GPa", "mean ± sd", "90 % interval", "paper's least squares", "weighted", "percentile method")
-    return Table(title, columns, tuple(rows))
-
-
-def _trimmed(percentile: Percentile | None, name: str) -> str:
-    """The percentile method's mean and its own spread, GPa."""
-    if percentile is None or (mean := percentile[name].mean) is None:
-        return MISSING
-    sd_percent = percentile[name].sd_percent
-    if sd_percent is None:
-        return number(mean, 3, factor=GPA)
-    return " ± ".join(text for text in rounded(mean * GPA, mean * GPA * sd_percent / 100) if text)
-
-
 def makers_table(summary: Summary) -> Table:
     """What makers derive from the constants, along and across the grain."""
     derived = summary.derived
-    rows = [
+    rows: list[Row] = [
         (words, *(plus_minus(derived[f"{name}_{axis}"], factor) for axis in "xy"), unit)
         for name, words, factor, unit in _MAKERS
     ]
@@ -108,7 +81,7 @@ def makers_table(summary: Summary) -> Table:
 def ratios_table(summary: Summary) -> Table:
     """Ratios of the constants, and the density."""
     derived = summary.derived
-    rows = [(words, plus_minus(derived[name])) for name, words in _RATIOS]
+    rows: list[Row] = [(words, plus_minus(derived[name])) for name, words in _RATIOS]
     rows.append(("density ρ, kg/m³", plus_minus(derived["density"])))
     rows += [(f"{name}, N m", plus_minus(entry)) for name, entry in summary.rigidity.items()]
     return Table("Ratios, density, rigidities", ("", "mean ± sd"), tuple(rows))
@@ -134,15 +107,15 @@ def _named(effect: str, where: str, parameter: str, shape: Parameter | None) -> 
     return f"{name}, {where}: {shape.look}", shape.words.removesuffix(f" of {name}")
 
 
-def _measured(entry: Spread) -> tuple[str, str]:
+def _measured(entry: Spread) -> tuple[Cell, Cell]:
     """Mean ± sd and the unit, in the unit that people use."""
     factor, unit = unit_of_people(entry.unit)
-    return plus_minus(entry, factor), unit or MISSING
+    return plus_minus(entry, factor), unit or None
 
 
 def effect_sentences(summary: Summary) -> list[str]:
     """One plain sentence a declared effect."""
-    return [f"{effect_name(name)}: {effect_sentence(name)}" for name in summary.model.effects]
+    return [f"{effect_name(name)}: {EFFECTS[name].sentence}" for name in summary.model.effects]
 
 
 def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
@@ -150,18 +123,24 @@ def budget_table(inference: Inference, draws: Draws, summary: Summary) -> Table:
     board = inference.problem.board
     shares = budget(draws, board)
     alone = dict(zip(CONSTANTS, inference.problem.identifiability.errors_of_rigidities, strict=True))
-    rows = []
-    for name in CONSTANTS:
-        entry = summary.elastic[name]
+    named = {one.name: input_words(one, board)[0] for one in board.uncertain}
+
+    def inputs(name: str) -> str | None:
         largest = sorted(shares[name].items(), key=lambda item: -item[1])[:2]
-        named = {one.name: input_words(one, board)[0] for one in board.uncertain}
-        told = [
+        told = (
             f"{named.get(key) or row_words(key, board)} {percent(share)}" for key, share in largest if share >= 0.05
-        ]
-        both = (f"{two_digits(entry.sd / entry.mean, 100)} %", f"{two_digits(alone[name], 100)} %")
-        rows.append((name, *both, ", ".join(told) or MISSING))
-    columns = ("constant", "sd", "from the expected noise alone", "share of the variance from inputs")
-    return Table("Where the uncertainty comes from", columns, tuple(rows))
+        )
+        return ", ".join(told) or None
+
+    return by_constant(
+        "Where the uncertainty comes from",
+        {
+            "sd": lambda name: f"{two_digits(summary.elastic[name].sd / summary.elastic[name].mean, 100)} %",
+            "from the expected noise alone": lambda name: f"{two_digits(alone[name], 100)} %",
+            "share of the variance from inputs": inputs,
+        },
+        isotropic=summary.model.isotropic,
+    )
 
 
 def inputs_table(board: Board, summary: Summary) -> Table:
@@ -172,7 +151,7 @@ def inputs_table(board: Board, summary: Summary) -> Table:
         entry = (
             summary.effects[one.owner.title][one.effect][one.key] if one.is_of_effect else summary.inputs.get(one.name)
         )
-        after = MISSING if entry is None or one.prior.is_exact else plus_minus(entry, factor)
+        after = None if entry is None or one.prior.is_exact else plus_minus(entry, factor)
         rows.append((f"{words}, {unit}" if unit else words, _stated(one.prior, factor), after))
     return Table("Inputs", ("quantity", "as stated", "after the fit"), tuple(rows))
 
@@ -182,7 +161,7 @@ def _stated(quantity: Quantity, factor: float) -> str:
         return f"{quantity.mean * factor:.6g} (taken as exact)"
     n = len(quantity.readings)
     readings = f", {n} reading{'s' * (n != 1)}" if n else ""
-    return plus_minus(quantity, factor) + readings
+    return f"{plus_minus(quantity, factor)}{readings}"
 
 
 def setups_table(board: Board) -> Table:
@@ -220,11 +199,11 @@ def modes_tables(summary: Summary) -> list[Table]:
 
 def laws_table(summary: Summary) -> Table:
     """Posterior means under both laws."""
-    rows = []
-    for name in CONSTANTS:
-        both = (summary.linear_means, summary.exact_means)
-        rows.append((name, *(number(means[name], 3, factor=GPA) for means in both)))
-    return Table("Means under both frequency laws, GPa", ("constant", "linear law", "exact law"), tuple(rows))
+    columns = {
+        "linear law": lambda name: number(summary.linear_means[name], 3, factor=GPA),
+        "exact law": lambda name: number(summary.exact_means[name], 3, factor=GPA),
+    }
+    return by_constant("Means under both frequency laws, GPa", columns, isotropic=summary.model.isotropic)
 
 
 def model_rows(summary: Summary) -> list[tuple[str, str]]:
@@ -243,7 +222,7 @@ def model_rows(summary: Summary) -> list[tuple[str, str]]:
     ]
 
 
-def sampler_rows(summary: Summary) -> list[tuple[str, str]]:
+def sampler_rows(summary: Summary) -> list[tuple[str, str | Value]]:
     """How the sampler fared, beside what convergence asks for."""
     one, limits = summary.sampler, Gate()
     return [

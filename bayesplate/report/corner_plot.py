@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,9 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.report.colours import BLACK, ORANGE, POSTERIOR
-from bayesplate.report.priors import input_words
+from bayesplate.report.posterior import input_words
 from bayesplate.report.saving import drawing, save_figure
-from bayesplate.report.style import SMALL, WIDTH, Picture, limits, short
-from bayesplate.report.symbols import in_figure, is_symbol
+from bayesplate.report.style import BLACK, ORANGE, POSTERIOR, SMALL, WIDTH, Picture, in_figure, is_symbol, limits, short
 from bayesplate.results.budget import input_shares
 from bayesplate.results.words import GPA
 
@@ -66,6 +64,8 @@ def corner_figure(
     matplotlib.figure.Figure
         No state of pyplot is touched.
     """
+    load_arviz()  # which corner imports, and which has to be kept quiet
+    import corner
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -77,7 +77,6 @@ def corner_figure(
     width = _LEFT + len(columns) * (side + _GAP) - _GAP + _RIGHT
     height = width - _LEFT - _RIGHT + _BOTTOM + _TOP
     figure = Figure(figsize=(width, height))
-    corner = load_corner()
     with rc_context({"axes.formatter.useoffset": False}):
         corner.corner(
             np.column_stack([np.ravel(values) for values in columns.values()]),
@@ -135,14 +134,6 @@ def corner_picture(problem: PosedProblem, draws: Draws) -> Picture:
     )
     figure = corner_figure(columns, labels=axis_labels(list(columns)))
     return Picture("corner", "Which quantities hang together", alt, caption, figure)
-
-
-def load_corner() -> Any:
-    """The package."""
-    load_arviz()  # which corner imports, and which has to be kept quiet
-    import corner
-
-    return corner
 
 
 def panel_side(n_columns: int) -> float:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import gc
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib.resources import files
@@ -14,37 +12,37 @@ from typing import Any
 
 from bayesplate.cards import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.exports import write_before_after, write_known
+from bayesplate.diagnosis.wording.tables import write_diagnosis_tables
 from bayesplate.files import make_folder, write_text
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.report import content
 from bayesplate.report.board import board_picture
-from bayesplate.report.constants import constants_picture
-from bayesplate.report.corner_plot import corner_picture, load_corner
-from bayesplate.report.fitted_modes import modes_pictures
-from bayesplate.report.health import health_picture
-from bayesplate.report.null_control import null_picture
-from bayesplate.report.percentiles import percentiles_pictures
-from bayesplate.report.priors import priors_picture
-from bayesplate.report.residuals import predictive_picture, residuals_picture
+from bayesplate.report.constants import constants_picture, percentiles_pictures
+from bayesplate.report.corner_plot import corner_picture
+from bayesplate.report.diagnosis import before_after_picture, null_picture, signatures_picture
+from bayesplate.report.modes import (
+    modes_pictures,
+    predictive_picture,
+    residuals_picture,
+    shares_picture,
+    spectrum_pictures,
+)
+from bayesplate.report.posterior import health_picture, priors_picture
 from bayesplate.report.saving import drawing, save_pictures
-from bayesplate.report.shares import shares_picture
-from bayesplate.report.signatures import before_after_picture, signatures_picture
-from bayesplate.report.spectrum import spectrum_pictures
-from bayesplate.report.style import Picture, visible
-from bayesplate.report.symbols import in_page
+from bayesplate.report.style import Picture
 from bayesplate.report.verdict import diagnosis_section, page_warnings, quoted, quoted_constants, short_sentences
-from bayesplate.results.exports import write_exports
+from bayesplate.results.fit_tables import write_constants
 from bayesplate.results.folder import FIGURES, PAGE
 from bayesplate.results.references import references
 from bayesplate.results.summary import Summary
+from bayesplate.results.tables import escape, render, visible
 
 _PIXELS_AN_INCH = 96
 
 
 @dataclass(frozen=True)
-class Shown:
+class PagePicture:
     """A picture as the page holds it: its words, its size in pixels, and its content as a data address."""
 
     name: str
@@ -54,15 +52,6 @@ class Shown:
     width: int
     height: int
     source: str
-
-
-def load_libraries() -> None:
-    """Import what draws and lays out, so that a page written later does not wait for it."""
-    import jinja2  # noqa: F401
-    from matplotlib.backends import backend_agg, backend_svg  # noqa: F401
-    from matplotlib.figure import Figure  # noqa: F401
-
-    load_corner()
 
 
 @drawing()
@@ -93,19 +82,17 @@ def write_report(
     Path
         Of report.html. It shows the SVG figures, and is there before the PNG files are.
     """
-    with _uncollected():
-        title = inference.problem.board.title or summary.name
-        make_folder(folder)
-        write_exports(folder, quoted(summary, diagnosis), title)
-        if diagnosis is not None:
-            write_before_after(folder, diagnosis, title)
-            write_known(folder, diagnosis, title)
-        groups = pictures(inference, draws, summary, diagnosis)
-        return save_page(folder / PAGE, groups, lambda shown: render(card, inference, draws, summary, shown, diagnosis))
+    title = inference.problem.board.title or summary.name
+    make_folder(folder)
+    write_constants(folder, quoted(summary, diagnosis), title)
+    if diagnosis is not None:
+        write_diagnosis_tables(folder, diagnosis, title)
+    groups = pictures(inference, draws, summary, diagnosis)
+    return save_page(folder / PAGE, groups, lambda shown: fit_page(card, inference, draws, summary, shown, diagnosis))
 
 
 def save_page(
-    path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[Shown]]], str]
+    path: Path, groups: Mapping[str, Sequence[Picture]], text: Callable[[Mapping[str, Sequence[PagePicture]]], str]
 ) -> Path:
     """Write a page and, into the folder beside it, its figures as PNG and SVG.
 
@@ -128,18 +115,6 @@ def save_page(
     write_text(path, text({place: [_shown(one, vector[one.name]) for one in found] for place, found in groups.items()}))
     save_pictures(every, path.parent / FIGURES, "png")
     return path
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Without looking for garbage: what is drawn lives until it is written, and the search takes a fifth longer."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 def pictures(
@@ -175,21 +150,21 @@ def _of_diagnosis(diagnosis: Diagnosis | None) -> tuple[list[Picture], list[Pict
     return [before_after] if before_after else [], [one for one in more if one]
 
 
-def _shown(picture: Picture, svg: bytes) -> Shown:
+def _shown(picture: Picture, svg: bytes) -> PagePicture:
     """A picture as a page holds it, from the content of its SVG file."""
     from markupsafe import Markup
 
     width, height = (round(_PIXELS_AN_INCH * side) for side in picture.figure.get_size_inches())
     source = Markup(f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}")  # nothing in it to escape
-    return Shown(picture.name, picture.title, picture.alt, picture.caption, width, height, source)
+    return PagePicture(picture.name, picture.title, picture.alt, picture.caption, width, height, source)
 
 
-def render(
+def fit_page(
     card: BoardCard,
     inference: Inference,
     draws: Draws,
     summary: Summary,
-    shown: Mapping[str, Sequence[Shown]],
+    shown: Mapping[str, Sequence[PagePicture]],
     diagnosis: Diagnosis | None = None,
 ) -> str:
     """The page as text; parameters as of `write_report`, `shown` the pictures by their place."""
@@ -242,7 +217,8 @@ def from_template(template: str, /, **values: Any) -> str:
 
     loader = PackageLoader("bayesplate.report", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, finalize=cleaned)
-    environment.filters["symbols"] = lambda text: in_page(visible(str(text)))
+    environment.filters["symbols"] = lambda text: Markup(escape(str(text), "html"))
+    environment.globals["table"] = lambda shown, kind="": Markup(render(shown, "html", kind=kind))
     css = files("bayesplate.report").joinpath("templates/report.css").read_text(encoding="utf-8")
     digest = b64encode(sha256(css.encode("utf-8")).digest()).decode("ascii")
     policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"

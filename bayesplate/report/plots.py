@@ -17,21 +17,15 @@ from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.report.bench import bench_sheet
 from bayesplate.report.board import board_picture
-from bayesplate.report.campaign_figures import boards_picture, common_picture, left_out_picture, shared_picture
+from bayesplate.report.campaign import boards_picture, common_picture, left_out_picture, shared_picture
 from bayesplate.report.chladni import chladni_sheet
-from bayesplate.report.constants import constants_figure
+from bayesplate.report.constants import constants_figure, percentiles_pictures
 from bayesplate.report.corner_plot import axis_labels, corner_figure, corner_picture, words_and_factor
-from bayesplate.report.fitted_modes import modes_pictures
-from bayesplate.report.gains import gains_picture
-from bayesplate.report.health import health_picture
-from bayesplate.report.null_control import null_picture
-from bayesplate.report.percentiles import percentiles_pictures
-from bayesplate.report.priors import priors_picture
-from bayesplate.report.residuals import predictive_picture, residuals_picture
-from bayesplate.report.shares import shares_picture
-from bayesplate.report.signatures import before_after_picture, signatures_picture
+from bayesplate.report.diagnosis import before_after_picture, null_picture, signatures_picture
+from bayesplate.report.modes import modes_pictures, predictive_picture, residuals_picture, shares_picture
+from bayesplate.report.planning import bench_sheet, gains_picture
+from bayesplate.report.posterior import health_picture, priors_picture
 from bayesplate.report.style import Picture
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.summary import Summary
@@ -41,8 +35,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+class Plots:
+    """Figures by name."""
+
+    def __repr__(self) -> str:
+        names = (name for name in dir(self) if not name.startswith("_") and callable(getattr(self, name)))
+        return f"<figures: {', '.join(f'.{name}()' for name in names)}>"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class FitPlots:
+class FitPlots(Plots):
     """The figures of a fit."""
 
     inference: Inference
@@ -116,9 +118,6 @@ class FitPlots:
         """The board to scale, its edges, hammer and sensors."""
         return board_picture(self.inference.problem.board).figure
 
-    def __repr__(self) -> str:
-        return f"<figures of {self.summary.name}: {_methods(self)}>"
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DiagnosePlots(FitPlots):
@@ -143,7 +142,7 @@ class DiagnosePlots(FitPlots):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PlanPlots:
+class PlanPlots(Plots):
     """The figures of a plan."""
 
     plan: Plan
@@ -159,7 +158,7 @@ class PlanPlots:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModesPlots:
+class ModesPlots(Plots):
     """The sheets of Chladni figures."""
 
     sheets: tuple[Sheet, ...]
@@ -168,12 +167,9 @@ class ModesPlots:
         """The sheet of a setup, the first unless named."""
         return chladni_sheet(self.sheets[_place("setup", setup, [one.setup for one in self.sheets])])
 
-    def __repr__(self) -> str:
-        return f"<figures: {_methods(self)}>"
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CheckPlots:
+class CheckPlots(Plots):
     """What can be drawn before anything is sampled."""
 
     problem: PosedProblem
@@ -187,12 +183,9 @@ class CheckPlots:
         """The board to scale, its edges, hammer and sensors."""
         return board_picture(self.problem.board).figure
 
-    def __repr__(self) -> str:
-        return f"<figures of {self.report.name}: {_methods(self)}>"
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ComparePlots:
+class ComparePlots(Plots):
     """The posteriors of a comparison by theory of the plate."""
 
     draws: Mapping[str, Draws]
@@ -202,9 +195,6 @@ class ComparePlots:
         _place("theory", theory, list(self.draws))
         columns = {f"{name}, GPa": values * GPA for name, values in self.draws[theory].moduli.items()}
         return corner_figure(columns, labels=axis_labels(list(columns)))
-
-    def __repr__(self) -> str:
-        return f"<figures: {_methods(self)}>"
 
 
 def _figure(picture: Picture | None, place: str, wanted: str, got: str) -> Figure:
@@ -221,13 +211,8 @@ def _place(what: str, name: str | None, names: Sequence[str]) -> int:
     return 0 if name is None else list(names).index(name)
 
 
-def _methods(plots: object) -> str:
-    """The figures that there are."""
-    return ", ".join(f".{name}()" for name in dir(plots) if not name.startswith("_") and callable(getattr(plots, name)))
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class CampaignPlots:
+class CampaignPlots(Plots):
     """The figures of a campaign, and of its diagnosis where there is one."""
 
     summary: CampaignSummary

@@ -1,8 +1,7 @@
-"""What the figures of a report share: width, panels placed in inches, rows with names, humps, whiskers, legends."""
+"""What the figures of a report share: colours, width, panels placed in inches, rows, humps, whiskers, legends."""
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.report.colours import DARK, POSTERIOR
+from bayesplate.results.tables import GREEK, JOINERS, SYMBOL, visible
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -21,6 +20,11 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Limits = tuple[float, float]
+
+BLUE, ORANGE, GREEN, VERMILLION, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
+"""Those of Okabe and Ito: told apart by every eye, and in grey."""
+BLACK, DARK, GREY, LIGHT = "#000000", "0.30", "0.55", "0.88"
+POSTERIOR, PAPER, WEIGHTED = BLUE, ORANGE, BLACK
 
 WIDTH = 4.5
 """Inches. On a phone a point is then about one pixel of the page, so that the smallest words below stay readable."""
@@ -225,27 +229,27 @@ def moved_apart(wanted: NDArray[np.float64], least: float) -> NDArray[np.float64
     return placed
 
 
+def in_figure(text: str) -> str:
+    """A text of ours with its symbols as matplotlib's mathematics; a user's text must not come here."""
+    return SYMBOL.sub(
+        lambda found: f"${GREEK.get(found['letter'], ('', found['letter']))[1]}_{{{found['index']}}}$", text
+    )
+
+
+def is_symbol(name: str) -> bool:
+    """Whether a name, its unit aside, is a symbol of ours and nothing else: such a text holds nothing of a user's."""
+    return SYMBOL.fullmatch(name.partition(",")[0]) is not None
+
+
 def short(text: str, longest: int) -> str:
     """A text cut to a number of characters, the cut shown."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def visible(text: str) -> str:
-    """A text from a card without what steers the way text runs: control characters and direction marks are removed."""
-    if text.isprintable():
-        return text
-    kept = (character if character not in "\t\n\r" else " " for character in text)
-    return "".join(c for c in kept if unicodedata.category(c) not in {"Cc", "Cf", "Cs", "Co", "Cn"} or c in _JOINERS)
-
-
-_JOINERS = "\u200c\u200d"
-"""Format characters that shape letters and join emoji; they steer nothing."""
-
-
 def drawable(text: str) -> str:
     """A text from a card as a figure can show it: what the font has no sign for becomes one that says so."""
     known = _glyphs()
-    return "".join(c if ord(c) in known else NO_GLYPH for c in visible(text) if c not in _JOINERS)
+    return "".join(c if ord(c) in known else NO_GLYPH for c in visible(text) if c not in JOINERS)
 
 
 @lru_cache(maxsize=1)

@@ -24,8 +24,9 @@ from bayesplate.diagnosis.wording.told import (
     warnings,
 )
 from bayesplate.diagnosis.wording.words import IN_PART, VERDICTS
-from bayesplate.report.content import constants_table, summary_sentences
+from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import Elastic, Rigidity
+from bayesplate.results.fit_tables import compared_constants
 from bayesplate.results.summary import Summary
 from bayesplate.results.tables import Table
 
@@ -122,8 +123,8 @@ def quoted(summary: Summary, diagnosis: Diagnosis | None) -> Summary:
 
 def quoted_constants(summary: Summary, diagnosis: Diagnosis | None) -> Table:
     """The constants to quote beside the older methods; its title says what they are."""
-    title = "Elastic constants" + ("" if diagnosis is None else f", {what_is_quoted(diagnosis)}")
-    return constants_table(quoted(summary, diagnosis), title)
+    what = "" if diagnosis is None else f", {what_is_quoted(diagnosis)}"
+    return compared_constants(quoted(summary, diagnosis), f"Elastic constants{what}, GPa")
 
 
 def short_sentences(summary: Summary, diagnosis: Diagnosis | None) -> list[str]:

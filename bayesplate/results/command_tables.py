@@ -5,19 +5,17 @@ from __future__ import annotations
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.comparison import Estimated, MethodRow, TheoryRow
 from bayesplate.results.sheets import EnergyShares, ModesReport, SheetReport, SheetRow
-from bayesplate.results.tables import Table
+from bayesplate.results.tables import Cell, Row, Table, by_constant
 from bayesplate.results.words import (
     CONSTANTS,
     GPA,
-    MISSING,
+    Value,
     chances,
     decimals,
     is_isotropic,
     mode_name,
-    narrow_name,
     number,
     percent,
-    rounded,
     two_digits,
 )
 
@@ -40,30 +38,29 @@ _NO_MODE, _LEAST_TOLD = "none", 0.005
 
 def check_tables(report: CheckReport) -> tuple[Table, ...]:
     """What `check` found: the constants with the precision to expect, the modes, and what effects would do."""
-    constants = tuple(
-        (
-            narrow_name(name, isotropic=is_isotropic(dict(report.estimate.items()))),
-            number(estimate, decimals(estimate * report.expected_sd_percent[name] / 100 * GPA), factor=GPA),
-            f"± {two_digits(report.expected_sd_percent[name])} %",
-        )
-        for name in CONSTANTS
-        for estimate in (report.estimate[name],)
-    )
+
+    def estimate(name: str) -> Value:
+        value = report.estimate[name]
+        return number(value, decimals(value * report.expected_sd_percent[name] / 100 * GPA), factor=GPA)
+
     modes = tuple(
         (
             mode_name(mode.label, mode.setup, several=len(report.setups) > 1),
-            f"{mode.measured_hz:.6g}",
+            mode.measured_hz,
             number(mode.residual_cents, 1, signed=True),
-            " / ".join(number(share, 0) for share in mode.share_percent),
-            f"{mode.leverage:.2f}",
+            " / ".join(str(number(share, 0)) for share in mode.share_percent),
+            number(mode.leverage, 2),
         )
         for mode in report.modes
     )
     return (
-        Table(
+        by_constant(
             f"What {report.name} can tell, GPa",
-            ("constant", "weighted least squares", "uncertainty to expect"),
-            constants,
+            {
+                "weighted least squares": estimate,
+                "uncertainty to expect": lambda name: f"± {two_digits(report.expected_sd_percent[name])} %",
+            },
+            isotropic=is_isotropic(dict(report.estimate.items())),
         ),
         Table("Modes", ("mode", "measured Hz", "error, cents", "energy in D_x/D_y/D_s, %", "leverage"), modes),
         *([_effects_table(report)] if report.signatures else []),
@@ -78,10 +75,10 @@ def _effects_table(report: CheckReport) -> Table:
     rows = tuple(
         (
             one.effect,
-            f"{one.raw_rms_cents:.1f}",
+            number(one.raw_rms_cents, 1),
             f"{one.visible_rms_cents:.1f}" + (" *" if one.below_detection_limit else "  "),
-            "/".join(number(bias, 1, signed=True) for _, bias in one.bias_percent.items()),
-            "\n".join(one.look_alikes) or MISSING,
+            "/".join(str(number(bias, 1, signed=True)) for _, bias in one.bias_percent.items()),
+            "\n".join(one.look_alikes) or None,
         )
         for one in report.signatures
     )
@@ -101,7 +98,7 @@ def methods_table(name: str, theory: TheoryRow) -> Table:
     )
 
 
-def _method_cells(method: MethodRow) -> tuple[str, ...]:
+def _method_cells(method: MethodRow) -> tuple[Cell, ...]:
     subsets = "" if method.n_subsets is None else f" ({method.n_subsets})"
     cells = (_constant(entry) for _, entry in method.elastic.items())
     return (_METHODS[method.name] + subsets, *cells, number(method.forward_rms_cents, 1))
@@ -110,10 +107,10 @@ def _method_cells(method: MethodRow) -> tuple[str, ...]:
 def forward_table(theory: TheoryRow) -> Table:
     """The forward check: what the exact law predicts at each method's constants, less the reading, cents."""
     several = len({mode.setup for mode in theory.modes}) > 1
-    rows = [
+    rows: list[Row] = [
         (
             mode_name(mode.label, mode.setup, several=several),
-            f"{mode.measured_hz:.6g}",
+            mode.measured_hz,
             *(number(method.forward[i].cents, 1, signed=True) for method in theory.methods),
             number(mode.left_out_cents, 1, signed=True, factor=-1.0),
         )
@@ -126,12 +123,10 @@ def forward_table(theory: TheoryRow) -> Table:
     )
 
 
-def _constant(entry: Estimated) -> str:
-    if entry.mean is None:
-        return MISSING
-    if not entry.sd:
+def _constant(entry: Estimated) -> Value:
+    if entry.mean is None or not entry.sd:
         return number(entry.mean, _DEFAULT_DIGITS, factor=GPA)
-    return " ± ".join(rounded(entry.mean * GPA, entry.sd * GPA))
+    return Value(entry.mean * GPA, entry.sd * GPA)
 
 
 def sheet_tables(report: ModesReport) -> tuple[Table, ...]:
@@ -142,11 +137,11 @@ def sheet_tables(report: ModesReport) -> tuple[Table, ...]:
 
 def _proposed_table(report: ModesReport) -> Table:
     """The labels proposed for bare peaks, how probable each is, and what else it may be."""
-    rows = []
+    rows: list[Row] = []
     for one in report.proposed:
         label = one.label or _NO_MODE
         others = {name: p for name, p in one.probability.items() if name != label and p > _LEAST_TOLD}
-        rows.append((f"{one.measured_hz:.6g}", label, percent(one.probability[label]), chances(others)))
+        rows.append((one.measured_hz, label, percent(one.probability[label]), chances(others)))
     return Table(f"Labels proposed for the peaks of {report.name}", ("Hz", "mode", "probability", "or"), tuple(rows))
 
 
@@ -167,7 +162,7 @@ def _sheet_table(name: str, setup: SheetReport) -> Table:
     rows = tuple(
         (
             mode.label,
-            f"{mode.hz:.1f}",
+            number(mode.hz, 1),
             _reading(mode),
             " / ".join(str(share) for share in _shares(mode.share_percent, has_effects)),
             *(f"{coefficient:.4g}" for coefficient in (mode.a, mode.b, mode.c)),
@@ -190,7 +185,7 @@ def _shares(shares: EnergyShares, has_effects: bool) -> list[int]:
     return [round(share) for share in wanted]
 
 
-def _reading(mode: SheetRow) -> str:
+def _reading(mode: SheetRow) -> Cell:
     if mode.likely_hz is not None:
         return " to ".join(f"{end:.1f}" if end < _WHOLE_HZ else f"{end:.0f}" for end in mode.likely_hz)
-    return MISSING if mode.measured_hz is None else f"{mode.measured_hz:.6g}"
+    return mode.measured_hz

@@ -1,18 +1,19 @@
-"""What results are made of: one value per elastic constant, the spread of draws, and the one way to JSON."""
+"""What results are made of: one value per elastic constant, spread and joint spread of draws, the one way to JSON."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.posterior.draws import Draws
 
-Value = TypeVar("Value")
+Held = TypeVar("Held")
 
 NOT_IN_JSON = {"in_json": False}
 """Metadata of a field that `as_json` leaves out."""
@@ -21,16 +22,16 @@ _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @dataclass(frozen=True)
-class ByConstant(Generic[Value]):
+class ByConstant(Mapping[str, Held]):
     """One value per constant, by attribute or by name as in a dict: `elastic.E_x` is `elastic["E_x"]`."""
 
     NAMES: ClassVar[tuple[str, ...]] = ()
 
-    def __getitem__(self, name: str) -> Value:
+    def __getitem__(self, name: str) -> Held:
         if name not in self.NAMES:
             raise KeyError(name)
-        value: Value = getattr(self, name)
-        return value
+        held: Held = getattr(self, name)
+        return held
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.NAMES)
@@ -38,45 +39,37 @@ class ByConstant(Generic[Value]):
     def __len__(self) -> int:
         return len(self.NAMES)
 
-    def keys(self) -> tuple[str, ...]:
-        """The names."""
-        return self.NAMES
-
-    def items(self) -> tuple[tuple[str, Value], ...]:
-        """Name and value of each."""
-        return tuple((name, self[name]) for name in self.NAMES)
-
 
 @dataclass(frozen=True)
-class Elastic(ByConstant[Value]):
+class Elastic(ByConstant[Held]):
     """One value per elastic modulus."""
 
-    E_x: Value
-    E_y: Value
-    G_xy: Value
+    E_x: Held
+    E_y: Held
+    G_xy: Held
     NAMES: ClassVar[tuple[str, ...]] = MODULI
 
 
 @dataclass(frozen=True)
-class Rigidity(ByConstant[Value]):
+class Rigidity(ByConstant[Held]):
     """One value per rigidity."""
 
-    D_x: Value
-    D_y: Value
-    D_s: Value
+    D_x: Held
+    D_y: Held
+    D_s: Held
     NAMES: ClassVar[tuple[str, ...]] = RIGIDITIES
 
 
 @dataclass(frozen=True)
-class Constants(ByConstant[Value]):
+class Constants(ByConstant[Held]):
     """One value per modulus (Pa) and per rigidity (N m)."""
 
-    E_x: Value
-    E_y: Value
-    G_xy: Value
-    D_x: Value
-    D_y: Value
-    D_s: Value
+    E_x: Held
+    E_y: Held
+    G_xy: Held
+    D_x: Held
+    D_y: Held
+    D_s: Held
     NAMES: ClassVar[tuple[str, ...]] = MODULI + RIGIDITIES
 
 
@@ -134,3 +127,44 @@ def rms(values: Sequence[float | None] | NDArray[np.float64]) -> float | None:
     numbers = np.array(values, dtype=float)
     numbers = numbers[np.isfinite(numbers)]
     return float(np.sqrt(np.mean(numbers**2))) if numbers.size else None
+
+
+JOINT = (*MODULI, *RIGIDITIES, "density")
+"""Whatever makers compute is a product of powers of these, so that its logarithm is a sum of theirs."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Natural logarithms of constants and density together, in SI units.
+
+    Attributes
+    ----------
+    names : tuple of str
+        E_x, E_y, G_xy (Pa), D_x, D_y, D_s (N m), density (kg m^-3).
+    log_mean : tuple of float
+        In that order.
+    log_covariance : tuple of tuple of float
+        Row after row.
+    """
+
+    names: tuple[str, ...]
+    log_mean: tuple[float, ...]
+    log_covariance: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of(cls, draws: Draws) -> Joint:
+        """That of draws."""
+        return cls.of_values({**draws.moduli, **draws.rigidities, "density": draws.derived["density"].values})
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, NDArray[np.float64]]) -> Joint:
+        """That of draws by name, each an array of the same shape, SI."""
+        logs = np.stack([np.log(np.ravel(values[name])) for name in JOINT])
+        mean = logs.mean(axis=1)
+        apart = logs - mean[:, None]
+        covariance = (apart[:, None] * apart[None]).sum(axis=2) / (logs.shape[1] - 1)
+        return cls(
+            JOINT,
+            tuple(float(one) for one in mean),
+            tuple(tuple(float(one) for one in row) for row in covariance),
+        )

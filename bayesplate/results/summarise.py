@@ -22,10 +22,8 @@ from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS
 from bayesplate.posterior.sampling import Chains
 from bayesplate.results.budget import input_remarks, prior_remarks
-from bayesplate.results.contract import Elastic, Rigidity, Spread, finite, rms
-from bayesplate.results.joint import Joint
-from bayesplate.results.modes import foretold, mode_rows
-from bayesplate.results.peaks import assigned_peaks
+from bayesplate.results.contract import Elastic, Joint, Rigidity, Spread, finite, rms
+from bayesplate.results.modes import assigned_peaks, foretold, mode_rows
 from bayesplate.results.summary import (
     FORMAT,
     ErrorFigures,

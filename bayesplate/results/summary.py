@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
-from html import escape
+from importlib.metadata import PackageNotFoundError, version
 from typing import Literal
 
 from bayesplate.estimates.leave_one_out import CarryingMode
-from bayesplate.results.contract import Constants, Elastic, Rigidity, Spread
-from bayesplate.results.joint import Joint
-from bayesplate.results.modes import ModeRow
-from bayesplate.results.peaks import AssignedPeak, Spectrum
-from bayesplate.results.words import GPA, constant_name, interval, plus_minus
+from bayesplate.results.contract import Constants, Elastic, Joint, Rigidity, Spread
+from bayesplate.results.modes import AssignedPeak, ModeRow, Spectrum
+from bayesplate.results.tables import constants_table, render
+from bayesplate.results.words import GPA, plus_minus
 
 FORMAT = 1
 TOO_FEW_LEFT = "too few modes to leave one out"
@@ -222,10 +222,19 @@ class Summary(Run):
 
     def _repr_html_(self) -> str:
         """The constants as a notebook shows them."""
-        rows = "".join(
-            f"<tr><th>{constant_name(name, isotropic=self.model.isotropic)}</th>"
-            f"<td>{plus_minus(entry, GPA)}</td><td>{interval(entry, GPA)}</td></tr>"
-            for name, entry in self.elastic.items()
-        )
-        head = "<tr><th>GPa</th><th>mean ± sd</th><th>90 % interval</th></tr>"
-        return f"<table><caption>{escape(self.name)}</caption>{head}{rows}</table>"
+        table = constants_table(f"{self.name}, GPa", self.elastic, isotropic=self.model.isotropic)
+        return render(table, "html")
+
+
+PACKAGES = ("bayesplate", "numpy", "scipy", "emcee", "scikit-fem")
+
+
+def versions() -> dict[str, str]:
+    """Version of Python and of every package that has a part in the numbers."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found

@@ -1,129 +1,281 @@
-"""The tables that people read of a fit: constants with plus-minus, modes in cents; text cells only, no layout."""
+"""A table of values, and each medium that shows it: terminal, page and notebook, CSV, LaTeX."""
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
+from bayesplate.results.layout import laid_out
+from bayesplate.results.words import CONSTANTS, GPA, MISSING, Interval, Value, interval, narrow_name, plus_minus
 
-from bayesplate.frequencies.laws import cents
-from bayesplate.results.modes import ModeRow
-from bayesplate.results.peaks import LEAST
-from bayesplate.results.summary import Summary
-from bayesplate.results.words import (
-    CONSTANTS,
-    GPA,
-    MISSING,
-    chances,
-    decimals,
-    interval,
-    mode_name,
-    narrow_name,
-    number,
-    plus_minus,
-    two_digits,
-)
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
-_MARKS = {"card": "", "doubtful": " ?", "proposed": " *"}
-_MARKED = {"doubtful": "; ? label in doubt", "proposed": "; * label proposed here"}
-MOST_LISTED = 3
-"""Modes that a table gives for one peak."""
+Cell = str | float | int | Value | None
+Row = tuple[Cell, ...]
+Medium = Literal["terminal", "html", "csv", "latex"]
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text.
+    """A table of values.
 
     Attributes
     ----------
     title : str
     columns : tuple of str
-    rows : tuple of tuple of str
+    rows : tuple of tuple of Cell
+    keys : tuple of str
+        What programs call the columns, where that differs.
     """
 
     title: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    rows: tuple[Row, ...]
+    keys: tuple[str, ...] = ()
+
+    @property
+    def texts(self) -> tuple[tuple[str, ...], ...]:
+        """The rows as people read them."""
+        return tuple(tuple(map(_text, row)) for row in self.rows)
 
 
-def constants_table(summary: Summary) -> Table:
-    """The elastic constants of a fit: mean, plus-minus, 90 % interval, beside weighted least squares."""
-    rows = []
-    for name in CONSTANTS:
-        entry = summary.elastic[name]
-        least_squares = number(summary.weighted_least_squares[name], decimals(entry.sd * GPA), factor=GPA)
-        share = two_digits(entry.sd / entry.mean, 100)
-        told = narrow_name(name, isotropic=summary.model.isotropic)
-        rows.append((told, plus_minus(entry, GPA), interval(entry, GPA), share, least_squares))
-    return Table(
-        f"Elastic constants of {summary.name}, GPa",
-        ("constant", "mean ± sd", "90 % interval", "sd, %", "weighted"),
-        tuple(rows),
-    )
+def by_constant(
+    title: str,
+    columns: Mapping[str, Callable[[str], Cell]],
+    *,
+    isotropic: bool = False,
+    names: Iterable[str] = CONSTANTS,
+) -> Table:
+    """A row for each modulus; a column is its heading and what it holds of a modulus.
 
+    Parameters
+    ----------
+    title : str
+    columns : dict of callable
+    isotropic : bool
+    names : iterable of str
+        The moduli.
 
-def modes_table(summary: Summary) -> Table:
-    """Each labelled mode: measured, predicted, the one over the other with its interval, and the error left out.
-
-    The rounding interval stands beside the error where it is wider than the noise: there it decides.
+    Returns
+    -------
+    Table
     """
-    several = len({mode.setup for mode in summary.modes}) > 1
-    halves = [rounding_that_decides(summary, mode) for mode in summary.modes]
-    is_rounded = any(half is not None for half in halves)
+    rows = ((narrow_name(name, isotropic=isotropic), *(held(name) for held in columns.values())) for name in names)
+    return Table(title, ("constant", *columns), tuple(rows))
+
+
+def constants_table(
+    title: str,
+    moduli: Mapping[str, Interval],
+    more: Mapping[str, Callable[[str], Cell]] | None = None,
+    *,
+    isotropic: bool = False,
+) -> Table:
+    """Moduli in GPa: mean ± sd, 90 % interval, and further columns as of `by_constant`."""
+    shown: dict[str, Callable[[str], Cell]] = {
+        "mean ± sd": lambda name: plus_minus(moduli[name], GPA),
+        "90 % interval": lambda name: interval(moduli[name], GPA),
+    }
+    return by_constant(title, shown | dict(more or {}), isotropic=isotropic)
+
+
+def render(shown: Table | str, medium: Medium, *, width: int = 80, styled: bool = False, kind: str = "") -> str:
+    """A table, or a sentence, as a medium shows it; every text in it is escaped.
+
+    Parameters
+    ----------
+    shown : Table or str
+    medium : "terminal", "html", "csv" or "latex"
+        Programs read CSV at full precision: a number with its uncertainty has two columns, and so has an interval.
+    width : int
+        Of a terminal, characters.
+    styled : bool
+        Whether the terminal knows bold letters.
+    kind : str
+        Classes of a table of HTML.
+
+    Returns
+    -------
+    str
+    """
+    if medium == "terminal":
+        return _printed(shown, width, styled=styled)
+    if isinstance(shown, str):
+        return f"<p>{escape(shown, medium)}</p>" if medium == "html" else escape(shown, medium)
+    if medium == "html":
+        return str(_html(shown, kind))
+    return csv_text(*_columns_of_numbers(shown)) if medium == "csv" else _latex(shown)
+
+
+def notebook(heading: str, sentences: Iterable[str], tables: Iterable[Table]) -> str:
+    """A result as a notebook shows it: a heading, sentences and tables in HTML."""
+    told, shown = ([render(one, "html") for one in some] for some in (sentences, tables))
+    return "\n".join([f"<h3>{escape(heading, 'html')}</h3>", *told, *shown])
+
+
+_SYMBOL = r"\b(?P<letter>E|G|D|L|nu)_(?P<index>xy|xz|yz|x|y|s)\b"
+SYMBOL = re.compile(_SYMBOL)
+"""A symbol of ours: every medium that can sets its index lower."""
+GREEK = {"nu": ("ν", r"\nu")}
+_POWER = re.compile(r"(?<=[a-z])\^(-?\d)")
+_TOGETHER = re.compile(r"(?<=[\d±]) (?=[±%])|(?<=±) (?=\d)")
+_STARTS_A_FORMULA = ("=", "+", "-", "@")
+_IN_LATEX = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    "±": r"$\pm$",
+    "–": "--",
+    "\N{NARROW NO-BREAK SPACE}": r"\,",
+}
+_OF_LATEX = re.compile(
+    "|".join([_SYMBOL, r"(?P<signed>(?<![\w.])[+-]\d[\d.]*)", r"(?<=\d) %", *map(re.escape, _IN_LATEX)])
+)
+JOINERS = "\u200c\u200d"
+"""Format characters that shape letters and join emoji; they steer nothing."""
+
+
+def visible(text: str) -> str:
+    """A text without what steers the way it runs: control characters and direction marks are removed."""
+    if text.isprintable():
+        return text
+    kept = (character if character not in "\t\n\r" else " " for character in text)
+    return "".join(c for c in kept if unicodedata.category(c) not in {"Cc", "Cf", "Cs", "Co", "Cn"} or c in JOINERS)
+
+
+def escape(text: str, medium: Medium) -> str:
+    """A text, whatever stands in it, as a medium shows it: what steers is removed, and nothing is taken for a command.
+
+    A terminal keeps the ends of lines. A page sets our symbols with lowered indices and units with raised powers, LaTeX
+    the symbols and signed numbers as mathematics. A spreadsheet does not take it for a formula.
+    """
+    if medium == "terminal":
+        return "\n".join(map(visible, text.split("\n")))
+    text = visible(text)
+    if medium == "html":
+        return _escaped_html(text)
+    text = " ".join(text.split())
+    if medium == "csv":
+        return f"'{text}" if text.startswith(_STARTS_A_FORMULA) else text
+    return _OF_LATEX.sub(_latex_of, text)
+
+
+def _escaped_html(text: str) -> Markup:
+    from markupsafe import Markup
+    from markupsafe import escape as escaped
+
+    together = _TOGETHER.sub("\N{NO-BREAK SPACE}", str(escaped(text)))
+    lowered = SYMBOL.sub(
+        lambda found: f"<i>{GREEK.get(found['letter'], found['letter'])[0]}</i><sub>{found['index']}</sub>", together
+    )
+    return Markup(_POWER.sub(r"<sup>\1</sup>", lowered))  # what was escaped, and tags of our own
+
+
+def _latex_of(found: re.Match[str]) -> str:
+    if found["letter"]:
+        return f"${GREEK.get(found['letter'], ('', found['letter']))[1]}_{{{found['index']}}}$"
+    return f"${found[0]}$" if found["signed"] else _IN_LATEX.get(found[0], r"\,\%")
+
+
+def _text(cell: Cell) -> str:
+    if cell is None:
+        return MISSING
+    return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
+
+
+def _printed(shown: Table | str, width: int, *, styled: bool) -> str:
+    from io import StringIO
+
+    from rich.console import Console
+    from rich.text import Text
+
+    stream = StringIO()
+    console = Console(file=stream, width=width, force_terminal=styled, soft_wrap=False, highlight=False)
+    if isinstance(shown, str):
+        console.print(Text(escape(shown, "terminal")))
+    else:
+        title, *texts = (escape(text, "terminal") for text in (shown.title, *shown.columns, *sum(shown.texts, ())))
+        n = len(shown.columns)
+        columns, *rows = (texts[i : i + n] for i in range(0, len(texts), n))
+        console.print(laid_out(title, columns, rows, width))
+    return stream.getvalue()
+
+
+def _html(table: Table, kind: str) -> Markup:
+    from markupsafe import Markup
+
+    def html(text: str) -> Markup:
+        return Markup(escape(text, "html"))
+
+    heads = [html(column) for column in table.columns]
     rows = []
-    for mode, half in zip(summary.modes, halves, strict=True):
-        low, high = mode.residual_interval_cents
-        rounding = (MISSING if half is None else f"± {half:.1f}",) if is_rounded else ()
-        rows.append(
-            (
-                mode_name(mode.label, mode.setup, several=several) + _MARKS[mode.label_origin],
-                f"{mode.measured_hz:.6g}",
-                f"{mode.predicted_hz.mean:.1f}",
-                number(mode.residual_cents, 1, signed=True),
-                f"{number(low, 1, signed=True)} to {number(high, 1, signed=True)}",
-                *rounding,
-                number(mode.left_out_cents, 1, signed=True),
-            )
-        )
-    rounded = ("rounding",) if is_rounded else ()
-    marked = "".join(
-        words for origin, words in _MARKED.items() if origin in {mode.label_origin for mode in summary.modes}
-    )
-    return Table(
-        f"Modes, Hz; errors, cents (17 cents are about 1 %){marked}",
-        ("mode", "measured", "predicted", "error", "90 % interval", *rounded, "left out"),
-        tuple(rows),
+    for first, *others in table.texts:
+        cells = zip(heads[1:], others, strict=True)
+        named = (Markup('<td data-name="{}"><bdi>{}</bdi></td>').format(h.striptags(), html(text)) for h, text in cells)
+        row = Markup('<tr><th scope="row"><bdi>{}</bdi></th>{}</tr>')
+        rows.append(row.format(html(first), Markup("").join(named)))
+    return Markup(
+        '\n<div class="table"><table{}>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n'
+        "<tbody>\n{}\n</tbody></table></div>"
+    ).format(
+        Markup(' class="{}"').format(kind) if kind else "",
+        html(table.title),
+        Markup("").join(Markup('<th scope="col">{}</th>').format(head) for head in heads),
+        Markup("\n").join(rows),
     )
 
 
-def rounding_that_decides(summary: Summary, mode: ModeRow) -> float | None:
-    """Half the width of a reading's rounding interval, cents, where that is wider than the noise; None elsewhere."""
-    if mode.rounding_cents is None:
-        return None
-    width = mode.rounding_cents[1] - mode.rounding_cents[0]
-    return 0.5 * width if width > noise_cents(summary, mode) else None
+def _columns_of_numbers(table: Table) -> tuple[list[str], list[list[Cell]]]:
+    """Names and cells of plain numbers and texts: what has an uncertainty or is an interval takes two columns."""
+    names: list[str] = []
+    columns: list[Sequence[Cell]] = []
+    for name, cells in zip(table.keys or table.columns, zip(*table.rows, strict=True), strict=True):
+        values = [one if isinstance(one, Value) else None for one in cells]
+        if any(one is not None and one.ends for one in values):
+            names += [f"{name}_q05", f"{name}_q95"]
+            columns += zip(*(one.ends if one and one.ends else (None, None) for one in values), strict=True)
+            continue
+        names.append(name)
+        columns.append([one.mean if isinstance(one, Value) else one for one in cells])
+        if any(one is not None and one.sd is not None for one in values):
+            names.append(f"{name}_sd")
+            columns.append([one and one.sd for one in values])
+    return names, [list(row) for row in zip(*columns, strict=True)]
 
 
-def noise_cents(summary: Summary, mode: ModeRow) -> float:
-    """Standard deviation of the noise of a mode's setup, cents."""
-    return float(cents(np.asarray(summary.noise[mode.setup].q50)))
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """CSV with full precision of plain numbers and texts; without a header its line is left out."""
+    from pandas import DataFrame
+
+    def safe(cells: Sequence[Any]) -> list[Any]:
+        return [escape(cell, "csv") if isinstance(cell, str) else cell for cell in cells]
+
+    frame = DataFrame(list(map(safe, rows)), columns=safe(header) or None, dtype=object)
+    return frame.to_csv(index=False, header=bool(header), lineterminator="\n")
 
 
-def peaks_table(summary: Summary) -> Table | None:
-    """Peaks whose label is not sure beside the modes that they may be; None if there are none."""
-    if not summary.peaks:
-        return None
-    several = len(summary.spectra) > 1
-    rows = []
-    for peak in summary.peaks:
-        found = {one.label: one.probability for one in peak.assignments[:MOST_LISTED]}
-        if peak.spurious_probability >= LEAST:
-            found["no mode"] = peak.spurious_probability
-        name = f"{peak.hz:.6g}" + (f" {peak.setup}" if several else "")
-        miss = number(peak.residual_cents, 1, signed=True)
-        rows.append((name, peak.stated or MISSING, chances(found), f"{peak.predicted_hz.mean:.1f}", miss))
-    return Table(
-        "Peaks and the modes that they may be",
-        ("peak, Hz", "on the card", "probability", "predicted, Hz", "cents"),
-        tuple(rows),
-    )
+def _latex(table: Table) -> str:
+    """A tabular under its title as a comment; it needs no package."""
+    from pandas import DataFrame
+
+    cells = [[escape(text, "latex") for text in row] for row in table.texts]
+    frame = DataFrame(cells, columns=[escape(column, "latex") for column in table.columns])
+    rules = [{"selector": rule, "props": ":hline;"} for rule in ("toprule", "midrule", "bottomrule")]
+    styled = frame.style.hide(axis="index").set_table_styles(rules)
+    body = styled.to_latex(column_format="l" + "r" * (len(table.columns) - 1))
+    return f"% {escape(table.title, 'latex')}\n{body}"

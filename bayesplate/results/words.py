@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 GPA = 1e-9
@@ -50,6 +51,50 @@ class Interval(Uncertain, Protocol):
         """The upper end."""
 
 
+@dataclass(frozen=True)
+class Value:
+    """A number at full precision that prints with the digits that have meaning for people.
+
+    Attributes
+    ----------
+    mean : float or None
+        None where there is no number.
+    sd : float or None
+        Its standard deviation, which decides on the digits; None where it is printed with fixed decimals.
+    ends : (float, float) or None
+        Of an interval, in place of a mean.
+    digits : int
+        Fixed decimals.
+    signed : bool
+        Whether a positive number has its sign.
+    unit : str
+        Printed after it.
+    times : float
+        What it is multiplied by in print: 100 for a share in per cent.
+    """
+
+    mean: float | None = None
+    sd: float | None = None
+    ends: tuple[float, float] | None = None
+    digits: int = 0
+    signed: bool = False
+    unit: str = ""
+    times: float = 1.0
+
+    def __str__(self) -> str:
+        if self.ends is not None:
+            return " to ".join(map(self._fixed, self.ends)) + self.unit
+        if self.mean is None:
+            return MISSING
+        if self.sd is None:
+            return self._fixed(self.mean) + self.unit
+        return " ± ".join(text for text in rounded(self.mean, self.sd) if text) + self.unit
+
+    def _fixed(self, number: float) -> str:
+        """Fixed decimals, zero without a sign."""
+        return _unsigned_zero(f"{number * self.times:{'+' if self.signed else ''}.{self.digits}f}")
+
+
 def constant_name(name: str, *, isotropic: bool = False) -> str:
     """A modulus with its words: "E_x, along the grain"; an isotropic plate has no grain."""
     return f"{name}, {(CONSTANTS_OF_ISOTROPIC if isotropic else CONSTANTS)[name]}"
@@ -89,36 +134,33 @@ def rounded(mean: float, sd: float) -> tuple[str, str]:
     return mean_text, sd_text
 
 
-def plus_minus(entry: Uncertain, factor: float = 1.0) -> str:
+def plus_minus(entry: Uncertain, factor: float = 1.0, unit: str = "") -> Value:
     """Mean ± sd as of `rounded`; the number alone where it is exact."""
-    return " ± ".join(text for text in rounded(entry.mean * factor, entry.sd * factor) if text)
+    return Value(entry.mean * factor, entry.sd * factor, unit=unit)
 
 
-def interval(entry: Interval, factor: float = 1.0) -> str:
+def interval(entry: Interval, factor: float = 1.0, unit: str = "") -> Value:
     """The middle 90 %, to the decimal place of the mean."""
-    digits = decimals(entry.sd * factor)
-    return f"{number(entry.q05, digits, factor=factor)} to {number(entry.q95, digits, factor=factor)}"
+    return Value(ends=(entry.q05 * factor, entry.q95 * factor), digits=decimals(entry.sd * factor), unit=unit)
 
 
-def number(value: float | None, digits: int, *, signed: bool = False, factor: float = 1.0) -> str:
+def number(value: float | None, digits: int, *, signed: bool = False, factor: float = 1.0) -> Value:
     """A number with fixed decimals, zero without a sign, or a dash where there is none."""
-    if value is None:
-        return MISSING
-    return _unsigned_zero(f"{value * factor:{'+' if signed else ''}.{digits}f}")
+    return Value(None if value is None else value * factor, digits=digits, signed=signed)
 
 
-def two_digits(value: float | None, factor: float = 1.0) -> str:
+def two_digits(value: float | None, factor: float = 1.0) -> Value:
     """A number of which only the size matters, as an error or a standard deviation in per cent: 0.028, 3.0, 17."""
-    return MISSING if value is None else number(value, decimals(abs(value * factor)), factor=factor)
+    return number(value, 0 if value is None else decimals(abs(value * factor)), factor=factor)
 
 
 def _unsigned_zero(text: str) -> str:
     return text if text.strip("+-0.") else text.lstrip("+-")
 
 
-def percent(share: float | None, digits: int = 0) -> str:
+def percent(share: float | None, digits: int = 0) -> Value:
     """A share of one in per cent."""
-    return MISSING if share is None else f"{100 * share:.{digits}f} %"
+    return Value(share, digits=digits, unit=" %", times=100.0)
 
 
 def mode_name(label: str, setup: str, *, several: bool) -> str:

@@ -17,12 +17,12 @@ from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
+from bayesplate.grading.storage import TableKind
 from bayesplate.planning.gains import GOALS
 from bayesplate.planning.proposals import Costs
 from bayesplate.plate.board import Board
 from bayesplate.recordings.reading import CHANNELS
 from bayesplate.recordings.signals import MOTIONS
-from bayesplate.results.board_table import TableKind
 from bayesplate.workflow.batch_grading import grading_faults
 from bayesplate.workflow.prepare import Prepared
 

@@ -15,15 +15,12 @@ from bayesplate.errors import (
 )
 from bayesplate.files import write_text
 from bayesplate.frequencies.laws import LawName
+from bayesplate.grading.boards import FORMAT, BatchSummary, BoardRow, Doubt, Failure, told_rows
+from bayesplate.grading.matching import Grading, GradingRequest, grade
+from bayesplate.grading.storage import Journal, TableKind, require_table_kind, write_table
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.batch_summary import FORMAT, BatchSummary, Doubt, Failure
-from bayesplate.results.board_journal import Journal
-from bayesplate.results.board_rows import BoardRow
-from bayesplate.results.board_table import TableKind, require_table_kind, write_table
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import OutputFolder, run_of_its_own
-from bayesplate.results.grading import Grading, GradingRequest, grade
-from bayesplate.results.told_rows import told_rows
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.batch_boards import boards_of
 from bayesplate.workflow.batch_pool import dask_cluster, processes
@@ -164,11 +161,11 @@ def batch(
 
 
 def _write_grading(folder: Path, graded: Grading, summary: BatchSummary, *, folders: bool, report: bool) -> None:
-    from bayesplate.results.grading_table import write_grading
+    from bayesplate.grading.tables import write_grading
 
     write_grading(folder, graded)
     if report:
-        from bayesplate.report.grading_page import write_grading_page
+        from bayesplate.report.grading import write_grading_page
 
         write_grading_page(folder, graded, summary, has_pages=folders)
 

@@ -12,7 +12,7 @@ from bayesplate.cards.cells import Cell, is_empty
 from bayesplate.cards.csv_table import csv_table
 from bayesplate.cards.reading import read_file, read_table
 from bayesplate.errors import Fault, InputError
-from bayesplate.results.board_table import parquet_library
+from bayesplate.grading.storage import parquet_library
 
 LARGEST_TABLE = 100_000_000
 """Bytes; hundreds of thousands of boards, and ten times as much in memory."""

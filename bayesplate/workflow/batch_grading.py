@@ -8,10 +8,9 @@ from typing import Any
 
 from bayesplate.cards.words import did_you_mean, quoted
 from bayesplate.errors import Fault, InputError, plain
+from bayesplate.grading.figures import FIGURES, MOST
+from bayesplate.grading.matching import GradingRequest
 from bayesplate.plate.material import MODULI
-from bayesplate.results.grading import GradingRequest
-from bayesplate.results.log_figures import FIGURES
-from bayesplate.results.normal_box import MOST
 
 _RANGE = "positive numbers, the least before the greatest, at least one of them"
 _MATCHED = tuple(name for name in FIGURES if name[0] in "EG" or name == "density")

@@ -21,12 +21,11 @@ from bayesplate.errors import (
     NotIdentifiableError,
     UnwritableError,
 )
+from bayesplate.grading.boards import FORMAT, WORDS, BoardRow, row_of
+from bayesplate.grading.storage import Journal
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.batch_summary import FORMAT
-from bayesplate.results.board_journal import Journal
-from bayesplate.results.board_rows import WORDS, BoardRow, row_of
 from bayesplate.results.folder import BOARDS, SUMMARY
-from bayesplate.results.versions import versions
+from bayesplate.results.summary import versions
 from bayesplate.workflow.batch_boards import Source
 from bayesplate.workflow.batch_pool import Call, WorkerDied, Workers, computed
 from bayesplate.workflow.fit_board import FitRequest, fit_board, fit_board_into

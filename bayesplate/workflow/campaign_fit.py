@@ -32,7 +32,7 @@ from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import BOARDS, SUMMARY, OutputFolder
 from bayesplate.results.summarise import sampler_health, summarise
-from bayesplate.results.versions import versions
+from bayesplate.results.summary import versions
 from bayesplate.workflow.campaign import Campaign
 from bayesplate.workflow.campaign_result import CampaignFitResult, write_campaign_pages
 from bayesplate.workflow.fitting import Fitted, fitted, not_converged

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.campaigns.archive import shared_archive
+from bayesplate.campaigns.archive import shared_tree
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.learning import Learnt
 from bayesplate.campaigns.population import Population, prior_of
@@ -22,7 +22,7 @@ from bayesplate.cards import PriorCard
 from bayesplate.errors import Fault, InputError
 from bayesplate.files import make_folder, write_text, writing
 from bayesplate.report.plots import CampaignPlots
-from bayesplate.results.archive import to_arviz, write_archive
+from bayesplate.results.archive import to_arviz, write_tree
 from bayesplate.results.contract import as_json, json_text
 from bayesplate.results.folder import ARCHIVE, BOARDS, OF_POPULATION, PAGE, SUMMARY
 from bayesplate.workflow.campaign import Campaign
@@ -86,7 +86,7 @@ class CampaignFitResult:
         if self.learnt is None:
             wanted, remedy = "a campaign that shares something", "every board has its own draws: boards[NAME]"
             raise InputError(Fault("to_arviz", wanted, "nothing shared", remedy))
-        return to_arviz(shared_archive(self.learnt, self._attributes))
+        return to_arviz(shared_tree(self.learnt, self._attributes))
 
     @property
     def _attributes(self) -> dict[str, str]:
@@ -105,7 +105,7 @@ class CampaignFitResult:
         if self.prior is not None:
             write_text(folder / f"{self.prior.name}.toml", self.prior.to_card())
         if self.learnt is not None:
-            write_archive(folder / ARCHIVE, shared_archive(self.learnt, self._attributes))
+            write_tree(folder / ARCHIVE, shared_tree(self.learnt, self._attributes))
         write_text(folder / SUMMARY, json_text(self.summary))
 
     def _repr_html_(self) -> str:
@@ -118,7 +118,7 @@ class CampaignFitResult:
 
 def write_campaign_pages(folder: Path, result: CampaignFitResult, diagnosis: CampaignDiagnosis | None = None) -> None:
     """Write the page of the campaign, and that of each board in its own folder."""
-    from bayesplate.report.campaign_page import write_campaign_report
+    from bayesplate.report.campaign import write_campaign_report
 
     for name, one in result.boards.items():
         write_page(folder / BOARDS / name, one)

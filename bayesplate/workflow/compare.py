@@ -24,11 +24,10 @@ from bayesplate.posterior.reweighting import law_weights
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.posterior.statistics import effective_draws
 from bayesplate.report.plots import ComparePlots
-from bayesplate.results.archive import to_arviz
+from bayesplate.results.archive import posterior_tree, to_arviz
 from bayesplate.results.comparison import FORMAT, Comparison, TheoryRow, better_theory, judged_alike, theory_row
 from bayesplate.results.contract import NOT_IN_JSON, json_text
-from bayesplate.results.store import posterior_archive
-from bayesplate.results.versions import versions
+from bayesplate.results.summary import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.check import expected_sd
 from bayesplate.workflow.fitting import not_converged
@@ -77,7 +76,7 @@ class CompareResult(Comparison):
         """
         about = {"seed": str(self.seed), "prior": self.prior, "card_sha256": self.card_sha256}
         return {
-            theory: to_arviz(posterior_archive(inference, draws, about | {"theory": theory}))
+            theory: to_arviz(posterior_tree(inference, draws, about | {"theory": theory}))
             for theory, (inference, draws) in self.sampled.items()
         }
 

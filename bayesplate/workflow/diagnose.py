@@ -39,10 +39,9 @@ from bayesplate.plate.material import MODULI
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots
-from bayesplate.results.archive import to_arviz
+from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
-from bayesplate.results.store import attributes_of, posterior_archive
 from bayesplate.results.summary import Summary
 from bayesplate.streams import stream
 from bayesplate.workflow.arguments import require_arguments
@@ -95,7 +94,7 @@ class DiagnoseResult:
     def to_arviz(self) -> Any:
         """The draws of the model that the diagnosis ends with, as of `bayesplate.FitResult.to_arviz`."""
         attributes = attributes_of(self.after.inference, self.summary, self.after.problem.prepared.card_text)
-        return to_arviz(posterior_archive(self.after.inference, self.after.draws, attributes))
+        return to_arviz(posterior_tree(self.after.inference, self.after.draws, attributes))
 
     def to_json(self) -> dict[str, Any]:
         """The content of diagnosis.json."""

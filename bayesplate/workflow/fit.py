@@ -16,13 +16,11 @@ from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import FitPlots
-from bayesplate.results.archive import to_arviz
+from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz, write_tree
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, run_of_its_own
-from bayesplate.results.store import attributes_of, posterior_archive, write_posterior
 from bayesplate.results.summarise import unconverged_summary
-from bayesplate.results.summary import Summary
-from bayesplate.results.versions import versions
+from bayesplate.results.summary import Summary, versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fitting import Fitted, fitted, not_converged, opened
@@ -71,7 +69,7 @@ class FitResult:
         arviz.InferenceData or xarray.DataTree
         """
         attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card_text)
-        return to_arviz(posterior_archive(self.inference, self.draws, attributes))
+        return to_arviz(posterior_tree(self.inference, self.draws, attributes))
 
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
@@ -150,10 +148,6 @@ def fit(
 
         return fit_campaign(problem, out=out, report=report, seed=seed, force=force, resume=resume, progress=progress)
     run = opened(problem, seed, out, force=force, resume=resume)
-    if run.folder is not None and report:
-        from bayesplate.report.page import load_libraries
-
-        load_libraries()  # while nobody waits for the page yet
 
     def refuse(inference: Inference) -> None:
         refuse_unconverged(inference, seed, problem, run.path)
@@ -169,8 +163,8 @@ def fit(
 
 def write_fit(folder: Path, result: Fitted) -> None:
     """Write summary and archive of a fit into a folder that is there."""
-    text = result.problem.prepared.card_text
-    write_posterior(folder / ARCHIVE, result.inference, result.draws, result.summary, text)
+    attributes = attributes_of(result.inference, result.summary, result.problem.prepared.card_text)
+    write_tree(folder / ARCHIVE, posterior_tree(result.inference, result.draws, attributes))
     write_text(folder / SUMMARY, json_text(result.summary))
 
 

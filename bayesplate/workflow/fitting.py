@@ -22,8 +22,7 @@ from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
 from bayesplate.results.folder import OutputFolder
 from bayesplate.results.summarise import summarise
-from bayesplate.results.summary import Summary
-from bayesplate.results.versions import versions
+from bayesplate.results.summary import Summary, versions
 from bayesplate.workflow.problem import Problem
 
 

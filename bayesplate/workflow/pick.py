@@ -250,7 +250,7 @@ def _each_once(named: Mapping[int, tuple[str, float]]) -> dict[int, tuple[str, f
 
 
 def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked, heard: Heard) -> None:
-    from bayesplate.report.recordings_page import write_recordings_page
+    from bayesplate.report.recordings import write_recordings_page
 
     make_folder(folder / FIGURES)
     fragment, _, numbers = targets

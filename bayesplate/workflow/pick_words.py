@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.plausibility import UNLIKE
-from bayesplate.results.tables import Table
-from bayesplate.results.words import MISSING, chances, percent, two_digits
+from bayesplate.results.tables import Cell, Row, Table
+from bayesplate.results.words import chances, percent, two_digits
 from bayesplate.workflow.shown import Shown
 
 MOST_SET_ASIDE = 8
@@ -56,13 +56,13 @@ def picked_table(report: PickReport) -> Table:
     """Each likely mode: frequency with its standard error, damping, sign, doubt, label."""
     has_signs = any(peak.sign for peak in report.likely)
     has_labels = any(peak.labels for peak in report.likely)
-    rows = []
+    rows: list[Row] = []
     for peak in report.likely:
-        cells = [
+        cells: list[Cell] = [
             f"{peak.hz:.2f}",
             f"± {two_digits(peak.sd_hz)}",
             f"{peak.damping_percent:.2f}",
-            *([peak.sign or MISSING] if has_signs else []),
+            *([peak.sign or None] if has_signs else []),
             percent(peak.spurious_probability),
             *([chances(peak.may_be(2))] if has_labels else []),
         ]

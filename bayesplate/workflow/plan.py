@@ -287,8 +287,7 @@ def _among(found: Found, between: Sequence[str] | None, finished: _Finished | No
 
 
 def _write(made: Plan, drawn: Sequence[Bench], folder: Path, files: Sequence[Path]) -> None:
-    from bayesplate.report.bench import bench_sheet
-    from bayesplate.report.gains import gains_picture
+    from bayesplate.report.planning import bench_sheet, gains_picture
     from bayesplate.report.saving import drawing, save_figure
 
     make_folder(folder)

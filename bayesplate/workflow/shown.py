@@ -19,11 +19,13 @@ from bayesplate.diagnosis.wording.told import (
 )
 from bayesplate.effects.words import effect_names
 from bayesplate.estimates.leave_one_out import carrying_sentence
+from bayesplate.grading.boards import BatchSummary
+from bayesplate.grading.matching import Grading
+from bayesplate.grading.tables import MOST_ON_TERMINAL, doubts_sentence, grading_tables
 from bayesplate.planning.plan import Plan
 from bayesplate.planning.tables import plan_tables
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.sampling import Progress
-from bayesplate.results.batch_summary import BatchSummary
 from bayesplate.results.checking import CheckReport
 from bayesplate.results.command_tables import (
     METHODS_REMARK,
@@ -35,12 +37,10 @@ from bayesplate.results.command_tables import (
 )
 from bayesplate.results.comparison import Comparison
 from bayesplate.results.contract import json_text
-from bayesplate.results.grading import Grading
-from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables
-from bayesplate.results.notebook import html
+from bayesplate.results.fit_tables import fitted_constants, modes_table, peaks_table
 from bayesplate.results.sheets import ModesReport
 from bayesplate.results.summary import Summary
-from bayesplate.results.tables import Table, constants_table, modes_table, peaks_table
+from bayesplate.results.tables import Table, notebook, render
 from bayesplate.results.words import percent, two_digits
 
 __all__ = [
@@ -78,7 +78,13 @@ class Shown:
 
     def html(self, heading: str) -> str:
         """The same for a notebook, under a heading."""
-        return html(heading, (*self.remarks, *self.warnings, self.closing), self.tables)
+        return notebook(heading, (*self.remarks, *self.warnings, self.closing), self.tables)
+
+    def printed(self, width: int, *, styled: bool) -> str:
+        """The same for a terminal of so many columns, which may know bold letters."""
+        sentences = (*(f"- {text}" for text in self.remarks), *(f"! {text}" for text in self.warnings), self.closing)
+        parts: tuple[Table | str, ...] = (*self.tables, *sentences)
+        return "".join(render(one, "terminal", width=width, styled=styled) for one in parts)
 
 
 def show_check(report: CheckReport | CampaignCheck) -> Shown:
@@ -108,11 +114,11 @@ def show_fit(summary: Summary | CampaignSummary) -> Shown:
     if isinstance(summary, CampaignSummary):
         return _show_campaign_fit(summary)
     peaks = peaks_table(summary)
-    tables = (constants_table(summary), modes_table(summary), *([peaks] if peaks else []))
+    tables = (fitted_constants(summary), modes_table(summary), *([peaks] if peaks else []))
     error, model = summary.error, summary.model
     left_out = error.leave_one_out_rms_cents
     several = len(summary.noise) > 1
-    noise = ", ".join(percent(one.q50, 2) + f" in {setup}" * several for setup, one in summary.noise.items())
+    noise = ", ".join(f"{percent(one.q50, 2)}" + f" in {setup}" * several for setup, one in summary.noise.items())
     effects = f" with {effect_names(model.effects)}" if model.effects else ""
     kind = "isotropic, " if model.isotropic else ""
     closing = (

@@ -13,8 +13,7 @@ from calibration.sbc import N_DRAWS
 from calibration.table import FAMILY_LEVEL, NOT_COUNTED
 from numpy.typing import NDArray
 
-from bayesplate.report.colours import BLACK, BLUE, GREEN, LIGHT, ORANGE, PURPLE, SKY, VERMILLION
-from bayesplate.report.style import SMALL, WORDS, plain_axes
+from bayesplate.report.style import BLACK, BLUE, GREEN, LIGHT, ORANGE, PURPLE, SKY, SMALL, VERMILLION, WORDS, plain_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -33,7 +33,7 @@ from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.posing import PosedProblem, pose
-from bayesplate.results.peaks import assigned_peaks
+from bayesplate.results.modes import assigned_peaks
 from bayesplate.workflow.prepare import Prepared, prepare
 
 N_MODES, MISSED, N_LABELLED = 16, 0.3, 2

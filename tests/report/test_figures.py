@@ -19,18 +19,14 @@ from bayesplate.plate.measured import Peak
 from bayesplate.quantities import Quantity
 from bayesplate.report.board import board_picture
 from bayesplate.report.chladni import chladni_sheet
-from bayesplate.report.colours import BLUE, GREEN, ORANGE, SKY, VERMILLION
-from bayesplate.report.constants import modulus_title
+from bayesplate.report.constants import modulus_title, percentiles_pictures
 from bayesplate.report.content import inputs_table
 from bayesplate.report.corner_plot import axis_label
-from bayesplate.report.fitted_modes import modes_pictures
-from bayesplate.report.health import health_picture
-from bayesplate.report.null_control import null_picture
+from bayesplate.report.diagnosis import null_picture
+from bayesplate.report.modes import modes_pictures, predictive_picture
 from bayesplate.report.page import pictures
-from bayesplate.report.percentiles import percentiles_pictures
-from bayesplate.report.priors import Compared, compared
-from bayesplate.report.residuals import predictive_picture
-from bayesplate.report.style import NO_GLYPH, drawable
+from bayesplate.report.posterior import Compared, compared, health_picture
+from bayesplate.report.style import BLUE, GREEN, NO_GLYPH, ORANGE, SKY, VERMILLION, drawable
 from bayesplate.results.words import MISSING
 from bayesplate.workflow.prepare import prepare
 from bayesplate.workflow.problem import Problem
@@ -241,7 +237,7 @@ def test_the_table_of_inputs_says_what_became_of_an_effect(clamped):
     board = prepare("finnish-spruce-cantilever", ["clamp_rotation"]).board
     (own,) = (one for one in board.parameters if one.effect == "clamp_rotation")
     found = {own.owner.title: {own.effect: {own.key: spread(0.3 * own.prior.mean, 0.1 * own.prior.mean, own.unit)}}}
-    told = {row[0]: row[1:] for row in inputs_table(board, replace(clamped.summary, effects=found)).rows}
+    told = {row[0]: row[1:] for row in inputs_table(board, replace(clamped.summary, effects=found)).texts}
     (after,) = (cells[1] for words, cells in told.items() if "clamp rotation" in words)
 
     assert after != MISSING

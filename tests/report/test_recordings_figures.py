@@ -6,8 +6,8 @@ import numpy as np
 
 from bayesplate.recordings.contract import LabelChance, PickedRow, PickReport
 from bayesplate.recordings.responses import Averaged
-from bayesplate.report.recordings_figures import spectra_picture
-from bayesplate.results.peaks import UNNAMED
+from bayesplate.report.recordings import spectra_picture
+from bayesplate.results.modes import UNNAMED
 
 
 def row(hertz: float, label: str) -> PickedRow:

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from made_summaries import SUMMARY
 
-from bayesplate.report.colours import BLUE, ORANGE
-from bayesplate.report.spectrum import spectrum_pictures
-from bayesplate.results.modes import Prediction
-from bayesplate.results.peaks import AssignedPeak, Assignment, PredictedMode, Spectrum
+from bayesplate.report.modes import spectrum_pictures
+from bayesplate.report.style import BLUE, ORANGE
+from bayesplate.results.modes import AssignedPeak, Assignment, PredictedMode, Prediction, Spectrum
 
 
 def peak(hertz, *assignments, spurious=0.0):

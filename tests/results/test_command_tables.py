@@ -60,9 +60,9 @@ THIN = TheoryRow(
 def test_check_shows_what_its_report_holds():
     constants, modes, effects = check_tables(REPORT)
 
-    assert constants.rows[1] == ("E_y, across grain", "0.674", "± 4.2 %")
-    assert modes.rows == (("(1,0)", "52", "+20.5", "100 / 0 / 0", "0.62"),)
-    assert effects.rows == (
+    assert constants.texts[1] == ("E_y, across grain", "0.674", "± 4.2 %")
+    assert modes.texts == (("(1,0)", "52", "+20.5", "100 / 0 / 0", "0.62"),)
+    assert effects.texts == (
         ("fluid_loading", "44.1", "10.6 *", "-7.3/-2.4/+0.1", "clamp_rotation\ntension"),
         ("grain_angle", "44.1", "10.6  ", "-7.3/-2.4/+0.1", "–"),
     )
@@ -83,7 +83,7 @@ def test_of_a_campaign_one_board_in_doubt_is_enough(n_doubts, told):
 
 
 def test_methods_stand_beside_each_other():
-    assert methods_table("made", THIN).rows == (
+    assert methods_table("made", THIN).texts == (
         ("paper", "12.721", "–", "12.721", "–"),
         ("percentile (42)", "13.05 ± 0.25", "13.05 ± 0.25", "13.05 ± 0.25", "20.5"),
     )
@@ -94,7 +94,7 @@ def test_the_forward_check_is_predicted_less_measured():
     table = forward_table(THIN)
 
     assert table.columns == ("mode", "Hz", "paper", "percentile", "left out")
-    assert table.rows == (("(1,0)", "52", "–", "-20.5", "-55.2"),)
+    assert table.texts == (("(1,0)", "52", "–", "-20.5", "-55.2"),)
 
 
 @pytest.mark.parametrize(
@@ -126,10 +126,10 @@ def test_modes_are_shown_with_their_reading_or_their_range():
     (table,) = sheet_tables(report)
 
     assert table.columns[2:4] == ("measured or\nlikely Hz", "% in D_x/D_y/D_s")
-    assert table.rows[0] == ("(1,0)", "51.4", "52", "100 / 0 / 0", "3.232", "-0.3164", "0.01128")
-    assert table.rows[1][2] == "800 to 836"
+    assert table.texts[0] == ("(1,0)", "51.4", "52", "100 / 0 / 0", "3.232", "-0.3164", "0.01128")
+    assert table.texts[1][2] == "800 to 836"
     low = replace(report, setups=(replace(report.setups[0], modes=(replace(rows[1], likely_hz=(8.84, 9.13)),)),))
-    assert sheet_tables(low)[0].rows[0][2] == "8.8 to 9.1"
+    assert sheet_tables(low)[0].texts[0][2] == "8.8 to 9.1"
     assert show_modes(report).closing == "Frequencies at the estimate; sheet to print: m.png"
     assert as_json(report)["setups"][0]["modes"][1]["likely_hz"] == [800.4, 836.2]
 

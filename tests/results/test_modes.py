@@ -75,7 +75,7 @@ def test_the_rest_of_a_row(rows):
 
 def test_a_peak_of_a_sure_label_is_predicted_as_its_mode_is(tmp_path, monkeypatch):
     """The same draws stand behind both tables, also where the probabilities of labels are taken from some."""
-    monkeypatch.setattr("bayesplate.results.peaks.MOST_DRAWS_OF_LABELS", 10)
+    monkeypatch.setattr("bayesplate.results.modes.MOST_DRAWS_OF_LABELS", 10)
     card = tmp_path / "doubtful.toml"
     text = (CARDS / "finnish-spruce-cantilever.toml").read_text(encoding="utf-8")
     text = text.replace('name = "finnish-spruce-cantilever"', 'name = "doubtful"')

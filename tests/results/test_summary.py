@@ -128,8 +128,9 @@ def test_it_shows_itself_in_a_line_and_in_a_notebook():
         "<Summary of made: E_x = 10.50 ± 0.25 GPa, E_y = 1.00 ± 0.12 GPa, G_xy = 0.500 ± 0.062 GPa; 3 modes, exact law>"
     )
     html = replace(SUMMARY, name="<b>")._repr_html_()
-    assert "<caption>&lt;b&gt;</caption>" in html
-    assert "<th>E_y, across the grain</th><td>1.00 ± 0.12</td><td>0.75 to 1.25</td>" in html
+    assert "<caption>&lt;b&gt;, GPa</caption>" in html
+    assert "<bdi><i>E</i><sub>y</sub>, across grain</bdi></th>" in html
+    assert "<bdi>0.75 to 1.25</bdi>" in html
     assert html.count("<tr>") == 1 + len(Elastic.NAMES)
 
 

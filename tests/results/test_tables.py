@@ -1,181 +1,125 @@
-"""Tables of a fit from a summary made by hand: columns that agree with each other, and rounding where it decides."""
+"""Any table in any medium: one escape for every text, full precision for programs, LaTeX that needs no package."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import csv
+import io
+import re
 
-import numpy as np
 import pytest
-from made_summaries import SUMMARY, mode, spread
+from payloads import DIRECTION_MARKS, PAYLOADS, shown
+from read_pages import Read, faults
 
-from bayesplate.report import content
-from bayesplate.results.contract import Elastic
-from bayesplate.results.tables import constants_table, modes_table, peaks_table, rounding_that_decides
-from bayesplate.results.words import decimals, interval, is_isotropic, number, percent, plus_minus, rounded, two_digits
-from bayesplate.workflow.prepare import prepare
-from bayesplate.workflow.shown import show_fit
+from bayesplate.results.tables import Table, escape, notebook, render, visible
+from bayesplate.results.words import Value, percent
 
-
-def column(table, name):
-    return [row[table.columns.index(name)] for row in table.rows]
+FORMULAS = ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "  =1")
+STEERS = ("\x1b[2J\x1b]0;owned\x07", "a\rb", "\x9b31m")
 
 
-def test_constants_beside_their_least_squares():
-    table = constants_table(SUMMARY)
-
-    assert table.rows[0] == ("E_x, along grain", "10.50 ± 0.25", "10.00 to 11.00", "2.4", "10.25")
-    assert column(table, "weighted") == ["10.25", "1.12", "0.500"]
-    assert table.title == "Elastic constants of made, GPa"
+def table_of(text):
+    """One that holds a text wherever a text may stand."""
+    return Table(text, (text, "value"), ((text, Value(1.25, 0.5)), (text, None)))
 
 
-def test_an_isotropic_plate_has_no_grain():
-    """Its two moduli are one, which is all that a report without the card's word can see."""
-    one = replace(SUMMARY, model=replace(SUMMARY.model, isotropic=True))
+@pytest.mark.parametrize("payload", [*PAYLOADS, *FORMULAS, *STEERS], ids=repr)
+def test_a_text_stays_a_text_in_every_medium(payload):
+    """It is seen as it stands, and nothing else happens."""
+    seen = " ".join(visible(payload).split())
+    page = Read("<title></title>" + notebook(payload, [payload], [table_of(payload)]))
+    on_terminal = escape(payload, "terminal")
+    _, (cell, *_), _ = csv.reader(io.StringIO(render(table_of(payload), "csv")), strict=True)
+    latex = render(table_of(payload), "latex")
+    comment, begin, *body, last = latex.splitlines()
 
-    for found in (constants_table(one), content.constants_table(one, "made")):
-        assert [row[0].replace(" in ", " ") for row in found.rows] == [
-            "E_x, any direction", "E_y, any direction", "G_xy, shear",
-        ]  # fmt: skip
-    assert "grain" in SUMMARY._repr_html_()
-    assert "grain" not in one._repr_html_()
-    assert is_isotropic({"E_x": 2.0, "E_y": 2.0})
-    assert not is_isotropic({"E_x": 2.0, "E_y": 2.0 + 1e-12})
-
-
-def test_the_columns_of_the_modes_agree_with_each_other():
-    """By hand from the printed cells: the error is the one column over the other, and so are its ends."""
-    table = modes_table(SUMMARY)
-    assert table.columns == ("mode", "measured", "predicted", "error", "90 % interval", "rounding", "left out")
-
-    for i, row in enumerate(table.rows):
-        measured, predicted, error = (float(cell) for cell in row[1:4])
-        tenth = 1200 / np.log(2) * 0.05 / predicted  # what the printed decimal of the prediction leaves open, cents
-        assert error == pytest.approx(1200 * np.log2(measured / predicted), abs=tenth + 0.05), row
-        low, high = (float(cell) for cell in row[4].split(" to "))
-        ends = SUMMARY.modes[i].predicted_hz
-        assert (low, high) == pytest.approx(
-            (1200 * np.log2(measured / ends.q95), 1200 * np.log2(measured / ends.q05)), abs=0.0501
-        )
-    assert column(table, "left out") == ["+12.2", "+12.2", "–"]
+    assert faults(page) == []
+    assert " ".join(page.text.split()).count(seen) == 6
+    assert not [c for c in on_terminal if not c.isprintable() and c not in "\n\u200c\u200d"]
+    assert " ".join(on_terminal.split()) == " ".join(visible(payload.replace("\r", " ")).split()) or "\r" in payload
+    assert not cell.startswith(("=", "+", "-", "@", "\t", "\r", " "))
+    assert cell.removeprefix("" if payload.startswith("'") else "'") == seen
+    assert comment.startswith("% ")
+    assert (begin, last) == (r"\begin{tabular}{lr}", r"\end{tabular}")
+    assert [line.count(" & ") for line in body if line.endswith(r"\\")] == [1, 1, 1]
+    assert seen not in latex or not set('\\{}$&#^_~%<>|"') & set(seen)
+    assert not set(DIRECTION_MARKS) & set("".join((page.source, on_terminal, cell, latex)))
 
 
-def test_rounding_is_shown_where_it_is_wider_than_the_noise():
-    """A hertz at 52 Hz is 33.3 cents wide; noise of 0.5 % is 8.66 cents, and a hertz at 400 Hz only 4.3."""
-    assert column(modes_table(SUMMARY), "rounding") == ["± 16.6", "–", "–"]
-    wide, narrow, unrounded = SUMMARY.modes
-    assert rounding_that_decides(SUMMARY, wide) == pytest.approx(600 * np.log2(52.5 / 51.5))
-    assert rounding_that_decides(SUMMARY, narrow) is rounding_that_decides(SUMMARY, unrounded) is None
+def test_a_text_that_is_not_escaped_would_be_noticed():
+    """The negative control: the same table with its escapes undone."""
+    html = render(table_of(PAYLOADS[4]), "html")
+    broken = html.replace("&lt;", "<").replace("&gt;", ">").replace("&#34;", '"').replace("&#39;", "'")
 
-    width = np.log(52.5 / 51.5)
-    for noise, shown in ((0.99 * width, True), (1.01 * width, False)):
-        noisy = replace(SUMMARY, noise={"bench": spread(noise, noise / 10, "1")})
-        assert ("rounding" in modes_table(noisy).columns) == shown
+    assert "img onerror" in faults(Read(broken))
 
 
-def test_modes_of_several_setups_say_in_which():
-    both = replace(SUMMARY, modes=(mode("(1,0)", 52.0, 51.75, 0.5), mode("(1,1)", 60.0, 60.0, 1.0, setup="free")),
-                   noise={**SUMMARY.noise, "free": SUMMARY.noise["bench"]})  # fmt: skip
-
-    assert column(modes_table(both), "mode") == ["(1,0) bench", "(1,1) free"]
-    assert column(modes_table(SUMMARY), "mode") == ["(1,0)", "(1,1)", "(2,0)"]
-
-
-def test_peaks_whose_label_is_not_sure():
-    told = "(3,1) 75 %, (2,2) 12 %, no mode 12 %"
-    assert peaks_table(SUMMARY).rows == (("860", "(3,1)", told, "850.0", "+20.2"),)
-    assert peaks_table(replace(SUMMARY, peaks=())) is None
-    bare = replace(SUMMARY.peaks[0], stated=None, spurious_probability=0.004)
-    assert peaks_table(replace(SUMMARY, peaks=(bare,))).rows[0][1:3] == ("–", "(3,1) 75 %, (2,2) 12 %")
-
-
-@pytest.mark.parametrize(
-    ("origin", "mark", "told"), [("doubtful", " ?", "in doubt"), ("proposed", " *", "proposed here")]
-)
-def test_labels_that_are_not_sure_are_marked(origin, mark, told):
-    table = modes_table(replace(SUMMARY, modes=(replace(SUMMARY.modes[0], label_origin=origin), *SUMMARY.modes[1:])))
-
-    assert [cell.endswith(mark) for cell in column(table, "mode")] == [True, False, False]
-    assert told in table.title
-    assert told not in modes_table(SUMMARY).title
-
-
-def test_what_fit_prints():
-    shown = show_fit(SUMMARY)
-
-    assert [table.title for table in shown.tables][1:] == [
-        "Modes, Hz; errors, cents (17 cents are about 1 %)", "Peaks and the modes that they may be",
-    ]  # fmt: skip
-    assert (shown.remarks, shown.warnings) == (SUMMARY.identifiability, SUMMARY.warnings)
-    assert shown.closing == (
-        "thin plate with attached mass, exact law. Error rms 7.5 cents in sample, 12.2 left out; noise 0.50 %; the "
-        "linear law is off by 0.50 cents."
+def test_symbols_are_set_with_lowered_indices():
+    assert escape("E_x and G_xy of <b>", "html") == "<i>E</i><sub>x</sub> and <i>G</i><sub>xy</sub> of &lt;b&gt;"
+    assert escape("nu_xy = 0.4 ± 0.1, 3 %, kg/m^3", "html") == (
+        "<i>ν</i><sub>xy</sub> = 0.4\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.1, 3\N{NO-BREAK SPACE}%, kg/m<sup>3</sup>"
     )
-    both = {"bench": SUMMARY.noise["bench"], "free": SUMMARY.noise["bench"]}
-    model = replace(SUMMARY.model, effects=())
-    closing = show_fit(replace(SUMMARY, model=model, noise=both)).closing
-    assert closing.startswith("thin plate, exact law.")
-    assert "noise 0.50 % in bench, 0.50 % in free;" in closing
+    assert escape("a_board E_xtra shear_xz", "html") == "a_board E_xtra shear_xz"
+    assert escape("E_x, nu_xy: -0.5 to +1.5 ± 2 %", "latex") == r"$E_{x}$, $\nu_{xy}$: $-0.5$ to $+1.5$ $\pm$ 2\,\%"
 
 
-def test_what_a_page_says():
-    first, missed, weakest = content.summary_sentences(SUMMARY)
+def test_visible_keeps_joined_emoji_and_turns_breaks_into_spaces():
+    assert visible("a\nb\tc") == "a b c"
+    assert visible("\U0001f469\u200d\U0001f527") == "\U0001f469\u200d\U0001f527"
+    assert visible("\u202ex\u202c\x07\x1b[0m\ufeff") == "x[0m"
 
-    assert first.startswith("From 3 modes: 10.50 ± 0.25 GPa along the grain, 1.00 ± 0.12 GPa across it, and a shear")
-    assert missed == (
-        "The fit misses the frequencies by 7.5 cents (0.43 %); a mode that it has not seen, by 12 cents (0.71 %)."
+
+def test_latex_prints_what_stands_there():
+    """By hand: every character that means something to LaTeX."""
+    assert escape("50 % & #1 $x_1^2$ {a} ~b\\c", "latex") == (
+        r"50\,\% \& \#1 \$x\_1\textasciicircum{}2\$ \{a\} \textasciitilde{}b\textbackslash{}c"
     )
-    assert weakest == "Least well known is G_xy, shear: ± 12 %."
-    alike = Elastic(*(spread(mean, 0.033 * mean, "Pa") for mean in (11e9, 0.75e9, 0.68e9)))
-    assert (
-        content.summary_sentences(replace(SUMMARY, elastic=alike))[-1] == "All three are known equally well: ± 3.3 %."
+    assert escape("one\ntwo", "latex") == "one two"
+
+
+def test_programs_read_numbers_at_full_precision():
+    """A number with its uncertainty has two columns, an interval too; where there is nothing the cell is empty."""
+    third = 1.0 / 3.0
+    table = Table(
+        "made",
+        ("constant", "mean ± sd", "90 % interval", "n", "share"),
+        (
+            ("E_x", Value(third, 0.25), Value(ends=(0.1, third)), 3, percent(0.125)),
+            ("D_x", None, None, None, 2.5),
+        ),
+        keys=("constant", "mean", "interval", "n", "share"),
     )
-    assert content.constants_table(SUMMARY, "Constants").rows == (
-        ("E_x, along the grain", "10.50 ± 0.25", "10.00 to 11.00", "10.25", "10.25", "10.00 ± 0.20"),
-        ("E_y, across the grain", "1.00 ± 0.12", "0.75 to 1.25", "–", "1.12", "–"),
-        ("G_xy, shear", "0.500 ± 0.062", "0.375 to 0.625", "0.500", "0.500", "0.500"),
+
+    assert render(table, "csv") == (
+        "constant,mean,mean_sd,interval_q05,interval_q95,n,share\n"
+        f"E_x,{third!r},0.25,0.1,{third!r},3,0.125\n"
+        "D_x,,,,,,2.5\n"
     )
-    board = prepare("spruce-free-2L").board
-    assert content.effects_table(board, SUMMARY).rows == (("attached mass, bench", "mass", "2.00 ± 0.50", "g"),)
-    of_field = replace(SUMMARY, effects={"board": {"thickness_profile": {"field_2": spread(0.5, 1.0, "1")}}})
-    ((effect, shape, *_),) = content.effects_table(board, of_field).rows
-    assert effect.startswith("thickness profile, board: at +1 thicker along the middle and at mid-length, ")
-    assert shape == "shape 2"
-    assert content.laws_table(SUMMARY).rows[0] == ("E_x", "–", "10.500")
-    assert dict(content.sampler_rows(SUMMARY)) == {
-        "ensembles, walkers, steps": "4, 32, 2000",
-        "largest R-hat (at most 1.01)": "1.0025",
-        "smallest effective size (at least 400)": "6000",
-        "largest autocorrelation time, steps": "30.5",
-        "accepted proposals": "50 %",
-    }
+    assert table.texts == (("E_x", "0.33 ± 0.25", "0 to 0", "3", "12 %"), ("D_x", "–", "–", "–", "2.5"))
 
 
-@pytest.mark.parametrize(
-    ("mean", "sd", "printed"),
-    [
-        (13.0, 0.032, "13.000 ± 0.032"),
-        (0.899, 0.22, "0.90 ± 0.22"),
-        (12.5, 0.028, "12.500 ± 0.028"),
-        (5304.0, 123.0, "5\N{NARROW NO-BREAK SPACE}300 ± 120"),
-        (2.0, 9.97, "2 ± 10"),
-        (0.12, 0.0997, "0.12 ± 0.10"),
-        (-0.004, 0.5, "0.00 ± 0.50"),
-        (0.00012, 0.0000066, "0.0001200 ± 0.0000066"),
-        (399.0, 0.0, "399"),
-    ],
-)
-def test_one_rule_rounds_every_mean_and_its_sd(mean, sd, printed):
-    """Two significant digits of the sd, the mean to the same decimal place: by hand."""
-    assert plus_minus(replace(spread(1.0, 0.1, "1"), mean=mean, sd=sd)) == printed
-    assert " ± ".join(text for text in rounded(mean, sd) if text) == printed
+def test_latex_needs_no_package():
+    table = Table("Made, 50 %", ("constant", "mean ± sd"), (("E_x", Value(13.32, 0.4)), ("E_y", None)))
+
+    assert render(table, "latex").splitlines() == [
+        r"% Made, 50\,\%",
+        r"\begin{tabular}{lr}",
+        r"\hline",
+        r"constant & mean $\pm$ sd \\",
+        r"\hline",
+        r"$E_{x}$ & 13.32 $\pm$ 0.40 \\",
+        r"$E_{y}$ & -- \\",
+        r"\hline",
+        r"\end{tabular}",
+    ]
 
 
-def test_numbers_as_people_read_them():
-    assert [decimals(sd) for sd in (0.0, 123.0, 9.96, 9.94, 0.0996, 0.0994, 1e-9)] == [0, 0, 0, 1, 2, 3, 8]
-    assert plus_minus(spread(12345.6, 12.0, "1")) == "12\N{NARROW NO-BREAK SPACE}346 ± 12"
-    assert plus_minus(spread(2.5, 0.0, "1")) == "2.5"
-    assert interval(spread(10.0e9, 0.5e9, "Pa"), 1e-9) == "9.00 to 11.00"
-    assert [number(None, 1), number(1.25, 1, signed=True), number(-2.0, 0, factor=-1.0)] == ["–", "+1.2", "2"]
-    assert [number(-0.04, 1, signed=True), number(-0.06, 1, signed=True)] == ["0.0", "-0.1"]
-    assert [two_digits(value) for value in (0.028, 3.0, 17.3, 0.0, None)] == ["0.028", "3.0", "17", "0", "–"]
-    assert [percent(None), percent(0.125), percent(0.125, 1)] == ["–", "12 %", "12.5 %"]
+def test_a_sentence_and_a_table_on_a_terminal():
+    assert render("one two three", "terminal", width=8) == "one two \nthree\n"
+    assert "\x1b[1m" in render(table_of("a"), "terminal", styled=True)
+    assert "\x1b" not in render(table_of("a"), "terminal")
+    assert re.search(r"│ a +│ 1.25 ± 0.50 │", render(table_of("a"), "terminal"))
+
+
+def test_shown_is_what_is_left_of_a_payload():
+    """The two ways to say so agree where nothing but direction marks steers."""
+    assert [visible(one) for one in PAYLOADS] == [shown(one) for one in PAYLOADS]

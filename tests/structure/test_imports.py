@@ -23,6 +23,7 @@ ROAD = (
     "estimates",
     "posterior",
     "results",
+    "grading",
     "diagnosis",
     "campaigns",
     "planning",
@@ -38,8 +39,7 @@ ROOMS = {
     "cli": {"cli", "asking", "options", "terminal", "workflow", "errors"},
     "options": {"options"},
     "asking": {"asking", "workflow", "errors"},
-    "terminal": {"terminal", "columns", "workflow", "errors"},
-    "columns": {"columns", "workflow"},
+    "terminal": {"terminal", "workflow", "errors"},
     "batch": {"batch", "workflow", "errors"},
     "__init__": {*ROAD, "recordings", "workflow", *OPEN_TO_ALL},
     "__main__": {"cli"},
@@ -61,6 +61,7 @@ DOORS = {
     "skfem": "modes",
     "arviz": "libraries",
     "xarray": "results",
+    "pandas": "results",
     "matplotlib": "report",
     "corner": "report",
     "jinja2": "report",
@@ -71,7 +72,7 @@ DOORS = {
 """Heavy libraries and the one room that may import each."""
 ONLY_WHERE_NEEDED = {*DOORS, "scipy.stats"}
 """Imported inside functions, so that `--help` answers at once."""
-WRITERS = {Path("files.py"), Path("locks.py"), Path("results/board_journal.py")}
+WRITERS = {Path("files.py"), Path("locks.py"), Path("grading/storage.py")}
 """Files are written by the first; the others hold theirs open while a run goes on."""
 EXECUTES_DATA = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve"}
 SEEDED_RANDOM = {"Generator", "BitGenerator", "SeedSequence", "default_rng", "MT19937", "PCG64", "Philox", "SFC64"}

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from bayesplate.errors import InputError
-from bayesplate.results.grading import GradingRequest
-from bayesplate.results.log_figures import limit_told
+from bayesplate.grading.figures import limit_told
+from bayesplate.grading.matching import GradingRequest
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.batch_grading import grading_request
 

@@ -264,7 +264,7 @@ class Diagnosis:
         return f"<Diagnosis of {self.name}, {self.verdict}{named}{claim}>"
 
     def _repr_html_(self) -> str:
-        from bayesplate.diagnosis.wording.notebook import html
+        from bayesplate.diagnosis.wording.tables import html
 
         return html(self)
 

@@ -13,8 +13,8 @@ from bayesplate.effects.words import effect_name, effect_names
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI
 from bayesplate.results.contract import rms
-from bayesplate.results.tables import Table
-from bayesplate.results.words import MISSING
+from bayesplate.results.tables import Row, Table
+from bayesplate.results.words import number
 
 _COMPUTED = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
 AS_IT_STANDS = "as it stands"
@@ -90,17 +90,18 @@ def known_table(known: Sequence[KnownModel]) -> Table | None:
     """Errors and changes, model by model; None where there is nothing to compute."""
     if len(known) < 2:
         return None
-    rows = []
+    rows: list[Row] = []
     for words, one in zip(known_titles(known), known, strict=True):
-        left_out = MISSING if one.leave_one_out_rms_cents is None else f"{one.leave_one_out_rms_cents:.1f}"
-        changes = (MISSING if one is known[0] else f"{value:+.1f}" for value in one.change_percent.values())
-        rows.append((words, f"{one.in_sample_rms_cents:.1f}", left_out, *changes))
+        errors = (number(value, 1) for value in (one.in_sample_rms_cents, one.leave_one_out_rms_cents))
+        changes = (number(value, 1, signed=True) for value in one.change_percent.values())
+        rows.append((words, *errors, *changes))
     columns = ("model", "in the fit", "left out", *(f"{name}, %" for name in MODULI))
+    keys = ("model", "in_sample_rms_cents", "leave_one_out_rms_cents", *(f"{name}_percent" for name in MODULI))
     title = (
         "What physics knows, computed and not fitted: error by weighted least squares, rms cents, and change of the "
         "constants"
     )
-    return Table(title, columns, tuple(rows))
+    return Table(title, columns, tuple(rows), keys)
 
 
 def known_titles(known: Sequence[KnownModel]) -> list[str]:

@@ -1,17 +1,22 @@
-"""The tables of a diagnosis, text cells only: the terminal, the page and notebooks lay out the same ones."""
+"""The tables of a diagnosis: terminal, page, notebook, CSV and LaTeX show the same ones."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 from bayesplate.diagnosis.wording.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import known_table
-from bayesplate.diagnosis.wording.words import CONDITIONS, MERITS, MISSING, Merit, names_of, worth_showing
+from bayesplate.diagnosis.wording.told import known_sentences, verdict_sentences, warnings
+from bayesplate.diagnosis.wording.words import CONDITIONS, MERITS, VERDICTS, names_of, worth_showing
 from bayesplate.effects.words import effect_name
 from bayesplate.plate.parameter import unit_of_people
-from bayesplate.results.tables import Table
-from bayesplate.results.words import GPA, decimals, interval, is_isotropic, narrow_name, number, plus_minus
+from bayesplate.results.fit_tables import write_tables
+from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
+from bayesplate.results.tables import Cell, Row, Table, by_constant, constants_table, notebook
+from bayesplate.results.words import GPA, Value, decimals, interval, is_isotropic, number, plus_minus
 
 _WORTH_A_ROW = 0.01
 _NARROW = ("effect", "shift", "visible", "size (90 %)", "fate")
@@ -49,8 +54,8 @@ def errors_table(diagnosis: Diagnosis) -> Table:
         columns = {"before": diagnosis.before, f"after: {diagnosis.refitted_words}": diagnosis.after}
     else:
         title, columns = "Error", {"as it is": diagnosis.before}
-    rows = tuple((one.title, *(_merit(one, one.of(errors)) for errors in columns.values())) for one in MERITS)
-    return Table(f"{title}: {diagnosis.name}", ("", *columns), rows)
+    rows: list[Row] = [(one.title, *(one.shown(one.of(errors)) for errors in columns.values())) for one in MERITS]
+    return Table(f"{title}: {diagnosis.name}", ("", *columns), tuple(rows))
 
 
 def claim_table(diagnosis: Diagnosis) -> Table | None:
@@ -61,7 +66,7 @@ def claim_table(diagnosis: Diagnosis) -> Table | None:
     for one in diagnosis.conditions:
         words = CONDITIONS[one.name]
         wanted = words.wanted.format(limit=words.shown(one.limit))
-        found = words.shown(one.value)
+        found = str(words.shown(one.value))
         if one.name == "chance selection" and diagnosis.null_control.nested_ratio_percentile is not None:
             found += f", smaller than on {diagnosis.null_control.nested_ratio_percentile:.0f} % of them"
         rows.append((words.title, found, wanted, "yes" if one.is_met else "no"))
@@ -74,13 +79,23 @@ def shift_table(diagnosis: Diagnosis) -> Table | None:
     """Each modulus before and after; None where nothing was added."""
     if not diagnosis.is_refitted:
         return None
-    rows = []
-    for name, one in diagnosis.elastic_shift.items():
-        digits = decimals(0.01 * one.before * GPA)
-        before, after = (number(value, digits, factor=GPA) for value in (one.before, one.after))
-        rows.append((name, before, after, f"{one.shift_in_sd:+.1f}"))
-    title = f"Shift of the constants by {diagnosis.refitted_words}, GPa"
-    return Table(title, ("constant", "before", "after", "shift, sd"), tuple(rows))
+    return by_constant(
+        f"Shift of the constants by {diagnosis.refitted_words}, GPa",
+        {
+            "before": lambda name: _shifted(diagnosis, name)[0],
+            "after": lambda name: _shifted(diagnosis, name)[1],
+            "shift, sd": lambda name: _shifted(diagnosis, name)[2],
+        },
+        isotropic=is_isotropic(diagnosis.elastic_averaged),
+    )
+
+
+def _shifted(diagnosis: Diagnosis, name: str) -> tuple[Value, Value, Value]:
+    """A modulus before and after, GPa, and the shift in standard deviations."""
+    one = diagnosis.elastic_shift[name]
+    digits = decimals(0.01 * one.before * GPA)
+    before, after = (number(value, digits, factor=GPA) for value in (one.before, one.after))
+    return before, after, number(one.shift_in_sd, 1, signed=True)
 
 
 def what_is_quoted(diagnosis: Diagnosis) -> str:
@@ -93,9 +108,8 @@ def what_is_quoted(diagnosis: Diagnosis) -> str:
 def averaged_table(diagnosis: Diagnosis) -> Table:
     """The moduli to quote."""
     every = diagnosis.elastic_averaged
-    names = {name: narrow_name(name, isotropic=is_isotropic(every)) for name in every}
-    rows = tuple((names[name], plus_minus(one, GPA), interval(one, GPA)) for name, one in every.items())
-    return Table(f"The constants, {what_is_quoted(diagnosis)}, GPa", ("constant", "mean ± sd", "90 % interval"), rows)
+    title = f"The constants, {what_is_quoted(diagnosis)}, GPa"
+    return constants_table(title, every, isotropic=is_isotropic(every))
 
 
 def answers_table(diagnosis: Diagnosis) -> Table:
@@ -113,7 +127,7 @@ def answers_table(diagnosis: Diagnosis) -> Table:
 
 def sizes_table(diagnosis: Diagnosis) -> Table | None:
     """Every size of every explanation that was fitted again, named where there are several; None if none was."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[Row] = []
     are_several = len(diagnosis.finalists) > 1
     for one in diagnosis.finalists:
         explanation = (" and ".join(map(effect_name, one.effects)),) if are_several else ()
@@ -122,8 +136,9 @@ def sizes_table(diagnosis: Diagnosis) -> Table | None:
             for effect, parameters in effects.items():
                 for parameter, spread in parameters.items():
                     factor, unit = unit_of_people(spread.unit)
-                    size = f"{plus_minus(spread, factor)} {unit}".rstrip()
-                    range_ = MISSING if spread.sd == 0.0 else f"{interval(spread, factor)} {unit}".rstrip()
+                    after = f" {unit}" * bool(unit)
+                    size = plus_minus(spread, factor, after)
+                    range_ = None if spread.sd == 0.0 else interval(spread, factor, after)
                     rows.append((*explanation, f"{effect_name(effect)}{where}", parameter, size, range_))
     columns = (*(["fitted with"] if are_several else []), "effect", "size", "mean ± sd", "90 % interval")
     return Table("Sizes of what was fitted again", columns, tuple(rows)) if rows else None
@@ -150,27 +165,19 @@ def candidates_table(diagnosis: Diagnosis, *, narrow: bool = False) -> Table | N
     return Table(title, columns, tuple(rows))
 
 
-def _cells(name: str, one: CandidateEntry) -> Mapping[str, str]:
+def _cells(name: str, one: CandidateEntry) -> Mapping[str, Cell]:
     """Every cell that a row of a candidate may have, by its column."""
     return {
         "effect": name,
-        "shift": _number(one.raw_rms_cents),
-        "visible": _number(one.visible_rms_cents),
+        "shift": number(one.raw_rms_cents, 1),
+        "visible": number(one.visible_rms_cents, 1),
         "E_x / E_y / G_xy off by, %": _bias(one.bias_percent),
-        "inclusion probability": f"{one.inclusion_probability:.3f}",
+        "inclusion probability": number(one.inclusion_probability, 3),
         "size (90 %)": _size(one.amplitude),
-        "looks like": ", ".join(effect_name(other) for other in one.look_alikes) or MISSING,
-        "rejected because": one.rejected_because or MISSING,
+        "looks like": ", ".join(effect_name(other) for other in one.look_alikes) or None,
+        "rejected because": one.rejected_because or None,
         "fate": one.fate,
     }
-
-
-def _merit(one: Merit, value: float | None) -> str:
-    return MISSING if value is None else one.shown(value)
-
-
-def _number(value: float | None) -> str:
-    return MISSING if value is None else f"{value:.1f}"
 
 
 def _summing(shares: Sequence[float]) -> list[str]:
@@ -182,16 +189,81 @@ def _summing(shares: Sequence[float]) -> list[str]:
     return [f"{one / 1000.0:.3f}" for one in thousandths]
 
 
-def _bias(bias: Mapping[str, float] | None) -> str:
-    return MISSING if bias is None else " / ".join(f"{value:+.1f}" for value in bias.values())
+def _bias(bias: Mapping[str, float] | None) -> str | None:
+    return None if bias is None else " / ".join(f"{value:+.1f}" for value in bias.values())
 
 
-def _size(amplitude: Amplitude | None) -> str:
+def _size(amplitude: Amplitude | None) -> str | None:
     if amplitude is None:
-        return MISSING
+        return None
     factor, unit = unit_of_people(amplitude.unit)
     smallest = 1e-3 * (amplitude.q95 - amplitude.q05)
     every = (value if abs(value) >= smallest else 0.0 for value in (amplitude.q05, amplitude.q50, amplitude.q95))
     low, middle, high = (f"{v:.0f}" if abs(v) >= 1000.0 else f"{v:.3g}" for v in (factor * value for value in every))
     range_ = " (fixed)" if amplitude.q05 == amplitude.q95 else f" ({low} to {high})"
     return f"{amplitude.parameter} {middle} {unit}".rstrip() + range_
+
+
+def before_after_table(diagnosis: Diagnosis) -> Table:
+    """Errors, moduli in GPa and sizes of what was added; without an addition there is no after."""
+    rows: list[Row] = [
+        (one.title, one.shown(one.of(diagnosis.before)), one.shown(one.of(diagnosis.after)), None, None)
+        for one in MERITS
+    ]
+    for name, one in diagnosis.elastic_averaged.items():
+        rows.append((f"{name}, GPa", *_shifted(diagnosis, name), plus_minus(one, GPA)))
+    title = f"Before and after; verdict: {diagnosis.verdict}"
+    columns = ("", "before", "after", "shift, sd", "averaged")
+    keys = ("quantity", "before", "after", "shift_in_sd", "averaged")
+    if diagnosis.is_refitted:
+        rows += [(name, None, size, None, None) for name, size in _sizes(diagnosis)]
+        return Table(title, columns, tuple(rows), keys)
+
+    def known(row: tuple[Cell, ...]) -> tuple[Cell, ...]:
+        return (*row[:2], row[4])
+
+    return Table(title, (*columns[:2], columns[4]), tuple(map(known, rows)), (*keys[:2], keys[4]))
+
+
+def _sizes(diagnosis: Diagnosis) -> list[tuple[str, Value]]:
+    """Name with unit, and mean, of each size of what was added."""
+    found = []
+    for one in diagnosis.finalists:
+        for owner, effects in one.sizes.items() if one.effects == diagnosis.refitted else ():
+            for effect, parameters in effects.items():
+                for parameter, spread in parameters.items():
+                    factor, unit = unit_of_people(spread.unit)
+                    words = f"{effect_name(effect)} {parameter}, {owner}" + f", {unit}" * bool(unit)
+                    found.append((words, number(spread.mean, decimals(spread.sd * factor), factor=factor)))
+    return found
+
+
+def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis, title: str) -> tuple[Path, ...]:
+    """Write errors and constants before and after, and known effects where there are any, as CSV and LaTeX.
+
+    Parameters
+    ----------
+    folder : Path
+        Must be there.
+    diagnosis : Diagnosis
+    title : str
+        Of the board; any text.
+
+    Returns
+    -------
+    tuple of Path
+    """
+    written: tuple[Path, ...] = ()
+    for names, table in ((BEFORE_AFTER, before_after_table(diagnosis)), (KNOWN_EFFECTS, known_table(diagnosis.known))):
+        if table is not None:
+            told = replace(table, title=f"{table.title}; {title}")
+            written += write_tables(folder, names, table, told)
+    return written
+
+
+def html(diagnosis: Diagnosis) -> str:
+    """A diagnosis as a notebook shows it: heading, sentences, tables, and what to measure next."""
+    advice = [f"What to measure next: {diagnosis.recommendation}"] if diagnosis.recommendation else []
+    sentences = [*verdict_sentences(diagnosis), *known_sentences(diagnosis), *warnings(diagnosis), *advice]
+    heading = f"{diagnosis.name}: {VERDICTS[diagnosis.verdict].heading}"
+    return notebook(heading, sentences, every_table(diagnosis))

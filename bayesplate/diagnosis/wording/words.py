@@ -10,8 +10,8 @@ from bayesplate.diagnosis.decision.verdict import Word
 from bayesplate.diagnosis.wording.candidates import CandidateEntry, ExchangeEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Errors
 from bayesplate.effects.words import effect_name, effect_names, joined
+from bayesplate.results.words import Value, number, percent
 
-MISSING = "–"
 TOO_FEW = "the readings are too few to choose anew without each of them"
 NONE_LEFT = "hardly a mode is left that does not carry a constant or a size alone"
 _UNLIKELY = 0.01
@@ -73,7 +73,7 @@ class Merit:
 
     words: str
     of: Callable[[Errors], float | None]
-    shown: Callable[[float], str]
+    shown: Callable[[float | None], Value]
     is_rms: bool = False
 
     @property
@@ -82,12 +82,16 @@ class Merit:
         return f"error {self.words}, rms cents" if self.is_rms else self.words
 
 
+def _cents(value: float | None) -> Value:
+    return number(value, 1)
+
+
 MERITS = (
-    Merit("in the fit", lambda errors: errors.in_sample_rms_cents, "{:.1f}".format, True),
-    Merit("of a mode left out", lambda errors: errors.leave_one_out_rms_cents, "{:.1f}".format, True),
-    Merit("left out, search and all", lambda errors: errors.nested_leave_one_out_rms_cents, "{:.1f}".format, True),
-    Merit("log score", lambda errors: errors.log_score, "{:.2f}".format),
-    Merit("readings inside their 90 % intervals", lambda errors: errors.hits_90, lambda share: f"{100 * share:.0f} %"),
+    Merit("in the fit", lambda errors: errors.in_sample_rms_cents, _cents, True),
+    Merit("of a mode left out", lambda errors: errors.leave_one_out_rms_cents, _cents, True),
+    Merit("left out, search and all", lambda errors: errors.nested_leave_one_out_rms_cents, _cents, True),
+    Merit("log score", lambda errors: errors.log_score, lambda value: number(value, 2)),
+    Merit("readings inside their 90 % intervals", lambda errors: errors.hits_90, percent),
 )
 """In the order of the tables: the first falls with every effect that is added, the third is the honest one."""
 
@@ -126,11 +130,11 @@ class ConditionWords:
     title: str
     wanted: str
     lacking: str
-    digits: str = "{:.2f}"
+    digits: int = 2
 
-    def shown(self, value: float | None) -> str:
+    def shown(self, value: float | None) -> Value:
         """A number of it as people read it."""
-        return MISSING if value is None else self.digits.format(value)
+        return number(value, self.digits)
 
 
 CONDITIONS: dict[ConditionName, ConditionWords] = {
@@ -148,16 +152,16 @@ CONDITIONS: dict[ConditionName, ConditionWords] = {
         "probability that nothing is lacking, at its largest with the sizes' priors halved or doubled",
         "below {limit}",
         "the probability that nothing is lacking is too large",
-        "{:.3f}",
+        3,
     ),
     "probability of another": ConditionWords(
         "probability of what is not named here, at its largest with the sizes' priors halved or doubled",
         "below {limit}",
         "the probability of another effect is too large",
-        "{:.3f}",
+        3,
     ),
     "prior predictive": ConditionWords(
-        "p-value of the misfit that is left", "at least {limit}", "the misfit that is left is too large", "{:.3f}"
+        "p-value of the misfit that is left", "at least {limit}", "the misfit that is left is too large", 3
     ),
 }
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from bayesplate.workflow.shown import Table
+Texts = Sequence[str]
 
 _SENTENCE = 40
 """Characters in a line from which on a cell is a text and no number: it begins at the left."""
@@ -17,12 +16,14 @@ _RULES = 3
 """Characters of a rule between two columns with its spaces."""
 
 
-def laid_out(table: Table, width: int) -> Any:
+def laid_out(title: str, columns: Texts, rows: Sequence[Texts], width: int) -> Any:
     """A table as rich prints it: as a grid where that fits, otherwise each row as a small list of its own.
 
     Parameters
     ----------
-    table : Table
+    title : str
+    columns : sequence of str
+    rows : sequence of sequence of str
     width : int
         Of the terminal, characters.
 
@@ -30,16 +31,16 @@ def laid_out(table: Table, width: int) -> Any:
     -------
     rich.console.RenderableType
     """
-    widths = column_widths(table, width)
-    return _stacked(table) if widths is None else _grid(table, widths)
+    widths = column_widths(columns, rows, width)
+    return _stacked(title, columns, rows) if widths is None else _grid(title, columns, rows, widths)
 
 
-def column_widths(table: Table, width: int) -> list[int] | None:
+def column_widths(columns: Texts, rows: Sequence[Texts], width: int) -> list[int] | None:
     """Characters of each column, the longest ones narrowed first; None if no division leaves every number whole."""
-    columns = list(zip(table.columns, *table.rows, strict=True))
+    cells = list(zip(columns, *rows, strict=True))
     available = width - _RULES * len(columns) - 1
-    natural = [max(_longest_line(cell) for cell in column) for column in columns]
-    least = [max(map(_least, column)) for column in columns]
+    natural = [max(map(_longest_line, column)) for column in cells]
+    least = [max(map(_least, column)) for column in cells]
     # a name is broken only where nothing else helps
     for narrowest in ([natural[0], *least[1:]], least):
         if sum(narrowest) <= available:
@@ -72,29 +73,29 @@ def _holds_a_number(line: str) -> bool:
     return any(character.isdigit() for character in line)
 
 
-def _grid(table: Table, widths: Sequence[int]) -> Any:
+def _grid(title: str, columns: Texts, rows: Sequence[Texts], widths: Sequence[int]) -> Any:
     from rich.table import Table as Grid
     from rich.text import Text
 
-    grid = Grid(title=Text(table.title), title_justify="left", title_style="bold")
-    cells = zip(*table.rows, strict=True) if table.rows else [()] * len(table.columns)
-    for i, (column, width, own) in enumerate(zip(table.columns, widths, cells, strict=True)):
+    grid = Grid(title=Text(title), title_justify="left", title_style="bold")
+    cells = zip(*rows, strict=True) if rows else [()] * len(columns)
+    for i, (column, width, own) in enumerate(zip(columns, widths, cells, strict=True)):
         is_text = i == 0 or any(_longest_line(cell) > _SENTENCE for cell in own)
         grid.add_column(Text(column), justify="left" if is_text else "right", width=width, overflow="fold")
-    for row in table.rows:
-        grid.add_row(*(Text(cell) for cell in row))
+    for row in rows:
+        grid.add_row(*map(Text, row))
     return grid
 
 
-def _stacked(table: Table) -> Any:
+def _stacked(title: str, columns: Texts, rows: Sequence[Texts]) -> Any:
     """Each row under its first cell: the name of a column, and the cell."""
     from rich.console import Group
     from rich.padding import Padding
     from rich.text import Text
 
-    names = [" ".join(column.split()) for column in table.columns]
-    parts: list[Any] = [Text(table.title, style="bold")]
-    for first, *cells in table.rows:
+    names = [" ".join(column.split()) for column in columns]
+    parts: list[Any] = [Text(title, style="bold")]
+    for first, *cells in rows:
         parts.append(Text(f"{names[0]} {first}".strip()))
         for name, cell in zip(names[1:], cells, strict=True):
             told = ", ".join(cell.rstrip().split("\n"))

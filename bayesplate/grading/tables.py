@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from bayesplate.files import whole_file, writing
+from bayesplate.grading.figures import FIGURES, LogFigure, limit_told
+from bayesplate.grading.matching import Grading
+from bayesplate.grading.storage import write_rows
 from bayesplate.plate.material import MODULI
-from bayesplate.results.board_table import write_rows
-from bayesplate.results.exports import Cell
-from bayesplate.results.grading import Grading
-from bayesplate.results.log_figures import FIGURES, LogFigure, limit_told
-from bayesplate.results.tables import Table
-from bayesplate.results.words import percent, plus_minus
+from bayesplate.results.tables import Cell, Row, Table
+from bayesplate.results.words import Value, percent
 
 GRADING = "grading.csv"
 MOST_LISTED, MOST_ON_TERMINAL = 100, 20
@@ -22,12 +20,6 @@ MOST_LISTED, MOST_ON_TERMINAL = 100, 20
 _MARK = "?"
 _AT_ONCE = 256
 """Boards whose figures are computed together."""
-
-
-@dataclass(frozen=True)
-class _Number:
-    mean: float
-    sd: float
 
 
 def best_first(graded: Grading) -> list[int]:
@@ -103,25 +95,25 @@ def _head(name: str, figure: LogFigure) -> str:
     return f"{told}{figure.words}" + ("" if figure.unit == "1" else f", {figure.unit}")
 
 
-def _column(graded: Grading, some: list[int], figure: LogFigure) -> list[str]:
+def _column(graded: Grading, some: list[int], figure: LogFigure) -> list[Value]:
     middle = graded.spread(figure, some)[0]
     sd = figure.log(graded.log_mean[some], graded.triangles[some])[1]
-    return [plus_minus(_Number(float(one), float(one * share))) for one, share in zip(middle, sd, strict=True)]
+    return [Value(float(one), float(one * share)) for one, share in zip(middle, sd, strict=True)]
 
 
 def _limits_table(graded: Grading, some: list[int], which: str) -> Table:
     assert graded.meets_all is not None
     limits = [limit_told(name, limit) for name, limit in graded.request.limits.items()]
     each = list(graded.meets.values())
-    rows = tuple(
+    rows: list[Row] = [
         (graded.names[i], *(percent(float(one[i])) for one in each), percent(float(graded.meets_all[i]))) for i in some
-    )
-    return Table(f"Probability that a board meets the limits{which}", ("board", *limits, "all of them"), rows)
+    ]
+    return Table(f"Probability that a board meets the limits{which}", ("board", *limits, "all of them"), tuple(rows))
 
 
 def _pairs_table(graded: Grading, most: int) -> Table:
     some = graded.pairs[:most]
-    rows = []
+    rows: list[Row] = []
     for pair in some:
         apart = [_apart(graded, pair.first, pair.second, name) for name in MODULI]
         rows.append((graded.names[pair.first], graded.names[pair.second], percent(pair.probability), *apart))

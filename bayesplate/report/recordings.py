@@ -1,19 +1,31 @@
-"""Figures of picked recordings: spectra of all places with the modes, what their errors are made of, stability."""
+"""recordings.html: the spectra of all places, the modes in them, what is known of each, and what was set aside."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bayesplate.recordings.contract import PickedRow, PickReport
-from bayesplate.recordings.modes_found import Path
-from bayesplate.recordings.responses import Averaged
-from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILLION
-from bayesplate.report.spectrum import short_label
+from bayesplate.recordings.modes_found import Path as FoundPath
+from bayesplate.recordings.picking import Picked
+from bayesplate.recordings.responses import Averaged, averaged
+from bayesplate.recordings.taking import Heard
+from bayesplate.report.modes import short_label
+from bayesplate.report.page import from_template, save_page
+from bayesplate.report.saving import drawing
 from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    LIGHT,
+    ORANGE,
+    SKY,
     SMALL,
+    VERMILLION,
     Picture,
     drawable,
     hertz_axis,
@@ -24,6 +36,8 @@ from bayesplate.report.style import (
     stacked,
     upright_names,
 )
+from bayesplate.results.tables import Table
+from bayesplate.results.words import chances, percent, two_digits
 
 MOST_PLACES = 8
 _STEP = 30.0
@@ -38,7 +52,7 @@ _PARTS = (
 )
 
 
-def every_picture(report: PickReport, averaged: Sequence[Averaged], paths: Sequence[Path]) -> list[Picture]:
+def every_picture(report: PickReport, averaged: Sequence[Averaged], paths: Sequence[FoundPath]) -> list[Picture]:
     """All figures of the page."""
     return [spectra_picture(report, averaged), errors_picture(report), stability_picture(report, paths)]
 
@@ -117,7 +131,7 @@ def errors_picture(report: PickReport) -> Picture:
     return Picture("errors", "How well the frequencies are known", told, caption, figure)
 
 
-def stability_picture(report: PickReport, paths: Sequence[Path]) -> Picture:
+def stability_picture(report: PickReport, paths: Sequence[FoundPath]) -> Picture:
     """Where the search found modes with one mode in a window, with two, and so on."""
     figure, (panel,) = stacked([2.2], left=0.55, right=0.2, bottom=0.75, top=0.05)
     widths = sorted({path.width for path in paths}, reverse=True)
@@ -147,3 +161,89 @@ def _name(peak: PickedRow) -> str:
     """Its frequency in Hz, and its likeliest mode where there is one."""
     likeliest = peak.labels[0] if peak.labels else None
     return f"{peak.hz:.1f}" + (f" {short_label(likeliest.label)}" if likeliest and likeliest.probability > 0.5 else "")
+
+
+RECORDINGS_PAGE = "recordings.html"
+
+
+@drawing()
+def write_recordings_page(folder: Path, report: PickReport, picked: Picked, heard: Heard) -> Path:
+    """Write the page and its figures as PNG and SVG.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+    report : PickReport
+    picked : Picked
+    heard : Heard
+
+    Returns
+    -------
+    Path
+        Of recordings.html.
+    """
+    aside = [peak for peak in report.peaks if not peak.is_likely]
+    return save_page(
+        folder / RECORDINGS_PAGE,
+        {"every": every_picture(report, averaged(heard), picked.paths)},
+        lambda pictures: from_template(
+            "recordings.html",
+            title=", ".join(report.files[:3]) + (" and others" if len(report.files) > 3 else ""),
+            sentences=sentences(report),
+            remarks=report.remarks,
+            pictures=pictures["every"],
+            modes_table=modes_table(report),
+            aside_table=aside_table(aside) if aside else None,
+            fragment=report.fragment.splitlines(),
+        ),
+    )
+
+
+def sentences(report: PickReport) -> tuple[str, ...]:
+    """The page in short."""
+    hits = "One ring-down" if report.n_hits == 1 else f"{report.n_hits} ring-downs"
+    places = "one pair of places" if report.n_places == 1 else f"{report.n_places} pairs of places"
+    told = [
+        f"{hits} of {report.seconds:.1f} s between {places} show {len(report.likely)} modes between "
+        f"{report.lowest_hz:g} and {report.highest_hz:g} Hz."
+    ]
+    if report.likely:
+        share = sorted(peak.sd_hz / peak.hz for peak in report.likely)
+        doubt = sum(peak.spurious_probability for peak in report.likely)
+        told.append(
+            f"Half of the frequencies are known to {100.0 * share[len(share) // 2]:.2g} % or better, the worst to "
+            f"{100.0 * share[-1]:.2g} %. Of these modes, {doubt:.1f} are expected to be none."
+        )
+    if report.polarity:
+        told.append(
+            f"Force and response have {'one polarity' if report.polarity == 'same' else 'opposite polarities'}."
+        )
+    if report.board:
+        told.append(f"The labels are those of the board {report.board}; the fit weighs them anew.")
+    return tuple(told)
+
+
+def modes_table(report: PickReport) -> Table:
+    """Every likely mode."""
+    rows = tuple(
+        (
+            f"{peak.hz:.3f} ± {two_digits(peak.sd_hz)}",
+            f"{peak.damping_percent:.3f} ± {two_digits(peak.damping_sd_percent)}",
+            peak.sign or None,
+            f"{peak.amplitude:.3f}",
+            percent(peak.spurious_probability, 1),
+            chances(peak.may_be(3)),
+        )
+        for peak in report.likely
+    )
+    return Table("Modes", ("frequency, Hz", "damping, %", "sign", "strength", "no mode", "label"), rows)
+
+
+def aside_table(aside: list[PickedRow]) -> Table:
+    """What was set aside, and why."""
+    rows = tuple(
+        (f"{peak.hz:.2f}", peak.kind or f"{peak.amplitude:.3f}", percent(peak.spurious_probability, 1))
+        for peak in aside
+    )
+    return Table("Set aside", ("Hz", "taken for", "strength", "no mode"), rows)

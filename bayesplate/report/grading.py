@@ -1,21 +1,36 @@
-"""Figures of many boards: sorted by each constant, density and wave speed, what meets a specification, pairs."""
+"""grading.html: many boards sorted by their constants, makers' figures, a specification, and pairs that match."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.grading.boards import BatchSummary
+from bayesplate.grading.figures import FIGURES, limit_told
+from bayesplate.grading.matching import LEAST_PROBABILITY, NINETY, TARGET, Grading
+from bayesplate.grading.tables import MOST_LISTED, best_first, doubts_sentence, grading_tables, marked
 from bayesplate.plate.material import MODULI
-from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
+from bayesplate.report.page import from_template, save_page
+from bayesplate.report.saving import drawing
 from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    LIGHT,
+    ORANGE,
+    SKY,
     SMALL,
+    VERMILLION,
     Picture,
     drawable,
     heading,
+    in_figure,
     in_rows,
     key,
     legend_below,
@@ -25,14 +40,13 @@ from bayesplate.report.style import (
     stacked,
     whisker,
 )
-from bayesplate.report.symbols import in_figure
-from bayesplate.results.grading import Grading
-from bayesplate.results.grading_table import best_first, marked
-from bayesplate.results.log_figures import FIGURES
+from bayesplate.results.folder import PAGE
+from bayesplate.results.tables import Table
 from bayesplate.results.words import percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +58,6 @@ _ASIDE, _ABOVE, _LINE = 8.0, 3.0, SMALL + 2.0
 """Points from a point to its name, beside and above its bar, and from one name to the next."""
 _MOST_VECTORS = 1000
 """Boards up to which a figure draws each as lines; more would make a page of many megabytes."""
-_NINETY = 1.645
 _STYLES = {"E_x": (BLUE, "o"), "E_y": (ORANGE, "D"), "G_xy": (GREEN, "s")}
 
 
@@ -177,10 +190,10 @@ def pairs_picture(graded: Grading) -> Picture:
         at = [pair.first, pair.second]
         for step, name in zip(np.linspace(-0.22, 0.22, len(names)), names, strict=True):
             mean, sd = FIGURES[name].log(graded.log_mean[at], graded.triangles[at])
-            apart, spread = float(mean[1] - mean[0]), _NINETY * float(np.sqrt((sd**2).sum()))
+            apart, spread = float(mean[1] - mean[0]), NINETY * float(np.sqrt((sd**2).sum()))
             ends = 100.0 * np.expm1(apart + spread * np.array([-1.0, 0.0, 1.0]))
             whisker(panel, row + step, tuple(ends), *_STYLES[name])
-        panel.annotate(percent(pair.probability), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
+        panel.annotate(str(percent(pair.probability)), (1.02, row), xycoords=("axes fraction", "data"), ha="left",
                        va="center", fontsize=SMALL, weight="bold", annotation_clip=False)  # fmt: skip
     for width in sorted({graded.request.match_percent.get(name, 0.0) for name in names}):
         panel.axvspan(-100.0 * width / (100.0 + width), width, color=LIGHT, zorder=0)
@@ -229,3 +242,86 @@ def _limit_band(panel: Axes, graded: Grading, name: str) -> None:
             color=LIGHT,
             zorder=0,
         )
+
+
+GRADING_PAGE = "grading.html"
+_TABLES = ("constants", "makers", "limits", "pairs", "doubts")
+
+
+@drawing()
+def write_grading_page(folder: Path, graded: Grading, summary: BatchSummary, *, has_pages: bool) -> Path:
+    """Write the page and its figures as PNG and SVG.
+
+    Parameters
+    ----------
+    folder : Path
+        Must be there.
+    graded : Grading
+    summary : BatchSummary
+        Of the same boards.
+    has_pages : bool
+        Whether each board has a page of its own in boards/NAME.
+
+    Returns
+    -------
+    Path
+    """
+    tables: dict[str, Table | None] = {**dict.fromkeys(_TABLES), **grading_tables(graded)}
+    pages = [(marked(graded, i), f"boards/{graded.names[i]}/{PAGE}") for i in best_first(graded)[:MOST_LISTED]]
+    return save_page(
+        folder / GRADING_PAGE,
+        every_grading_picture(graded),
+        lambda pictures: from_template(
+            "grading.html",
+            title=f"{summary.n_fitted} boards, graded",
+            sentences=sentences(graded, summary),
+            failures=failures_table(summary),
+            pictures=pictures,
+            tables=tables,
+            matching=matching_sentence(graded),
+            has_target=TARGET in graded.request.figures,
+            links=pages if has_pages else [],
+        ),
+    )
+
+
+def sentences(graded: Grading, summary: BatchSummary) -> tuple[str, ...]:
+    """The page in short."""
+    told = [f"{summary.n_fitted} of {summary.n_boards} boards were fitted."]
+    if graded.meets_all is not None and graded.names:
+        meets = graded.meets_all[graded.trusted]
+        limits = ", ".join(limit_told(name, limit) for name, limit in graded.request.limits.items())
+        n_sure, n_maybe = int((meets >= 0.9).sum()), int((meets >= 0.5).sum())
+        told.append(
+            f"{limits}: {n_sure} boards meet this with 90 % or more, {n_maybe} with 50 % or more; "
+            f"{float(meets.sum()):.1f} are to be expected."
+        )
+    if graded.pairs:
+        best = graded.pairs[0]
+        first, second = graded.names[best.first], graded.names[best.second]
+        told.append(
+            f"{len(graded.pairs)} pairs are proposed; the likeliest match is {first} with {second}, "
+            f"{percent(best.probability)}."
+        )
+    in_doubt = doubts_sentence(graded)
+    return (*told, f"{in_doubt}.") if in_doubt else tuple(told)
+
+
+def matching_sentence(graded: Grading) -> str:
+    """When two boards match."""
+    within = ", ".join(f"{name} within {value:g} %" for name, value in graded.request.match_percent.items())
+    return (
+        f"Two boards match where {within}, all at once. The errors of two boards are taken to be independent. The "
+        f"likeliest pair is taken first, then the likeliest of the boards that are left; pairs below "
+        f"{percent(LEAST_PROBABILITY)} are not proposed."
+    )
+
+
+def failures_table(summary: BatchSummary) -> Table | None:
+    """The boards that were not fitted, with the reason; None where all were."""
+    if not summary.failed:
+        return None
+    some = summary.failed[:MOST_LISTED]
+    which = "" if len(some) == len(summary.failed) else f", the first {MOST_LISTED} of {len(summary.failed)}"
+    rows = tuple((one.name, one.outcome, one.message) for one in some)
+    return Table(f"Boards that were not fitted{which}", ("board", "outcome", "message"), rows)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bayesplate.results.board_rows import BoardRow
-from bayesplate.results.told_rows import told_rows
+from bayesplate.grading.boards import BoardRow, told_rows
 
 
 def test_boards_of_the_same_readings_are_in_doubt_and_what_was_refused_says_where_it_stands():

@@ -7,9 +7,8 @@ from dataclasses import replace
 import pytest
 from made_summaries import SUMMARY
 
-from bayesplate.results.board_journal import Journal
-from bayesplate.results.board_rows import NUMBERS, WORDS, BoardRow, row_of
-from bayesplate.results.board_table import write_table
+from bayesplate.grading.boards import NUMBERS, WORDS, BoardRow, row_of
+from bayesplate.grading.storage import Journal, write_table
 
 ROW, REFUSED = (
     row_of(replace(SUMMARY, doubts=("misread?", "scatter"))),

@@ -1,4 +1,4 @@
-"""The figure of prior and posterior: what was assumed of each quantity, and what the readings made of it."""
+"""Prior and posterior of every quantity, and the way of each ensemble."""
 
 from __future__ import annotations
 
@@ -13,15 +13,32 @@ from bayesplate.plate.material import MODULI, RIGIDITIES
 from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.plate.sessions import DISCREPANCY
 from bayesplate.posterior.draws import Draws
+from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.quantities import Quantity
-from bayesplate.report.colours import BLACK
-from bayesplate.report.style import SMALL, WIDTH, Picture, hump, legend_below, limits, placed, short
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    SMALL,
+    VERMILLION,
+    WIDTH,
+    Picture,
+    hump,
+    in_figure,
+    legend_below,
+    limits,
+    placed,
+    short,
+    stacked,
+)
 from bayesplate.results.words import GPA
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 MOST_PANELS = 18
 _PANEL, _ROW = (1.95, 0.6), 1.28
@@ -101,7 +118,7 @@ def priors_picture(problem: PosedProblem, draws: Draws) -> Picture:
     for i, one in enumerate(shown):
         row, column = divmod(i, 2)
         left, bottom = _LEFT + column * (_PANEL[0] + _GAP), height - _TOP - row * _ROW - _PANEL[1]
-        _draw(placed(figure, left, bottom, *_PANEL), one)
+        _draw_both(placed(figure, left, bottom, *_PANEL), one)
     legend_below(figure, 2)
     told = "; ".join(f"{one.name}: {one.told}" for one in shown)
     left_out = f" {len(quantities) - len(shown)} more are not drawn." if len(quantities) > len(shown) else ""
@@ -112,7 +129,7 @@ def priors_picture(problem: PosedProblem, draws: Draws) -> Picture:
     return Picture("priors", "What was assumed, and what the readings made of it", f"{told}.", caption, figure)
 
 
-def _draw(panel: Axes, one: Compared) -> None:
+def _draw_both(panel: Axes, one: Compared) -> None:
     """Both densities on the quantity's own axis, each to its own height; how much narrower the second is."""
     low, high = limits(one.draws, margin=_MARGIN)
     ends = (low if one.prior.kind == "normal" else max(low, 0.0), high)
@@ -128,3 +145,44 @@ def _draw(panel: Axes, one: Compared) -> None:
     title = f"{name}, {one.unit}" if one.unit else name
     panel.set_title(title, fontsize=SMALL, loc="left", weight="bold", pad=12, parse_math=is_ours)
     panel.text(0.0, 1.04, one.told, transform=panel.transAxes, va="bottom", fontsize=SMALL - 0.5)
+
+
+_COLOURS = (BLUE, ORANGE, GREEN, VERMILLION)
+_MOST_POINTS = 240
+
+
+def health_picture(inference: Inference) -> Picture:
+    """The mean over the walkers of each ensemble, step by step."""
+    convergence = inference.convergence
+    ways, burn_in = _ways(inference)
+    n_ensembles, n_steps, _ = ways.shape
+    names = [*inference.problem.board.symmetry.free, "noise"]
+    figure, panels = stacked([0.68] * len(names), left=0.62, right=0.25, top=0.26, bottom=0.78, gap=0.34)
+    steps = np.arange(0, n_steps, max(1, n_steps // _MOST_POINTS))
+    for i, (panel, name) in enumerate(zip(panels, names, strict=True)):
+        means = np.exp(ways[:, steps, i]) * (100.0 if name == "noise" else 1.0)
+        for k in range(n_ensembles):
+            panel.plot(steps, means[k], color=_COLOURS[k % len(_COLOURS)], lw=0.9, label=f"ensemble {k + 1}")
+        if burn_in:
+            panel.axvspan(0, burn_in, color=LIGHT, lw=0, zorder=0, label="left out: burn-in")
+        panel.set(xlim=(0, n_steps), ylim=limits(means[:, steps >= burn_in], margin=0.25))
+        panel.set_title("noise, %" if name == "noise" else f"{in_figure(name)}, N m", fontsize=SMALL, loc="left", pad=3)
+        panel.ticklabel_format(axis="y", useOffset=False)
+        panel.locator_params(axis="y", nbins=4)
+        panel.tick_params(labelbottom=panel is panels[-1])
+    panels[-1].set_xlabel("step")
+    legend_below(figure, 3)
+    alt = (
+        f"{n_ensembles} ensembles over {n_steps} steps. Largest R-hat {convergence.rhat_max:.4f}, smallest effective "
+        f"size {convergence.ess_min:.0f}, largest autocorrelation time {convergence.tau_max:.0f} steps."
+    )
+    caption = (
+        "The mean of each ensemble's walkers. Lines that wander in one band, none apart and none drifting, are a good "
+        "sign; the numbers below are the test."
+    )
+    return Picture("sampler", "How the sampler fared", alt, caption, figure)
+
+
+def _ways(inference: Inference) -> tuple[NDArray[np.float64], int]:
+    """Mean over the walkers of each ensemble, step by step, (n_ensembles, n_steps, n_dim), and the steps of burn-in."""
+    return inference.chains.draws.mean(axis=2), inference.chains.burn_in

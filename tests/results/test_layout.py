@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from io import StringIO
 
 import pytest
 from diagnoses import DIAGNOSES
 from made_summaries import SUMMARY
-from rich.console import Console
 
-from bayesplate.columns import column_widths, laid_out
 from bayesplate.diagnosis.wording.tables import candidates_table
-from bayesplate.results.tables import Table
+from bayesplate.results.layout import column_widths
+from bayesplate.results.tables import Table, render
 from bayesplate.workflow.shown import show_diagnosis, show_fit
 
 TABLES = {
@@ -24,9 +22,7 @@ TABLES = {
 
 def printed(table: Table, width: int) -> list[str]:
     """The lines of a table on a terminal."""
-    stream = StringIO()
-    Console(file=stream, width=width, highlight=False).print(laid_out(table, width))
-    return [line.rstrip() for line in stream.getvalue().splitlines()]
+    return [line.rstrip() for line in render(table, "terminal", width=width).splitlines()]
 
 
 @pytest.mark.parametrize("width", [40, 50, 60, 80])
@@ -38,7 +34,7 @@ def test_no_number_is_cut_on_a_narrow_terminal(shown, width):
 
         assert max(map(len, lines)) <= width
         assert "…" not in "".join(lines)
-        for row in table.rows:
+        for row in table.texts:
             for cell in row:
                 assert {word for word in cell.split() if len(word) < width - 4} <= words, cell
 
@@ -54,9 +50,9 @@ def test_a_number_and_its_uncertainty_stay_in_one_line(width):
 def test_a_table_that_fits_is_a_grid_and_one_that_does_not_is_stacked():
     table = Table("Made", ("mode", "90 % interval", "a reason in words"), (("(1,0)", "-35.3 to +45.7", "not needed"),))
 
-    assert column_widths(table, 80) == [5, 14, 17]
-    assert column_widths(table, 40) == [5, 14, 11]  # by hand: 40 less 10 of rules leaves 30
-    assert column_widths(table, 30) is None
+    assert column_widths(table.columns, table.texts, 80) == [5, 14, 17]
+    assert column_widths(table.columns, table.texts, 40) == [5, 14, 11]  # by hand: 40 less 10 of rules leaves 30
+    assert column_widths(table.columns, table.texts, 30) is None
     assert printed(table, 30) == [
         "Made",
         "mode (1,0)",

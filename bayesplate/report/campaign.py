@@ -1,25 +1,43 @@
-"""Figures of a campaign: shared numbers and who taught them, boards side by side, what is common, boards left out."""
+"""What the page of a campaign shows: what boards share and who taught it, boards side by side, what is left over."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bayesplate.campaigns.common import CommonResidual, clear_of_zero
-from bayesplate.campaigns.diagnosis import CampaignDiagnosis
+from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
 from bayesplate.campaigns.summary import CampaignSummary
-from bayesplate.campaigns.tables import shared_name
+from bayesplate.campaigns.tables import (
+    boards_table,
+    common_table,
+    population_table,
+    searched_tables,
+    shared_name,
+    shared_table,
+    taught_table,
+)
 from bayesplate.plate.material import MODULI
 from bayesplate.plate.parameter import unit_of_people
-from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
+from bayesplate.report.page import from_template, save_page
+from bayesplate.report.saving import drawing
 from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREY,
+    LIGHT,
+    ORANGE,
     ROW,
+    SKY,
+    VERMILLION,
     Picture,
     drawable,
     heading,
+    in_figure,
     in_rows,
     key,
     legend_below,
@@ -28,8 +46,8 @@ from bayesplate.report.style import (
     stacked,
     whisker,
 )
-from bayesplate.report.symbols import in_figure
 from bayesplate.results.contract import Spread
+from bayesplate.results.folder import PAGE
 from bayesplate.results.words import GPA, interval, plus_minus
 
 _LEFT = 1.25
@@ -151,3 +169,64 @@ def pooled_rms_cents(summary: CampaignSummary) -> float:
     """Error of all labelled modes of all boards, cents."""
     residuals = [mode.residual_cents for one in summary.boards.values() for mode in one.modes]
     return float(np.sqrt(np.mean(np.square(residuals))))
+
+
+@drawing()
+def write_campaign_report(
+    folder: Path, title: str, summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None
+) -> Path:
+    """Write the page and its figures as PNG and SVG.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+    title : str
+        Of the campaign; any text.
+    summary : CampaignSummary
+    diagnosis : CampaignDiagnosis, optional
+
+    Returns
+    -------
+    Path
+        Of report.html.
+    """
+    shared = summary.shared
+    return save_page(
+        folder / PAGE,
+        every_picture(summary, diagnosis),
+        lambda pictures: from_template(
+            "campaign.html",
+            title=title or summary.name,
+            name=summary.name,
+            sentences=sentences(summary, diagnosis),
+            warnings=summary.warnings,
+            boards=list(summary.boards),
+            pictures=pictures,
+            diagnosis_tables=() if diagnosis is None else searched_tables(diagnosis),
+            shared_tables=(shared_table(shared), *(taught_table(summary, name) for name in shared)) if shared else (),
+            boards_table=boards_table(summary),
+            common_table=common_table(summary.common_residual) if summary.common_residual else None,
+            population_table=None if summary.population is None else population_table(summary.population),
+        ),
+    )
+
+
+def sentences(summary: CampaignSummary, diagnosis: CampaignDiagnosis | None = None) -> tuple[str, ...]:
+    """The page in short."""
+    told = []
+    if diagnosis is not None:
+        told += [claim_sentence(diagnosis)]
+        told += [] if diagnosis.declared or diagnosis.conditions is None else [f"Why: {diagnosis.reason}."]
+    for name, one in summary.shared.items():
+        factor = unit_of_people(one.all_boards.unit)[0]
+        told.append(
+            f"{shared_name(name, one)}: {plus_minus(one.all_boards, factor)} from {len(summary.boards)} boards, nine "
+            f"times in ten {interval(one.all_boards, factor)}."
+        )
+        if one.scatter is not None:
+            told.append(f"The boards' own differ from it by {plus_minus(one.scatter, 100.0)} %.")
+    told.append(f"The fitted boards miss their labelled modes by {pooled_rms_cents(summary):.1f} cents in all.")
+    if diagnosis is not None and diagnosis.recommendation:
+        told.append(f"What to do next: {diagnosis.recommendation}.")
+    return tuple(told)

@@ -1,4 +1,4 @@
-"""The figure of a plan: what each proposal is expected to give, and what it costs."""
+"""Figures of a plan: what each proposal is expected to give, and the sheet for the bench."""
 
 from __future__ import annotations
 
@@ -8,15 +8,32 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayesplate.planning.bench import Bench
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
 from bayesplate.plate.material import MODULI
-from bayesplate.report.colours import BLUE, DARK, GREEN, LIGHT, ORANGE, SKY, VERMILLION
-from bayesplate.report.style import SMALL, Picture, drawable, heading, legend_below, placed
-from bayesplate.report.symbols import in_figure
+from bayesplate.report.chladni import Marks, chladni_sheet
+from bayesplate.report.style import (
+    BLUE,
+    DARK,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    SKY,
+    SMALL,
+    VERMILLION,
+    Picture,
+    drawable,
+    heading,
+    in_figure,
+    legend_below,
+    placed,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 MOST = 10
 """Proposals that are drawn."""
@@ -97,3 +114,9 @@ def _told(one: ProposalEntry) -> str:
     doubt = "" if gain.explanations is None else f"doubt falls by {gain.explanations:.2f} nats, "
     left = ", ".join(f"{name} {getattr(gain, name):.2f}" for name in MODULI)
     return f"{doubt}intervals shrink to {left}, in {one.cost_minutes:g} minutes"
+
+
+def bench_sheet(bench: Bench) -> Figure:
+    """The sheet of one way to hold the board: A4 upright, one panel a mode in the order of frequency."""
+    placing = bench.placing
+    return chladni_sheet(bench.sheet, Marks(placing.sensor, placing.hammer, placing.taps, "Modes to look for"))

@@ -1,14 +1,13 @@
-"""A board of many as a row of a table: what became of it, its constants, and what makers derive from them; SI units."""
+"""A board of many as a row of a table, and what became of all of them: batch.json; SI units."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bayesplate.plate.material import MODULI, RIGIDITIES
-from bayesplate.results.contract import Spread, as_json
-from bayesplate.results.joint import JOINT, Joint
+from bayesplate.results.contract import JOINT, Joint, Spread, as_json
 from bayesplate.results.summary import Summary
 
 FITTED = "fitted"
@@ -142,3 +141,118 @@ def _correlation(joint: Joint, a: str, b: str) -> float | None:
     i, j = JOINT.index(a), JOINT.index(b)
     spread = (joint.log_covariance[i][i] * joint.log_covariance[j][j]) ** 0.5
     return joint.log_covariance[i][j] / spread if spread > 0.0 else None
+
+
+_MOST_NAMED = 3
+
+
+def told_rows(rows: Sequence[BoardRow], place: Callable[[int], str]) -> Sequence[BoardRow]:
+    """Rows with their places in messages, and with a doubt where readings are alike.
+
+    Parameters
+    ----------
+    rows : sequence of BoardRow
+    place : callable
+        Where the board of a row stands, "tops.csv row 3"; empty where its own file says so.
+
+    Returns
+    -------
+    sequence of BoardRow
+        Each is made when it is asked for.
+    """
+    places: dict[int, str] = {}
+    alike: dict[str, list[int]] = {}
+    for at, row in enumerate(rows):
+        if not row.is_fitted:
+            places[at] = place(at)
+        elif row.readings_sha256:
+            alike.setdefault(row.readings_sha256, []).append(at)
+    doubts = dict(_copies(rows, [group for group in alike.values() if len(group) > 1]))
+    return _Told(rows, places, doubts)
+
+
+def _copies(rows: Sequence[BoardRow], groups: Sequence[Sequence[int]]) -> Iterator[tuple[int, str]]:
+    for group in groups:
+        names = [rows[at].name for at in group]
+        for i, at in enumerate(group):
+            others = [*names[:i], *names[i + 1 :]]
+            more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
+            which = f"{', '.join(others[:_MOST_NAMED])}{more}"
+            yield at, f"every reading is that of {which} to the last digit: one board twice, or a copy?"
+
+
+@dataclass(frozen=True)
+class _Told(Sequence[BoardRow]):
+    rows: Sequence[BoardRow]
+    places: Mapping[int, str]
+    doubts: Mapping[int, str]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, at: Any) -> Any:
+        row, place = self.rows[at], self.places.get(at, "")
+        if place:
+            row = replace(row, message=f"{place} -> {row.message}")
+        if at in self.doubts:
+            row = replace(row, doubt="; ".join(one for one in (self.doubts[at], row.doubt) if one))
+        return row
+
+
+FORMAT = 1
+_MOST_TOLD = 10
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A board that was not fitted: its name, what became of it, and the message of the error."""
+
+    name: str
+    outcome: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A board that was fitted and whose constants are not to be trusted, and why."""
+
+    name: str
+    doubt: str
+
+
+@dataclass(frozen=True)
+class BatchSummary:
+    """What became of the boards of a batch.
+
+    Attributes
+    ----------
+    format : int
+    seed : int
+        From which each board's own follows.
+    versions : dict of str
+    n_boards, n_fitted, n_failed : int
+    failed : tuple of Failure
+        In the order of their names.
+    doubts : tuple of Doubt
+        Of the boards that were fitted, in the order of their names.
+    aside : tuple of str
+        Files beside the cards that are cards of another kind.
+    """
+
+    format: int
+    seed: int
+    versions: Mapping[str, str]
+    n_boards: int
+    n_fitted: int
+    n_failed: int
+    failed: tuple[Failure, ...]
+    doubts: tuple[Doubt, ...]
+    aside: tuple[str, ...]
+
+    def failures_text(self, table: str) -> str:
+        """The boards that were not fitted, the first ten with their reasons, and where the others stand."""
+        lines = [f"{self.n_failed} of {self.n_boards} boards were not fitted, the others are written:"]
+        lines += [f"{one.name}: {one.outcome}: {one.message}" for one in self.failed[:_MOST_TOLD]]
+        if self.n_failed > _MOST_TOLD:
+            lines.append(f"and {self.n_failed - _MOST_TOLD} more, in {table}")
+        return "\n".join([*lines, "correct their cards or rows: --resume then fits these alone"])

@@ -9,14 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.grading.boards import BoardRow
+from bayesplate.grading.figures import FIGURES, box_probability, target_thickness, triangle
+from bayesplate.grading.matching import GradingRequest, grade, proposed_pairs
+from bayesplate.grading.tables import MOST_ON_TERMINAL, doubts_sentence, grading_tables, write_grading
 from bayesplate.plate.material import derived_quantities, moduli
-from bayesplate.results.board_rows import BoardRow
-from bayesplate.results.grading import GradingRequest, grade
-from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables, write_grading
-from bayesplate.results.joint import JOINT, Joint
-from bayesplate.results.log_figures import FIGURES, target_thickness, triangle
-from bayesplate.results.normal_box import box_probability
-from bayesplate.results.pairs import proposed_pairs
+from bayesplate.results.contract import JOINT, Joint
 
 INF = np.inf
 
@@ -129,8 +127,8 @@ def test_pairs_do_not_depend_on_how_many_are_looked_at_together(monkeypatch, val
     mean = np.array(joint.log_mean) + 0.1 * rng.standard_normal((60, 7))
     upper = np.broadcast_to(triangle(joint.log_covariance), (60, 28))
     whole = proposed_pairs(mean, upper, {"E_x": 10.0, "E_y": 10.0})
-    monkeypatch.setattr("bayesplate.results.pairs._AT_ONCE", 7)
-    monkeypatch.setattr("bayesplate.results.normal_box._AT_ONCE", 3)
+    monkeypatch.setattr("bayesplate.grading.matching._AT_ONCE", 7)
+    monkeypatch.setattr("bayesplate.grading.figures._AT_ONCE", 3)
 
     assert proposed_pairs(mean, upper, {"E_x": 10.0, "E_y": 10.0}) == whole
     assert len(whole) > 10
@@ -226,9 +224,9 @@ def test_a_board_in_doubt_is_marked_and_the_last_and_neither_paired_nor_counted(
 
     assert {p.first for p in graded.pairs} | {p.second for p in graded.pairs} <= {0, 2, 3}
     assert (graded.pairs[0].first, graded.pairs[0].second) == (0, 3)
-    assert [row[0] for row in tables["constants"].rows] == ["b3", "z-0", "b2", "a-1 ?"]
+    assert [row[0] for row in tables["constants"].texts] == ["b3", "z-0", "b2", "a-1 ?"]
     assert tables["constants"].title.endswith("; ? in doubt")
-    assert "a-1" not in {row[0].split()[0] for row in tables["limits"].rows}
+    assert "a-1" not in {row[0].split()[0] for row in tables["limits"].texts}
     assert tables["doubts"].rows == (("a-1", "20 Hz too high"),)
     assert doubts_sentence(graded).startswith("1 board is in doubt")
     with write_grading(tmp_path, graded).open() as stream:
