@@ -188,7 +188,7 @@ def _summary(
     names = tuple(plain(Path(one).name) for one in files)
     numbers = [number for number, mode in enumerate(picked.modes) if mode.is_likely]
     flips = None if polarity is None else polarity == "opposite"
-    remarks = list(heard.remarks)
+    remarks = [*heard.remarks, *picked.remarks]
     labels = None
     if prepared is not None:
         kept, turned = upright(prepared.board, pictures)
