@@ -320,7 +320,7 @@ def new(path: str | None, as_json: bool, quiet: bool, debug: bool, **answers: An
     "--channels",
     default="force,response",
     show_default=True,
-    help="Of a file with two channels; also response,force, or response,response for stereo.",
+    help="Of a file with two channels; also response,force, response,response for stereo, or the number of one.",
 )
 @click.option(
     "--motion",

@@ -96,7 +96,9 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
         reasons = {"noise": mode.expected / (1.0 + mode.expected)}
         reasons[UNLIKE] = _unlike(answered[m].alike, len(spectra.between), spare)
         reasons |= (lines := _of_lines(mode, spectra.duration, reasons[UNLIKE]))
-        faint, split, part_of = _odds(m, modes, answered, usual, broad, spacing, has_force=spectra.force is not None)
+        faint, split, part_of = _odds(
+            m, modes, answered, usual, broad, spacing, spectra.duration, has_force=spectra.force is not None
+        )
         unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
         reasons["something broad"] = 1.0 - 1.0 / (1.0 + broad[m])
         reasons["faint"] = 1.0 - 1.0 / (1.0 + faint * unstable)
@@ -184,6 +186,7 @@ def _odds(
     usual: Floats,
     broad: Floats,
     spacing: float,
+    duration: float,
     *,
     has_force: bool,
 ) -> tuple[float, float, int]:
@@ -197,7 +200,8 @@ def _odds(
     for k, other in enumerate(modes):
         width = mode.decay + other.decay
         apart = abs(mode.frequency - other.frequency)
-        if k == m or apart > REACH * width or answered[k].strength <= answer.strength:
+        is_weaker = answered[k].strength <= answer.strength
+        if k == m or apart > REACH * width or is_weaker or other.decay * duration < STEADY:
             continue
         share = answer.strength / answered[k].strength
         odds = _log_normal(share, SPLIT, SPLIT_FACTOR) / of_mode * spacing / (2.0 * REACH * width)

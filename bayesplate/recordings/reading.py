@@ -1,4 +1,4 @@
-"""Files to recordings: WAV and CSV by themselves, FLAC and UFF with the extra; every fault of every file at once."""
+"""Files to recordings: WAV, FLAC and CSV, and UFF with the extra; every fault of every file at once."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.checks import signal_faults
-from bayesplate.recordings.extras import read_flac, read_uff
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
+from bayesplate.recordings.sound import read_sound
 from bayesplate.recordings.tables import read_csv
-from bayesplate.recordings.wav import read_wav
+from bayesplate.recordings.uff import read_uff
 
 LARGEST_FILE = 400_000_000
 """Bytes; half an hour of two channels of 24 bits at 48 kHz."""
@@ -26,13 +26,15 @@ Read = Recording | FrequencyResponse
 Reader = Callable[[Path, str, float | None, str, Motion], list[Read]]
 
 READERS: dict[str, Reader] = {
-    ".wav": read_wav,
+    ".wav": read_sound,
     ".csv": read_csv,
-    ".flac": read_flac,
+    ".flac": read_sound,
     ".uff": read_uff,
     ".unv": read_uff,
+    ".ufb": read_uff,
 }
 """By the ending of the file."""
+COMPRESSED = (".m4a", ".mp3", ".aac", ".ogg", ".opus", ".wma", ".amr", ".3gp", ".mp4", ".mov")
 
 
 def read_recordings(
@@ -51,7 +53,7 @@ def read_recordings(
     rate : float, optional, Hz
         For files that do not say it.
     channels : str
-        What the two channels of a sound file are: one of `CHANNELS`.
+        What the two channels of a sound file are, one of `CHANNELS`, or the number of the one that is used.
     motion : str
         What a response is whose file does not say it: one of `bayesplate.recordings.signals.MOTIONS`.
     was_played : bool
@@ -113,6 +115,10 @@ def _require_file(path: Path, shown: str) -> None:
     """A regular file of a known kind and a size that fits into memory; looked at from outside only."""
     if os.path.isdir(path):
         raise InputError(Fault(shown, "a recording", "a folder", f"give the files in it: {shown}/*.wav"))
+    if path.suffix.lower() in COMPRESSED:
+        wanted, got = f"a recording: {', '.join(READERS)}", f'compressed sound, "{_plain(path.suffix)}"'
+        remedy = "record as WAV; what there is another program can save as WAV, but compression costs soft modes"
+        raise InputError(Fault(shown, wanted, got, remedy))
     if path.suffix.lower() not in READERS:
         got = f'"{_plain(path.suffix)}"' if path.suffix else "no ending"
         raise InputError(Fault(shown, f"a recording: {', '.join(READERS)}", got, "save it as WAV or CSV"))

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.forces import force_fault
+from bayesplate.recordings.channels import force_fault, is_cut_to_silence, is_pulse
+from bayesplate.recordings.checks import phase_fault
 from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, rising_again, usable
 from bayesplate.recordings.padding import common_padding
 from bayesplate.recordings.reading import Read
@@ -60,21 +61,26 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
         With every file that has no hit that can be used, or that does not go with the others.
     """
     every = [one for file in files for one in file]
+    remarks = [told for one in every for told in one.remarks]
     responses = [one for one in every if isinstance(one, FrequencyResponse)]
     if responses:
         faults = _response_faults(every, responses)
         if faults:
             raise InputError(faults)
         padding = common_padding(responses)
-        told = (
-            f"{responses[0].name}: of every {padding} lines one was measured and is used, the others are interpolated"
-        )
-        return Heard(response_spectra(responses, highest, padding), (), (told,) if padding > 1 else ())
+        if padding > 1:
+            told = f"of every {padding} lines one was measured and is used, the others are interpolated"
+            remarks.append(f"{responses[0].name}: {told}")
+        return Heard(response_spectra(responses, highest, padding), (), tuple(remarks))
     recordings = [one for one in every if isinstance(one, Recording)]
     faults = _recording_faults(recordings, highest)
     heard: list[tuple[Recording, list[Hit]]] = []
-    remarks: list[str] = []
-    for one in recordings:
+    silent = [one for one in recordings if one.force is None and is_pulse(one.response, one.rate)]
+    are_all = len(silent) == len(recordings)
+    wanted, got = "a response, which rings", "it is silent after its pulse: is it the force?"
+    faults += [Fault(one.name, wanted, got, "--channels, or the name of its column") for one in silent if are_all]
+    remarks += [f"{one.name} left out: {got}" for one in silent if not are_all]
+    for one in (one for one in recordings if one not in silent):
         if (no_force := force_fault(one)) is not None:
             faults.append(no_force)
             continue
@@ -90,6 +96,13 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
             remarks += [
                 f"{one.name}: hit {number} at {hit.onset / one.rate:.2f} s left out, {hit.fault}" for number, hit in bad
             ]
+            gated = [hit for hit in good if hit.is_gated]
+            if gated:
+                after = min(hit.stop - hit.onset for hit in gated) / one.rate
+                remarks.append(
+                    f"{one.name}: the sound breaks off {after:.2g} s after a hit: a noise gate, or noise suppression? "
+                    "(switch it off)"
+                )
             heard.append((one, good))
     if faults:
         raise InputError(faults)
@@ -110,19 +123,22 @@ def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> 
     if faults:
         raise InputError(faults)
     hits = tuple((one, (hit,)) for one, hit in impulses)
-    return Heard(decay_spectra(hits, highest), hits, ())
+    return Heard(decay_spectra(hits, highest), hits, tuple(told for one, _ in impulses for told in one.remarks))
 
 
 def _hit_fault(one: Recording, number: int, hit: Hit) -> Fault:
     place = f"{one.name} hit {number} at {hit.onset / one.rate:.2f} s"
-    return Fault(place, "one hit, and time to ring down", hit.fault, "hit again, and wait until it is silent")
+    remedy = "hit again, and wait until it is silent"
+    if is_cut_to_silence(one.response, one.rate):
+        remedy = "digital silence between: switch off the noise gate, or noise suppression, and hit again"
+    return Fault(place, "one hit, and time to ring down", hit.fault, remedy)
 
 
 def _response_faults(every: Sequence[Read], responses: Sequence[FrequencyResponse]) -> list[Fault]:
     if len(responses) < len(every):
         return [Fault("FILES", "recordings or frequency responses", "both", "pick them apart")]
     first = responses[0]
-    faults = []
+    faults = [fault for one in responses if (fault := phase_fault(one)) is not None]
     for one in responses[1:]:
         if one.frequency.shape != first.frequency.shape or not np.allclose(one.frequency, first.frequency, rtol=1e-6):
             faults.append(Fault(f"{one.name} frequencies", f"those of {first.name}", "others", "pick them apart"))
