@@ -110,7 +110,7 @@ def modes_across(spectra: Spectra, shown: Sequence[Shown]) -> Across:
     own = spectra.only(np.concatenate([shown[k].records for k in kept]))
     modes = _averaged(own, groups, [shown[k].records.size for k in kept])
     remarks = [f"{names[k]} left out: {told[k]} (is it of the same board?)" for k in strange]
-    remarks.append(_differences([names[k] for k in kept], groups))
+    remarks.append(_differences([names[k] for k in kept], groups, spectra.files.size))
     return Across(modes, [min(one.spurious for one in group.values()) for group in groups], own, tuple(remarks))
 
 
@@ -232,7 +232,7 @@ def _mean(parts: Sequence[Floats], common: Floats) -> Floats:
     return np.stack([*sums, 1.0 / total])
 
 
-def _differences(names: Sequence[str], groups: Sequence[dict[int, Seen]]) -> str:
+def _differences(names: Sequence[str], groups: Sequence[dict[int, Seen]], n_records: int) -> str:
     """What is told of recordings that differ."""
     told = []
     for k, name in enumerate(names):
@@ -246,5 +246,8 @@ def _differences(names: Sequence[str], groups: Sequence[dict[int, Seen]]) -> str
     others = "the other" if len(names) == 2 else "the others"
     most = [words for _, words in sorted(told, reverse=True)[: 1 if len(names) == 2 else _MOST_NAMED]]
     how = f"in frequency ({', '.join(most)} than {others})" if most else "in damping"
-    what = "hits" if any(" hit " in name for name in names) else "recordings"
-    return f"the {what} differ {how}: each was searched by itself, and the errors hold by what a mode scatters"
+    are_hits = any(" hit " in name for name in names)
+    what, which = ("hits" if are_hits else "recordings"), "each"
+    if are_hits and len(names) < n_records:
+        which = f"each of the {len(names)} clearest"
+    return f"the {what} differ {how}: {which} was searched by itself, and the errors hold by what a mode scatters"

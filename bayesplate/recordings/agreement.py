@@ -17,7 +17,7 @@ from bayesplate.recordings.spectra import Rows, Spectra
 
 Floats = NDArray[np.float64]
 
-_MOST_PEAKS, _FEWEST = 12, 2
+_MOST_PEAKS, _FEWEST, _MOST_RECORDS = 12, 2, 8
 _PROMINENCE = 12.0
 """dB by which a peak stands out of the mean of all records."""
 _REACH, _LEAST_LINES, _WIDEST = 6.0, 7, 0.03
@@ -29,7 +29,7 @@ _ALIKE = 0.035
 
 
 def agreeing(spectra: Spectra, lowest: float, highest: float) -> list[Rows]:
-    """Sets of records that show the same modes: all records, those of each file, or each record by itself.
+    """Sets of records that show the same modes: all records, those of each file, or the clearest, each by itself.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def agreeing(spectra: Spectra, lowest: float, highest: float) -> list[Rows]:
     squares = np.array([_squares(*one) for one in _poles(spectra, lowest, highest)]).reshape(-1, 2)
     within, among = (_middle(column) for column in squares.T)
     if within > _ALIKE**2:
-        return [every[[r]] for r in every]
+        return [np.array([r]) for r in _clearest(spectra)]
     if (spectra.files == spectra.files[0]).all():
         return [every]
     n_common = np.isfinite(squares[:, 1]).sum()
@@ -53,6 +53,15 @@ def agreeing(spectra: Spectra, lowest: float, highest: float) -> list[Rows]:
     if among <= _ALIKE**2 and not have_few_in_common:
         return [every]
     return [every[spectra.files == file] for file in np.unique(spectra.files)]
+
+
+def _clearest(spectra: Spectra) -> Rows:
+    """The records of each file that stand highest above their noise, as many as can be searched one by one."""
+    clear = np.sum(np.abs(spectra.values / spectra.noise) ** 2, axis=0)
+    files = np.unique(spectra.files)
+    most = max(_MOST_RECORDS // files.size, _FEWEST)
+    own = [np.flatnonzero(spectra.files == file) for file in files]
+    return np.concatenate([np.sort(one[np.argsort(-clear[one], kind="stable")[:most]]) for one in own])
 
 
 def _middle(squares: Floats) -> float:

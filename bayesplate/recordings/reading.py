@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -80,6 +81,7 @@ def read_recordings(
         except InputError as error:
             faults += error.faults
             continue
+        read = _set_aside(read)
         faults += [fault for one in read for fault in signal_faults(one, was_played=was_played)]
         found.append(read)
     faults += _given_twice([one for own in found for one in own])
@@ -88,15 +90,33 @@ def read_recordings(
     return found
 
 
+def _set_aside(read: list[Read]) -> list[Read]:
+    """Of a file with several recordings those that are neither silent nor a copy, the first with the remarks."""
+    kept, told, seen = list[Read](), list[str](), dict[bytes, str]()
+    for one in read:
+        signal = one.response if isinstance(one, Recording) else one.values
+        if len(read) > 1 and (signal == signal[:1]).all():
+            told.append(f"{one.name} is silent and left out")
+        elif (first := seen.setdefault(_content(one), one.name)) is not one.name:
+            told.append(f"{one.name} holds the same as {first} and is left out")
+        else:
+            kept.append(one)
+    return [replace(kept[0], remarks=(*kept[0].remarks, *told)), *kept[1:]] if kept else read[:1]
+
+
+def _content(one: Read) -> bytes:
+    """What tells a recording from others."""
+    content = sha256()
+    for part in (one.response, one.force) if isinstance(one, Recording) else (one.values, one.frequency):
+        content.update(b"" if part is None else np.ascontiguousarray(part).tobytes())
+    return content.digest()
+
+
 def _given_twice(read: Sequence[Read]) -> list[Fault]:
     """Recordings of the same content: a copy tells nothing new, and would count as a repeat without any scatter."""
     named: dict[bytes, list[str]] = {}
     for one in read:
-        both = (one.response, one.force) if isinstance(one, Recording) else (one.values, one.frequency)
-        content = sha256()
-        for part in both:
-            content.update(b"" if part is None else np.ascontiguousarray(part).tobytes())
-        named.setdefault(content.digest(), []).append(one.name)
+        named.setdefault(_content(one), []).append(one.name)
     wanted, got, remedy = "each recording once", "the same samples again", "a copy is no new evidence: leave it out"
     return [Fault(" and ".join(names), wanted, got, remedy) for names in named.values() if len(names) > 1]
 

@@ -18,6 +18,8 @@ from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
 Floats = NDArray[np.float64]
 
 _RATE_OFF = 1e-6
+_CROSSTALK = 1e-3
+"""Of the other channel: what comes through into one to which nothing is connected."""
 _BITS = {"PCM_S8": 8, "PCM_U8": 8, "PCM_16": 16, "PCM_24": 24, "PCM_32": 32}
 """Of the samples of a file, by the library's name of their kind; others are numbers without a largest."""
 
@@ -85,8 +87,10 @@ def _of_channels(columns: Floats, whole: Recording, channels: str) -> Iterator[R
     if count > 2:
         wanted, remedy = "one channel, or two: force and response", "--channels 1, say, takes the first alone"
         raise InputError(Fault(f"{shown} channels", wanted, str(count), remedy))
-    silent = [k for k in range(count) if columns.shape[0] and np.ptp(columns[:, k]) <= SILENT]
-    if count == 2 and len(silent) == 1 and rings(columns[:, 1 - silent[0]], whole.rate):
+    spans = np.ptp(columns, axis=0) if len(columns) else np.zeros(count)
+    quiet = max(SILENT, _CROSSTALK * spans.max()) if np.isfinite(whole.full_scale) else SILENT
+    silent = np.flatnonzero(spans <= quiet)
+    if count == 2 and silent.size == 1 and rings(columns[:, 1 - silent[0]], whole.rate):
         told = f"{shown}: channel {silent[0] + 1} is silent and left out"
         columns, whole = columns[:, [1 - silent[0]]], replace(whole, remarks=(*whole.remarks, told))
     elif count == 2 and is_copy(*columns.T):

@@ -294,3 +294,35 @@ def test_a_linear_sweep_is_no_exponential_one():
 
     with pytest.raises(InputError, match="got no impulse when it is turned back"):
         impulse_response(swept(linear), SWEPT)
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_channel_of_noise_beside_a_response_is_left_out(tmp_path, is_first):
+    """An input to which nothing is connected."""
+    noise = 2e-3 * np.random.default_rng(4).standard_normal(HEARD.size) * np.abs(HEARD).max()
+    columns = np.stack([noise, HEARD] if is_first else [HEARD, noise], axis=1)
+    wavfile.write(tmp_path / "a b.wav", RATE, np.round(2.0**14 * columns / np.abs(HEARD).max()).astype(np.int16))
+
+    taken = take([read(tmp_path / "a b.wav", channels="response,response")], 400.0)
+
+    assert len(taken.spectra.names) == 1
+    channel = 1 if is_first else 2
+    assert taken.remarks == (f"a b.wav channel {channel} left out: no hit stands out of its noise (is it connected?)",)
+
+
+def test_crosstalk_into_a_channel_to_which_nothing_is_connected_is_silence(tmp_path):
+    columns = np.stack([HEARD, 4e-4 * HEARD[::-1]], axis=1) / np.abs(HEARD).max()
+    wavfile.write(tmp_path / "a.wav", RATE, np.round(2.0**30 * columns).astype(np.int32))
+    (one,) = read(tmp_path / "a.wav")
+
+    assert one.remarks == ("a.wav: channel 2 is silent and left out",)
+
+
+def test_of_the_sets_of_a_file_silent_ones_and_copies_are_left_out(tmp_path):
+    sets = [{"kind": 4, "x": HERTZ, "y": y} for y in (accelerance(), 0.0 * accelerance(), accelerance())]
+    (one,) = read(tmp_path / "a.uff", uff(sets))
+
+    assert one.name == "a.uff set 1"
+    assert one.remarks == (
+        "a.uff set 2 is silent and left out", "a.uff set 3 holds the same as a.uff set 1 and is left out",
+    )  # fmt: skip
