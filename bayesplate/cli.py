@@ -264,7 +264,7 @@ def new(path: str | None, **options: Any) -> Answer:
     "--channels",
     default="force,response",
     show_default=True,
-    help="Of a file with two channels; also response,force, or response,response for stereo.",
+    help="Of a file with two channels; also response,force, response,response for stereo, or the number of one.",
 )
 @click.option(
     "--motion",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.errors import Fault
+from bayesplate.recordings.channels import SILENT
 from bayesplate.recordings.hits import LEAST_DURATION
 from bayesplate.recordings.signals import FrequencyResponse, Recording
 
@@ -21,8 +22,11 @@ _N_STEPS = 100
 """Largest values among which the step is looked for, and steps below which a recording is too quiet."""
 _TOO_QUIET = 10.0 ** (-50.0 / 20.0)
 """Of full scale; a converter of 16 bits has the steps above left there, one of 24 bits many more."""
-_SILENT = 1e-5
-"""Of full scale: less than the last bit of 16."""
+_AROUND, _RISE, _NOISE = 3, 1.5, 0.1
+"""Samples about the blow that are left out; power in the last quarter of a response over that in the third, and over
+that in the first, from which on it does not follow its force."""
+_FINEST, _COARSEST = 0.02, 2.0
+"""Hz between lines that show it."""
 _FASTEST, _SLOWEST = 1e6, 200.0
 _LARGEST, _SMALLEST = 1e100, 1e-100
 """Of numbers without a unit: what lies between them can be squared and divided."""
@@ -49,6 +53,23 @@ def signal_faults(one: Recording | FrequencyResponse, *, was_played: bool = Fals
         yield from _channel_faults(one, signal, name, was_played=was_played)
 
 
+def phase_fault(one: FrequencyResponse) -> Fault | None:
+    """What is wrong with a response that does not follow its force: over time it rises towards the blow.
+
+    Magnitudes, decibels or degrees in the place of a real or imaginary part lie as much before the blow as after it,
+    and a conjugated response wholly before.
+    """
+    got, remedy = "one that answers before it is hit", "export re and im: no magnitudes, no decibels, no degrees"
+    fault = Fault(one.name, "a response with its phase", got, remedy)
+    if not one.values.imag.any():
+        return fault
+    if not _FINEST <= one.frequency[1] - one.frequency[0] <= _COARSEST:
+        return None
+    over_time = np.abs(np.fft.ifft(one.values * np.hanning(one.values.size))) ** 2
+    first, _, third, last = (part.sum() for part in np.array_split(over_time[_AROUND:-_AROUND], 4))
+    return fault if last > max(_RISE * third, _NOISE * first) else None
+
+
 def _channel_faults(one: Recording, signal: Floats, name: str, *, was_played: bool) -> Iterator[Fault]:
     if signal.size == 0:
         yield Fault(name, "samples", "none", "record it again")
@@ -62,7 +83,7 @@ def _channel_faults(one: Recording, signal: Floats, name: str, *, was_played: bo
     if signal.size < LEAST_DURATION * one.rate:
         yield Fault(name, f"{LEAST_DURATION:g} s or more", f"{signal.size / one.rate:.2g} s", "let the board ring out")
     spread = float(np.ptp(signal))
-    if spread <= (_SILENT * one.full_scale if np.isfinite(one.full_scale) else _SMALLEST):
+    if spread <= (SILENT * one.full_scale if np.isfinite(one.full_scale) else _SMALLEST):
         yield Fault(name, "a sound", "silence", "is the right channel connected?")
     elif not was_played:
         yield from _level_faults(one, signal, name)

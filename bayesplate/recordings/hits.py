@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.recordings.onsets import onsets, soft_onsets
+from bayesplate.recordings.onsets import heard_as, onsets, soft_onsets
 from bayesplate.recordings.signals import Recording
 
 if TYPE_CHECKING:
@@ -26,6 +26,9 @@ BOUNCE = 0.1
 """s after a hit within which another one is a bounce of the hammer."""
 _AFTER_SOUND = 0.004
 """s after a tap sets in, when finger or knuckle have left the board."""
+_GATE_BLOCK, _GATE_BLOCKS, _GATE_FALL, _GATE_SLOW = 0.01, 10, 3.0, 1.0
+"""s of a block; blocks within which a noise gate shuts; powers of ten by which it falls then for good, and by which it
+fell at most in as many blocks before."""
 _SETTLED = 0.03
 """s after a hit and before the next one in which a rise of the sound is that hit."""
 _OF_PULSE, _OF_BOUNCE = 0.05, 0.1
@@ -47,12 +50,15 @@ class Hit:
         Where the next hit, or the end, cuts it off.
     fault : str
         Why it cannot be used; empty if it can.
+    is_gated : bool
+        Whether a noise gate cuts it off, before the next hit.
     """
 
     onset: int
     start: int
     stop: int
     fault: str = ""
+    is_gated: bool = False
 
 
 def find_hits(recording: Recording) -> list[Hit]:
@@ -68,33 +74,65 @@ def find_hits(recording: Recording) -> list[Hit]:
     after_bounce = False
     for i, ((begin, end), stop) in enumerate(zip(pulses, ends, strict=True)):
         start = end + lag
+        gated = _gated(recording.response[start:stop], recording.rate)
+        is_gated, stop = gated is not None, stop if gated is None else start + gated
         is_last = i == len(pulses) - 1
         is_bounced = not is_last and stop - begin < BOUNCE * recording.rate
         fault = "" if not (is_bounced or after_bounce) else "a double hit: the hammer bounced"
         if not fault:
-            fault = _fault(recording, start, stop, is_last=is_last)
-        hits.append(Hit(begin, start, stop, fault))
+            fault = _fault(recording, begin, start, stop, "a noise gate" if is_gated else "the end" * is_last)
+        hits.append(Hit(begin, start, stop, fault, is_gated))
         after_bounce = is_bounced
     return hits
 
 
-def _fault(recording: Recording, start: int, stop: int, *, is_last: bool) -> str:
-    """Why what follows a hit cannot be used."""
+def _fault(recording: Recording, onset: int, start: int, stop: int, end: str) -> str:
+    """Why what follows a hit cannot be used; `end` is what cuts it off, empty where that is the next hit."""
     length = (stop - start) / recording.rate
-    heard = recording.response[start:stop]
     if length < LEAST_DURATION:
-        return f"only {max(length, 0.0):.2g} s until " + ("the end" if is_last else "the next hit")
-    if not is_last and _fall(heard) < LEAST_FALL:
+        return f"only {max(length, 0.0):.2g} s until {end or 'the next hit'}"
+    if not end and _fall(recording.response, recording.rate, onset, start, stop) < LEAST_FALL:
         return f"the next hit came before it had fallen by {LEAST_FALL:g} dB"
     return ""
 
 
-def _fall(heard: Floats) -> float:
-    """By how many dB a sound falls from its first tenth to its last."""
-    tenth = max(heard.size // 10, 1)
-    centred = heard - heard.mean()
-    first, last = (float(np.mean(part**2)) for part in (centred[:tenth], centred[-tenth:]))
-    return 10.0 * float(np.log10(max(first, 1e-300) / max(last, 1e-300)))
+def _fall(response: Floats, rate: float, onset: int, start: int, stop: int) -> float:
+    """By how many dB a sound falls from its first tenth to its last, at the frequencies that the hit has raised.
+
+    Hum, a steady tone and rumble were there before the hit, and do not fall.
+    """
+    slow, slow_rate = heard_as(response, rate)[-1]
+    onset, start, stop = (round(at * slow_rate / rate) for at in (onset, start, stop))
+    tenth = max((stop - start) // 10, 1)
+    parts = (slice(max(onset - tenth, 0), onset), slice(start, start + tenth), slice(stop - tenth, stop))
+    before, first, last = (_powers(slow[part], tenth) for part in parts)
+    raised = first > 10.0 ** (LEAST_FALL / 10.0) * before
+    return 10.0 * float(np.log10(max(first[raised].sum(), 1e-300) / max(last[raised].sum(), 1e-300)))
+
+
+def _powers(part: Floats, n: int) -> Floats:
+    """Power of each line of a part, as if it had n samples: (n // 2 + 1,) array."""
+    if not part.size:
+        return np.zeros(n // 2 + 1)
+    change = np.diff(part, prepend=part[0])  # rumble hardly changes
+    return np.asarray(np.abs(np.fft.rfft(np.hanning(part.size) * change, n)) ** 2)
+
+
+def _gated(heard: Floats, rate: float) -> int | None:
+    """Where a noise gate cuts a decay off: it falls suddenly, far and for good; None where none does."""
+    block = max(round(_GATE_BLOCK * rate), 1)
+    n = heard.size // block
+    steps = np.abs(np.diff(heard))
+    if n < 3 * _GATE_BLOCKS or not steps.any():
+        return None
+    least = max(float(steps[steps > 0.0].min()) ** 2, 1e-300)  # what is rounded to nothing is not cut off
+    level = np.log10(np.mean((heard[: n * block] - np.median(heard)).reshape(n, block) ** 2, axis=1) + least)
+    later = np.maximum.accumulate(level[::-1])[::-1]  # the loudest from there on
+    at = np.arange(_GATE_BLOCKS, n - 2 * _GATE_BLOCKS)
+    falls = level[at] - later[at + _GATE_BLOCKS] > _GATE_FALL
+    is_sudden = np.max([level[at - k] for k in range(1, _GATE_BLOCKS + 1)], axis=0) - level[at] < _GATE_SLOW
+    found = at[falls & is_sudden]
+    return int(found[0] * block) if found.size else None
 
 
 def _pulses(force: Floats, rate: float) -> list[tuple[int, int]]:

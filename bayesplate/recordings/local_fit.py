@@ -29,8 +29,10 @@ _MOST_STEPS, _FEW_STEPS = 30, 4
 _SHRUNK, _GROWN, _FIRST_DAMPING = 0.2, 6.0, 1e-3
 _SETTLED = 1e-7
 """Of the sum of squares, relative."""
-_LEAST_DECAY = 0.02
-"""Decay rate over the spacing of the lines, below which a line is steady."""
+_LEAST_DECAY = 1e-4
+"""Decay rate over the spacing of the lines, at least: a steady line must not need another beside it."""
+STEADY = 0.11
+"""Decay rate times duration below which a line has not fallen by half: it may be steady."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,6 +35,8 @@ _CHANCE = 0.3
 """Modes that noise alone may give in a window before the search of it ends."""
 _CELLS_A_LINE = 3.0
 """Different modes that can be tried for one line of a spectrum."""
+_PRIOR_GROUPS = 8.0
+"""Hits or places without scatter of their own that stand beside those that were taken, so that few tell little."""
 _BROADEST = 0.06
 """Damping ratio beyond which what was fitted is no mode of a board but the ground on which others stand."""
 
@@ -47,12 +49,12 @@ class Mode:
     ----------
     frequency, decay : float, Hz
         The decay rate is half the width of the peak at half its power: damping ratio times frequency.
-    covariance : (2, 2) array, Hz^2
-        Of both, by what each record leaves after the fit.
-    steps : (n_records, 2) array, Hz
-        By how much each record would move both, and
-    variances : (n_records, 2) array, Hz^2
-        how much it should by its noise.
+    noise : (2,) array, Hz
+        Standard deviations of both, by what each record leaves after the fit.
+    scatter : (2,) array, Hz
+        By how much more both are uncertain for what hits, places and files scatter beyond it.
+    window : (2,) array, Hz
+        Standard deviations of both for the choice of lines.
     residues : (n_records,) complex array
         In units of the spectra.
     residue_sd : (n_records,) array
@@ -60,23 +62,25 @@ class Mode:
         Twice the ln of how much likelier the spectra are with this mode.
     expected : float
         Of how many modes noise alone would give so much, in all the band.
-    shift : (2,) array, Hz
-        By which both differ in a narrower window, where that is more than the fewer lines let expect.
     seen : float
         Share of the widths of windows in which it was found.
     """
 
     frequency: float
     decay: float
-    covariance: Floats
-    steps: Floats
-    variances: Floats
+    noise: Floats
+    scatter: Floats
+    window: Floats
     residues: Complex
     residue_sd: Floats
     gain: float
     expected: float
-    shift: Floats
     seen: float
+
+    @property
+    def pole(self) -> Floats:
+        """Frequency and decay rate: (2,) array, Hz."""
+        return np.array([self.frequency, self.decay])
 
     @property
     def damping(self) -> float:
@@ -155,12 +159,11 @@ def fit_modes(spectra: Spectra, start: Floats, by_width: list[Floats], lowest: f
     list of Mode
         In the order of frequency.
     """
-    noise = spectra.noise
-    values = spectra.values / noise
+    values = spectra.values / spectra.noise
     modes: list[Mode] = []
     n_lines = int(np.sum((spectra.frequency >= lowest) & (spectra.frequency < highest)))
     for window, low, high in _windows(spectra, values, lowest, highest, WIDTHS[0]):
-        modes += _modes_of(window, low, high, start, noise, n_lines, by_width)
+        modes += _modes_of(spectra, window, low, high, start, n_lines, by_width)
     return sorted(modes, key=lambda mode: mode.frequency)
 
 
@@ -201,7 +204,7 @@ def _has(poles: Floats, one: Floats, spacing: float) -> bool:
 
 
 def _modes_of(
-    window: Window, low: float, high: float, start: Floats, noise: Floats, n_lines: int, by_width: list[Floats]
+    spectra: Spectra, window: Window, low: float, high: float, start: Floats, n_lines: int, by_width: list[Floats]
 ) -> Iterator[Mode]:
     """Modes of one window between two frequencies, fitted to all records at once."""
     ends = window.frequency[0], window.frequency[-1]
@@ -217,7 +220,7 @@ def _modes_of(
     fit = refined(replace(window, unlike=few.window.unlike), few.poles, _LAST_STEPS)
     scores, information = fit.information()
     inverse = np.linalg.pinv(information.sum(axis=0), hermitian=True)
-    steps = scores @ inverse
+    steps, level = scores @ inverse, spectra.noise
     widening = _correlation(fit)
     narrow = _narrower(fit, low, high)
     n = len(fit.poles)
@@ -225,22 +228,43 @@ def _modes_of(
         if not low <= frequency < high or decay > _BROADEST * frequency:
             continue
         at = np.array([m, n + m])
-        each = np.einsum("ij,rjk,ki->ri", inverse[at], information, inverse[:, at])
-        spacing = window.spacing
-        counted = [_has(poles, fit.poles[m], spacing) for poles in by_width]
+        each = widening * np.einsum("ij,rjk,ki->ri", inverse[at], information, inverse[:, at])
+        variance = widening * np.diagonal(inverse)[at]
+        counted = [_has(poles, fit.poles[m], window.spacing) for poles in by_width]
         yield Mode(
             frequency=float(frequency),
             decay=float(decay),
-            covariance=widening * inverse[np.ix_(at, at)],
-            steps=steps[:, at],
-            variances=widening * each,
-            residues=fit.residues[m] * noise,
-            residue_sd=_residue_sd(fit, m) * noise,
+            noise=np.sqrt(variance),
+            scatter=np.sqrt(variance * (_excess(spectra.places, steps[:, at], each) - 1.0)),
+            residues=fit.residues[m] * level,
+            residue_sd=_residue_sd(fit, m) * level,
             gain=gains[m],
             expected=_expected(gains[m], few.rest.shape[1], n_lines),
-            shift=_shift(narrow, fit.poles[m], np.diagonal(inverse)[at]),
+            # two choices of lines are two estimates, each with an error of its own: twice its variance apart
+            window=_shift(narrow, fit.poles[m], np.diagonal(inverse)[at]) / np.sqrt(2.0),
             seen=float(np.mean(counted)),
         )
+
+
+def _excess(places: NDArray[np.intp], steps: Floats, variances: Floats) -> Floats:
+    """By how much the steps of hits, or of places, exceed their variances, 1 or more: the larger of the two ratios.
+
+    The steps are those by which each record would move frequency and decay rate.
+    """
+    of_place = np.eye(int(places.max()) + 1)[places]
+    by_hit, by_place = _ratio(steps, variances), _ratio(of_place.T @ steps, of_place.T @ variances)
+    return np.maximum(np.maximum(by_hit, by_place), 1.0)
+
+
+def _ratio(steps: Floats, variances: Floats) -> Floats:
+    """Sum of squares over the expected one, as if `_PRIOR_GROUPS` more had scattered as expected.
+
+    The steps of all records add up to nothing, so that one degree of freedom is lost.
+    """
+    if len(steps) < 2:
+        return np.ones(2)
+    squares = np.sum(steps**2 / np.maximum(variances, 1e-300), axis=0)
+    return np.asarray((squares + _PRIOR_GROUPS) / (len(steps) - 1.0 + _PRIOR_GROUPS))
 
 
 def _pruned(fit: Fitted, least: float) -> tuple[Fitted, list[float]]:

@@ -16,6 +16,8 @@ _ABOVE_FLOOR = 20.0
 _BELOW_LOUDEST = 26.0
 """dB below the loudest hit at which nothing is a hit any more."""
 _LOOK_BACK = 5
+_ORDER = 16
+"""Samples from which the next one is predicted."""
 _BOARD_RATE = 4000.0
 """Samples a second that hold what a board rings at: hiss above it is louder than a soft tap."""
 _LONG_BLOCK, _SOFT_RISE = 0.01, 6.0
@@ -24,18 +26,19 @@ _LONG_BLOCK, _SOFT_RISE = 0.01, 6.0
 
 def onsets(response: Floats, rate: float) -> list[int]:
     """First samples of every hit that is heard, by its click in all that was recorded or by how the board rings."""
-    found = np.concatenate([_rises(*heard, _BLOCK, _RISE, _ABOVE_FLOOR) for heard in _heard_as(response, rate)])
+    changes = [(_unforeseen(heard), own_rate) for heard, own_rate in heard_as(response, rate)]
+    found = np.concatenate([_rises(*change, _BLOCK, _RISE, _ABOVE_FLOOR) for change in changes])
     return _first_of_each(np.sort(np.rint(found * rate).astype(np.intp)), rate)
 
 
 def soft_onsets(response: Floats, rate: float) -> list[int]:
     """Samples at which the ringing of a board rises again, hits or not."""
-    slow, slow_rate = _heard_as(response, rate)[-1]
-    found = _rises(slow, slow_rate, _LONG_BLOCK, _SOFT_RISE, _SOFT_RISE)
+    slow, slow_rate = heard_as(response, rate)[-1]
+    found = _rises(_curved(slow), slow_rate, _LONG_BLOCK, _SOFT_RISE, _SOFT_RISE)
     return _first_of_each(np.rint(found * rate).astype(np.intp), rate)
 
 
-def _heard_as(response: Floats, rate: float) -> list[tuple[Floats, float]]:
+def heard_as(response: Floats, rate: float) -> list[tuple[Floats, float]]:
     """The sound as it was recorded, and where there are more samples than a board needs the means of neighbours."""
     every = int(rate / _BOARD_RATE)
     if every < 2:
@@ -44,15 +47,13 @@ def _heard_as(response: Floats, rate: float) -> list[tuple[Floats, float]]:
     return [(response, rate), (response[: n * every].reshape(n, every).mean(axis=1), rate / every)]
 
 
-def _rises(response: Floats, rate: float, seconds: float, rise: float, above_floor: float) -> Floats:
+def _rises(change: Floats, rate: float, seconds: float, rise: float, above_floor: float) -> Floats:
     """Times of the blocks whose power leaps, s."""
     block = max(round(seconds * rate), 1)
-    n = response.size // block
+    n = change.size // block
     if n < 2 * _LOOK_BACK:
         return np.empty(0)
-    # How the slope changes from sample to sample: a hit is a click, the ringing of a board and hum are not.
-    change = np.concatenate([np.zeros(2), np.diff(response[: n * block], n=2)])
-    power = np.mean(change.reshape(n, block) ** 2, axis=1)
+    power = np.mean(change[: n * block].reshape(n, block) ** 2, axis=1)
     floor = max(float(np.quantile(power, 0.1)), float(power.max()) * 1e-12, 1e-300)
     level = 10.0 * (np.log10(np.maximum(power, 1e-300)) - np.log10(floor))
     before = np.full(n, 0.0)
@@ -61,6 +62,28 @@ def _rises(response: Floats, rate: float, seconds: float, rise: float, above_flo
         before[back:] = np.maximum(before[back:], level[:-back])
     leaps = (level - before > rise) & (level > above_floor) & (level > level.max() - _BELOW_LOUDEST)
     return np.asarray(np.flatnonzero(leaps) * block / rate)
+
+
+def _curved(response: Floats) -> Floats:
+    """How the slope changes from sample to sample: in it hum and rumble are faint."""
+    return np.diff(response, n=2, prepend=[response[0]] * 2) if response.size else response
+
+
+def _unforeseen(response: Floats) -> Floats:
+    """What a linear prediction by the samples before does not foresee: a hit is a click, ringing and tones go on."""
+    from scipy.linalg import solve_toeplitz
+    from scipy.signal import lfilter
+
+    change = _curved(response)
+    after = change[_ORDER:]
+    lags = np.array([after @ change[_ORDER - k : change.size - k] for k in range(_ORDER + 1)])
+    lags[0] *= 1.0 + 1e-9
+    if change.size <= 2 * _ORDER or lags[0] <= 0.0:
+        return change
+    weights = solve_toeplitz(lags[:-1], lags[1:])
+    rest = np.asarray(lfilter([1.0, *-weights], 1.0, change))
+    rest[: _ORDER + 2] = 0.0  # nothing came before
+    return rest
 
 
 def _first_of_each(rises: NDArray[np.intp], rate: float) -> list[int]:

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.errors import Fault, InputError
+from bayesplate.recordings.across import Seen, Shown, modes_across
+from bayesplate.recordings.agreement import agreeing
 from bayesplate.recordings.modes_found import Mode, Path, find_modes, fit_modes, joined
 from bayesplate.recordings.plausibility import Verdict, complexity, part_words, verdicts
-from bayesplate.recordings.spectra import Spectra
+from bayesplate.recordings.spectra import Rows, Spectra
 from bayesplate.recordings.strength import Answer, answers
 
 Floats = NDArray[np.float64]
@@ -25,8 +27,6 @@ _PART = 0.5
 """Probability from which on a part of another peak is fitted together with it as one mode."""
 _SAME = 3.0
 """Decay rates within which a mode is found again in a fit without the parts."""
-_PRIOR_GROUPS = 8.0
-"""Hits or places without scatter of their own that stand beside those that were taken, so that few tell little."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class PickedMode:
     alike : float
         Share of the residues' power that is the same from hit to hit.
     amplitude : float
-        Strength over the strongest mode's.
+        Strength over the strongest likely mode's.
     seen : float
         Share of the widths of windows in which it was found.
     spurious : float
@@ -92,6 +92,8 @@ class Picked:
     paths : tuple of Path
         Of the search, for the diagram of stability.
     lowest, highest : float, Hz
+    remarks : tuple of str
+        How recordings differ that do not show quite the same modes.
     """
 
     modes: tuple[PickedMode, ...]
@@ -99,6 +101,7 @@ class Picked:
     paths: tuple[Path, ...]
     lowest: float
     highest: float
+    remarks: tuple[str, ...] = ()
 
     @property
     def likely(self) -> tuple[PickedMode, ...]:
@@ -121,19 +124,40 @@ def pick_modes(spectra: Spectra, lowest: float = LOWEST, highest: float = HIGHES
     Raises
     ------
     InputError
-        If the spectra have next to nothing between the two, as frequency responses that end below.
+        If the spectra have next to nothing between the two, as frequency responses that end below; if two recordings
+        have no modes in common.
     """
     n_lines = int(((spectra.frequency >= lowest) & (spectra.frequency <= highest)).sum())
     if n_lines < _FEWEST_LINES:
         place, wanted = f"{spectra.names[0]} between {lowest:g} and {highest:g} Hz", f"{_FEWEST_LINES} lines or more"
         raise InputError(Fault(place, wanted, str(n_lines), "--lowest and --highest look elsewhere"))
+    sets = agreeing(spectra, lowest, highest)
+    searched = [_searched(spectra.only(records), lowest, highest) for records in sets]
+    peaks, remarks = searched[0][0], tuple[str, ...]()
+    if len(sets) > 1:
+        across = modes_across(spectra, [_shown(*one) for one in zip(sets, (own for own, _ in searched), strict=True)])
+        spectra, remarks = across.spectra, across.remarks
+        judged = zip(_judged(spectra, across.modes), across.spurious, strict=True)
+        peaks = [replace(one, verdict=one.verdict.at_least(spurious)) for one, spurious in judged]
+    peaks = sorted(peaks, key=lambda peak: peak.mode.frequency)
+    strongest = max((peak.answer.strength for peak in peaks if peak.verdict.spurious < _PART), default=1.0)
+    picked = tuple(_picked(peak, strongest) for peak in peaks)
+    return Picked(picked, spectra, tuple(path for _, paths in searched for path in paths), lowest, highest, remarks)
+
+
+def _shown(records: Rows, peaks: Sequence[_Peak]) -> Shown:
+    """What a set of records shows by itself, parts of peaks left out."""
+    whole = [one for one in peaks if one.verdict.part_of < 0 or one.verdict.spurious < _PART]
+    return Shown(records, [Seen(one.mode, one.pole, one.split, one.verdict.spurious) for one in whole])
+
+
+def _searched(spectra: Spectra, lowest: float, highest: float) -> tuple[list[_Peak], list[Path]]:
+    """Peaks of records that show the same modes, parts of peaks included, and the paths of the search."""
     below, above = max(lowest - _BEYOND, min(lowest, LOWEST)), min(highest + _BEYOND, float(spectra.frequency[-1]))
     by_width, paths = find_modes(spectra, below, above)
     modes = fit_modes(spectra, joined(by_width, spectra), by_width, lowest, highest)
     kept, parts = _without_parts(spectra, modes, by_width, (lowest, highest))
-    every = sorted((*kept, *parts), key=lambda peak: peak.mode.frequency)
-    strongest = max((peak.answer.strength for peak in every), default=1.0)
-    return Picked(tuple(_picked(spectra, one, strongest) for one in every), spectra, tuple(paths), lowest, highest)
+    return [*kept, *parts], paths
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,16 +176,12 @@ class _Peak:
     @property
     def pole(self) -> Floats:
         """Frequency and decay rate averaged over both: (2,) array, Hz."""
-        return self.doubt * _pole(self.mode) + (1.0 - self.doubt) * _pole(self.other)
+        return self.doubt * self.mode.pole + (1.0 - self.doubt) * self.other.pole
 
     @property
     def split(self) -> Floats:
         """Standard deviations of both for not knowing which of the two it is: (2,) array, Hz."""
-        return np.abs(_pole(self.mode) - _pole(self.other)) * np.sqrt(self.doubt * (1.0 - self.doubt))
-
-
-def _pole(mode: Mode) -> Floats:
-    return np.array([mode.frequency, mode.decay])
+        return np.abs(self.mode.pole - self.other.pole) * np.sqrt(self.doubt * (1.0 - self.doubt))
 
 
 def _without_parts(
@@ -227,26 +247,21 @@ def _part_of(part: _Peak, whole: _Peak) -> _Peak:
     return replace(part, verdict=replace(part.verdict, kind=part_words(whole.pole[0])))
 
 
-def _picked(spectra: Spectra, peak: _Peak, strongest: float) -> PickedMode:
+def _picked(peak: _Peak, strongest: float) -> PickedMode:
     """A mode averaged over two fits: with a part of its peak as a mode, and without."""
     mode, answer, verdict = peak.mode, peak.answer, peak.verdict
     frequency, decay = (float(one) for one in peak.pole)
-    noise, noise_decay = np.sqrt(np.diagonal(mode.covariance))
-    scatter, scatter_decay = (
-        sd * np.sqrt(max(_excess(spectra, mode, k) - 1.0, 0.0)) for k, sd in enumerate((noise, noise_decay))
-    )
-    # two choices of lines are two estimates, each with an error of its own: their difference has twice its variance
-    window, window_decay = np.hypot(mode.shift / np.sqrt(2.0), peak.split)
-    turned = answer.mobility
+    window = np.hypot(mode.window, peak.split)
+    sd, decay_sd = (float(one) for one in np.sqrt(mode.noise**2 + mode.scatter**2 + window**2))
     return PickedMode(
         frequency=frequency,
-        sd=float(np.sqrt(noise**2 + scatter**2 + window**2)),
-        noise_sd=float(noise),
-        scatter_sd=float(scatter),
-        window_sd=float(window),
+        sd=sd,
+        noise_sd=float(mode.noise[0]),
+        scatter_sd=float(mode.scatter[0]),
+        window_sd=float(window[0]),
         damping=decay / frequency,
-        damping_sd=float(np.sqrt(noise_decay**2 + scatter_decay**2 + window_decay**2)) / frequency,
-        mobility=tuple(float(one) for one in np.real(turned)),
+        damping_sd=decay_sd / frequency,
+        mobility=tuple(float(one) for one in np.real(answer.mobility)),
         mobility_sd=tuple(float(one) for one in answer.sd),
         complexity=complexity(answer),
         alike=answer.alike,
@@ -255,26 +270,3 @@ def _picked(spectra: Spectra, peak: _Peak, strongest: float) -> PickedMode:
         spurious=verdict.spurious,
         kind=verdict.kind,
     )
-
-
-def _excess(spectra: Spectra, mode: Mode, which: int) -> float:
-    """By how much the steps of hits, or of places, exceed their variances: the larger of the two ratios.
-
-    The steps of all records add up to nothing, so that one degree of freedom is lost.
-    """
-    by_hit = _ratio(mode.steps[:, which], mode.variances[:, which])
-    n_places = len(spectra.between)
-    steps = np.bincount(spectra.places, mode.steps[:, which], n_places)
-    variances = np.bincount(spectra.places, mode.variances[:, which], n_places)
-    return max(by_hit, _ratio(np.asarray(steps, dtype=float), np.asarray(variances, dtype=float)))
-
-
-def _ratio(steps: Floats, variances: Floats) -> float:
-    """Sum of squares over the expected one, as if `_PRIOR_GROUPS` more had scattered as expected."""
-    if steps.size < 2:
-        return 1.0
-    share = variances / variances.sum()
-    expected = variances * np.maximum(1.0 - share, 1e-9)
-    ratio = float(np.sum(steps**2 / expected * (1.0 - share)))
-    freedom = float(np.sum(1.0 - share))
-    return (ratio + _PRIOR_GROUPS) / (freedom + _PRIOR_GROUPS)

@@ -9,11 +9,12 @@ moves as it does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.recordings.local_fit import STEADY
 from bayesplate.recordings.modes_found import Mode
 from bayesplate.recordings.spectra import Spectra
 from bayesplate.recordings.strength import Answer
@@ -40,8 +41,6 @@ _UNSTABLE = 3.0
 _MAINS = (50.0, 60.0)
 _NEAR_MAINS = 0.5
 """Hz."""
-_STEADY = 0.11
-"""Decay rate times duration below which a line has not fallen by half: it may be steady."""
 _UNLIKE_PRIOR = 1.0 / 9.0
 
 
@@ -64,6 +63,10 @@ class Verdict:
     kind: str
     part_of: int = -1
 
+    def at_least(self, spurious: float) -> Verdict:
+        """The same where something else makes it as doubtful as that."""
+        return replace(self, spurious=max(self.spurious, spurious), kind=self.kind or "faint" * (spurious > 0.5))
+
 
 def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]) -> list[Verdict]:
     """A verdict for each mode; the probabilities of different reasons are taken as independent.
@@ -82,23 +85,26 @@ def verdicts(spectra: Spectra, modes: Sequence[Mode], answered: Sequence[Answer]
         return []
     strengths = np.array([one.strength for one in answered])
     hertz = np.array([mode.frequency for mode in modes])
-    usual = _usual(hertz, strengths)
-    strong = hertz[strengths > 0.2 * usual]
+    steady = np.array([mode.decay * spectra.duration < STEADY for mode in modes])
+    usual = _usual(hertz, strengths, ~steady)
+    strong = hertz[~steady & (strengths > 0.2 * usual)]
     spacing = float(np.ptp(strong)) / max(strong.size - 1, 1) if strong.size > 1 else 50.0
     spare = spectra.places.size - len(spectra.between)
-    broad = broad_odds(np.array([mode.damping for mode in modes]), strengths / usual)
+    broad = broad_odds(np.array([mode.damping for mode in modes]), np.where(steady, 0.0, strengths / usual))
     found = []
     for m, mode in enumerate(modes):
         reasons = {"noise": mode.expected / (1.0 + mode.expected)}
         reasons[UNLIKE] = _unlike(answered[m].alike, len(spectra.between), spare)
-        reasons |= _of_lines(mode, spectra.duration, reasons[UNLIKE])
-        faint, split, part_of = _odds(m, modes, answered, usual, broad, spacing, has_force=spectra.force is not None)
+        reasons |= (lines := _of_lines(mode, spectra.duration, reasons[UNLIKE]))
+        faint, split, part_of = _odds(
+            m, modes, answered, usual, broad, spacing, spectra.duration, has_force=spectra.force is not None
+        )
         unstable = 1.0 if mode.seen == 1.0 else _UNSTABLE
         reasons["something broad"] = 1.0 - 1.0 / (1.0 + broad[m])
         reasons["faint"] = 1.0 - 1.0 / (1.0 + faint * unstable)
         reasons["part"] = 1.0 - 1.0 / (1.0 + split * unstable)
         spurious = 1.0 - float(np.prod([1.0 - one for one in reasons.values()]))
-        worst = max(reasons, key=lambda name: reasons[name])
+        worst = max(lines or reasons, key=lambda name: reasons[name])
         kind = "" if reasons[worst] < 0.05 else worst
         is_part = kind == "part"
         words = part_words(modes[part_of].frequency) if is_part else kind
@@ -111,10 +117,10 @@ def part_words(hertz: float) -> str:
     return f"part of {hertz:.1f} Hz"
 
 
-def _usual(hertz: Floats, strengths: Floats) -> Floats:
-    """Strength of the stronger modes within an octave of each: (n_modes,) array."""
-    near = np.abs(np.log2(hertz[:, None] / hertz)) <= 1.0
-    return np.array([np.quantile(strengths[row], 0.7) for row in near])
+def _usual(hertz: Floats, strengths: Floats, rings: NDArray[np.bool_]) -> Floats:
+    """Strength of the stronger modes that ring down within an octave of each, of all where none does: (n_modes,)."""
+    near = (np.abs(np.log2(hertz[:, None] / hertz)) <= 1.0) & rings
+    return np.array([np.quantile(strengths[row if row.any() else slice(None)], 0.7) for row in near])
 
 
 def broad_odds(damping: Floats, strengths: Floats) -> Floats:
@@ -146,13 +152,13 @@ def broad_odds(damping: Floats, strengths: Floats) -> Floats:
 def weighted_median(values: Floats, weights: Floats) -> float:
     """The value with half of the weight on either side."""
     order = np.argsort(values)
-    total = np.cumsum(weights[order])
+    total = np.cumsum(weights[order] + 1e-12)
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _of_lines(mode: Mode, duration: float, unlike: float) -> dict[str, float]:
     """That it is hum of the mains or another line that does not decay."""
-    is_steady = mode.decay * duration < _STEADY
+    is_steady = mode.decay * duration < STEADY
     off = min(abs(mode.frequency - base * round(mode.frequency / base)) for base in _MAINS)
     is_mains = mode.frequency > 40.0 and off < _NEAR_MAINS and mode.decay < _NEAR_MAINS
     if is_mains and (is_steady or unlike > 0.5):
@@ -180,6 +186,7 @@ def _odds(
     usual: Floats,
     broad: Floats,
     spacing: float,
+    duration: float,
     *,
     has_force: bool,
 ) -> tuple[float, float, int]:
@@ -193,7 +200,8 @@ def _odds(
     for k, other in enumerate(modes):
         width = mode.decay + other.decay
         apart = abs(mode.frequency - other.frequency)
-        if k == m or apart > REACH * width or answered[k].strength <= answer.strength:
+        is_weaker = answered[k].strength <= answer.strength
+        if k == m or apart > REACH * width or is_weaker or other.decay * duration < STEADY:
             continue
         share = answer.strength / answered[k].strength
         odds = _log_normal(share, SPLIT, SPLIT_FACTOR) / of_mode * spacing / (2.0 * REACH * width)

@@ -1,10 +1,11 @@
-"""Files to recordings: WAV and CSV by themselves, FLAC and UFF with the extra; every fault of every file at once."""
+"""Files to recordings: WAV, FLAC and CSV, and UFF with the extra; every fault of every file at once."""
 
 from __future__ import annotations
 
 import os
 import stat
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -12,10 +13,10 @@ import numpy as np
 
 from bayesplate.errors import Fault, InputError
 from bayesplate.recordings.checks import signal_faults
-from bayesplate.recordings.extras import read_flac, read_uff
 from bayesplate.recordings.signals import FrequencyResponse, Motion, Recording
+from bayesplate.recordings.sound import read_sound
 from bayesplate.recordings.tables import read_csv
-from bayesplate.recordings.wav import read_wav
+from bayesplate.recordings.uff import read_uff
 
 LARGEST_FILE = 400_000_000
 """Bytes; half an hour of two channels of 24 bits at 48 kHz."""
@@ -26,13 +27,15 @@ Read = Recording | FrequencyResponse
 Reader = Callable[[Path, str, float | None, str, Motion], list[Read]]
 
 READERS: dict[str, Reader] = {
-    ".wav": read_wav,
+    ".wav": read_sound,
     ".csv": read_csv,
-    ".flac": read_flac,
+    ".flac": read_sound,
     ".uff": read_uff,
     ".unv": read_uff,
+    ".ufb": read_uff,
 }
 """By the ending of the file."""
+COMPRESSED = (".m4a", ".mp3", ".aac", ".ogg", ".opus", ".wma", ".amr", ".3gp", ".mp4", ".mov")
 
 
 def read_recordings(
@@ -51,7 +54,7 @@ def read_recordings(
     rate : float, optional, Hz
         For files that do not say it.
     channels : str
-        What the two channels of a sound file are: one of `CHANNELS`.
+        What the two channels of a sound file are, one of `CHANNELS`, or the number of the one that is used.
     motion : str
         What a response is whose file does not say it: one of `bayesplate.recordings.signals.MOTIONS`.
     was_played : bool
@@ -78,6 +81,7 @@ def read_recordings(
         except InputError as error:
             faults += error.faults
             continue
+        read = _set_aside(read)
         faults += [fault for one in read for fault in signal_faults(one, was_played=was_played)]
         found.append(read)
     faults += _given_twice([one for own in found for one in own])
@@ -86,15 +90,33 @@ def read_recordings(
     return found
 
 
+def _set_aside(read: list[Read]) -> list[Read]:
+    """Of a file with several recordings those that are neither silent nor a copy, the first with the remarks."""
+    kept, told, seen = list[Read](), list[str](), dict[bytes, str]()
+    for one in read:
+        signal = one.response if isinstance(one, Recording) else one.values
+        if len(read) > 1 and (signal == signal[:1]).all():
+            told.append(f"{one.name} is silent and left out")
+        elif (first := seen.setdefault(_content(one), one.name)) is not one.name:
+            told.append(f"{one.name} holds the same as {first} and is left out")
+        else:
+            kept.append(one)
+    return [replace(kept[0], remarks=(*kept[0].remarks, *told)), *kept[1:]] if kept else read[:1]
+
+
+def _content(one: Read) -> bytes:
+    """What tells a recording from others."""
+    content = sha256()
+    for part in (one.response, one.force) if isinstance(one, Recording) else (one.values, one.frequency):
+        content.update(b"" if part is None else np.ascontiguousarray(part).tobytes())
+    return content.digest()
+
+
 def _given_twice(read: Sequence[Read]) -> list[Fault]:
     """Recordings of the same content: a copy tells nothing new, and would count as a repeat without any scatter."""
     named: dict[bytes, list[str]] = {}
     for one in read:
-        both = (one.response, one.force) if isinstance(one, Recording) else (one.values, one.frequency)
-        content = sha256()
-        for part in both:
-            content.update(b"" if part is None else np.ascontiguousarray(part).tobytes())
-        named.setdefault(content.digest(), []).append(one.name)
+        named.setdefault(_content(one), []).append(one.name)
     wanted, got, remedy = "each recording once", "the same samples again", "a copy is no new evidence: leave it out"
     return [Fault(" and ".join(names), wanted, got, remedy) for names in named.values() if len(names) > 1]
 
@@ -113,6 +135,10 @@ def _require_file(path: Path, shown: str) -> None:
     """A regular file of a known kind and a size that fits into memory; looked at from outside only."""
     if os.path.isdir(path):
         raise InputError(Fault(shown, "a recording", "a folder", f"give the files in it: {shown}/*.wav"))
+    if path.suffix.lower() in COMPRESSED:
+        wanted, got = f"a recording: {', '.join(READERS)}", f'compressed sound, "{_plain(path.suffix)}"'
+        remedy = "record as WAV; what there is another program can save as WAV, but compression costs soft modes"
+        raise InputError(Fault(shown, wanted, got, remedy))
     if path.suffix.lower() not in READERS:
         got = f'"{_plain(path.suffix)}"' if path.suffix else "no ending"
         raise InputError(Fault(shown, f"a recording: {', '.join(READERS)}", got, "save it as WAV or CSV"))

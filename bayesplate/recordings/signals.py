@@ -35,6 +35,8 @@ class Recording:
         Largest value that the file can hold; infinity for numbers without a limit.
     hammer, sensor : tuple of float or None, m
         Where the board was hit and where it was listened to, from the corner of the edges x0 and y0.
+    remarks : tuple of str
+        What is told of its file.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Recording:
     full_scale: float = np.inf
     hammer: Place | None = None
     sensor: Place | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -69,6 +72,7 @@ class FrequencyResponse:
     coherence : (n_lines,) array or None
     motion : str
     hammer, sensor : tuple of float or None, m
+    remarks : tuple of str
     """
 
     name: str
@@ -78,6 +82,7 @@ class FrequencyResponse:
     motion: Motion = "acceleration"
     hammer: Place | None = None
     sensor: Place | None = None
+    remarks: tuple[str, ...] = ()
 
     def at(self, hammer: Place | None, sensor: Place | None) -> FrequencyResponse:
         """The same, taken between two places."""

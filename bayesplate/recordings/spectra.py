@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ class Spectra:
         Spectrum of each hit's force from the same origin of time; one for frequency responses.
     names : tuple of str
         Of the records, "tap.wav hit 3".
+    files : (n_records,) array of int
+        Which records are hits of one file.
     places : (n_records,) array of int
         Which records were taken between the same two places.
     between : tuple of (Place or None, Place or None)
@@ -48,6 +50,7 @@ class Spectra:
     values: Complex
     force: Complex | None
     names: tuple[str, ...]
+    files: Rows
     places: Rows
     between: tuple[tuple[Place | None, Place | None], ...]
     motion: Motion
@@ -60,6 +63,19 @@ class Spectra:
         level = np.median(np.abs(second), axis=0) / _MEDIAN
         top = np.abs(self.values).max(axis=0)
         return np.asarray(np.maximum(level, 1e-9 * top + 1e-300))
+
+    def only(self, records: Rows) -> Spectra:
+        """The same of some records."""
+        kept = np.unique(self.places[records])
+        return replace(
+            self,
+            values=self.values[:, records],
+            force=None if self.force is None else self.force[:, records],
+            names=tuple(self.names[r] for r in records),
+            files=self.files[records],
+            places=np.searchsorted(kept, self.places[records]),
+            between=tuple(self.between[k] for k in kept),
+        )
 
 
 def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: float) -> Spectra:
@@ -97,6 +113,7 @@ def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: flo
         values=np.stack(columns, axis=1),
         force=np.stack(forces, axis=1) if len(forces) == len(columns) else None,
         names=tuple(f"{recording.name} hit {number}" for recording, number, _ in every),
+        files=np.repeat(np.arange(len(heard)), [len(hits) for _, hits in heard]),
         places=places,
         between=distinct,
         motion=heard[0][0].motion,
@@ -128,6 +145,7 @@ def response_spectra(responses: Sequence[FrequencyResponse], highest: float, pad
         values=values,
         force=np.ones_like(values),
         names=tuple(one.name for one in responses),
+        files=np.arange(len(responses)),
         places=places,
         between=distinct,
         motion=first.motion,

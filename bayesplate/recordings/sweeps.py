@@ -26,6 +26,11 @@ _BEFORE = 0.01
 """s before the impulse response that are kept."""
 _AFTER = 0.002
 """s after it from which on the board rings by itself."""
+_ABOUT, _APART, _MOST_BEFORE = 0.1, 0.02, 0.05
+"""s before and after its height, s that are left out before it, and power there over that after it, at most."""
+_LOOK, _LOUD, _OFF, _MOST_OFF = 1.0, 1e-3, 0.06, 0.3
+"""s before and after its height in which frequencies are looked at, power over the loudest of those that count, s by
+which one may come at another time than the others, and the share of them that may be off by more."""
 _FLOOR = 1e-4
 """Share of a sweep's greatest power below which a frequency was not excited."""
 
@@ -94,6 +99,11 @@ def impulse_response(recording: Recording, sweep: Sweep | Floats) -> tuple[Recor
     recording : Recording
         With the impulse response in place of the response.
     hit : Hit
+
+    Raises
+    ------
+    InputError
+        If what comes out is no impulse response: the sweep was another.
     """
     from scipy.signal import oaconvolve
 
@@ -103,10 +113,31 @@ def impulse_response(recording: Recording, sweep: Sweep | Floats) -> tuple[Recor
     else:
         whole = _divided(recording.response, sweep)
     onset = int(np.argmax(np.abs(whole)))
+    about, apart = round(_ABOUT * rate), round(_APART * rate)
+    before = np.sum(whole[max(onset - apart - about, 0) : max(onset - apart, 0)] ** 2)
+    after = max(np.sum(whole[onset : onset + about] ** 2), 1e-300)
+    if before > _MOST_BEFORE * after or _late(
+        whole[max(onset - round(_LOOK * rate), 0) :][: round(2.0 * _LOOK * rate)], rate
+    ):
+        got = "no impulse when it is turned back: its frequencies come one after the other"
+        remedy = "--sweep with what was played: its frequencies and seconds, exponential"
+        raise InputError(Fault(recording.name, "the response to this sweep", got, remedy))
     first = max(onset - round(_BEFORE * rate), 0)
     response = whole[first : first + round((LONGEST_DURATION + _BEFORE) * rate)]
     onset -= first
     return replace(recording, response=response), Hit(onset, onset + round(_AFTER * rate), response.size)
+
+
+def _late(about: Floats, rate: float) -> bool:
+    """Whether many of the frequencies of an impulse response come at another time than the others."""
+    from scipy.signal import stft
+
+    n = round(_ABOUT * rate)
+    _, times, lines = stft(about, rate, nperseg=n, noverlap=n - n // 10, boundary=None, padded=False)
+    power = np.abs(lines) ** 2
+    loudest = power.max(axis=1)
+    when = times[power.argmax(axis=1)][loudest > _LOUD * loudest.max()]
+    return bool(np.mean(np.abs(when - np.median(when)) > _OFF) > _MOST_OFF)
 
 
 def _divided(response: Floats, sweep: Floats) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.errors import Fault, InputError
+from bayesplate.recordings.axes import rate_of, require_lines
 from bayesplate.recordings.signals import MOTIONS, FrequencyResponse, Motion, Recording
 
 Floats = NDArray[np.float64]
@@ -20,12 +21,6 @@ _REAL, _IMAGINARY, _COHERENCE = ("re", "real"), ("im", "imag", "imaginary"), ("c
 _FORCE, _RESPONSE = ("force",), ("response", "sound", *MOTIONS)
 KNOWN = (*_TIME, *_FORCE, *_RESPONSE, *_HERTZ, *_REAL, *_IMAGINARY, *_COHERENCE)
 WANTED = "named columns: force if it was measured, acceleration, velocity, displacement or sound, time; or f_hz, re, im"
-_JITTER = 1e-3
-"""Share of a step by which the times of samples, or the lines of a spectrum, may be unevenly spaced."""
-_GAP = 1.75
-"""Steps between two times at which a sample is missing; times are rounded, so two steps may look like less."""
-_LATEST = 1e12
-"""s, Hz."""
 _LONGEST_HEADER = 10_000
 _END_OF_LINE = re.compile(r"\r\n|\r|\n")
 """As the reader of the numbers counts lines; Python knows more ends of lines."""
@@ -48,12 +43,9 @@ def read_csv(
     times = _of(columns, _TIME)
     if times is None and rate is None:
         faults.append(Fault(f"{shown} rate", "a column time, or --rate", "neither", "--rate 48000"))
-    own_rate = rate or 1.0
-    if times is not None and not faults:
-        own_rate, fault = _rate_of(times, shown, rate)
-        faults += [fault] if fault else []
     if faults or response is None:
         raise InputError(faults)
+    own_rate = rate or 1.0 if times is None else rate_of(times, shown, rate)
     named = next(name for name in columns if name in _RESPONSE)
     told: Motion = next((one for one in MOTIONS if one == named), "pressure" if named == "sound" else motion)
     return [Recording(shown, own_rate, response, _of(columns, _FORCE), told)]
@@ -108,27 +100,10 @@ def _of(columns: dict[str, Floats], names: tuple[str, ...]) -> Floats | None:
     return next((columns[name] for name in names if name in columns), None)
 
 
-def _rate_of(times: Floats, shown: str, rate: float | None) -> tuple[float, Fault | None]:
-    if times.size < 2 or not (np.abs(times) < _LATEST).all() or not (np.diff(times) > 0).all():
-        return 1.0, Fault(f"{shown} time", "times in s that rise", "times that do not")
-    step = float((times[-1] - times[0]) / (times.size - 1))
-    away = np.abs(times - times[0] - step * np.arange(times.size)).max()
-    if away > max(_JITTER * step, 1e-6 * float(times[-1])) + step or np.diff(times).max() > _GAP * step:
-        return 1.0, Fault(f"{shown} time", "evenly spaced samples", "uneven ones", "record without gaps")
-    own = 1.0 / step
-    if rate is not None and abs(rate / own - 1.0) > _JITTER:
-        return own, Fault(f"{shown} rate", f"{rate:g} Hz, as --rate says", f"{own:.6g} Hz", "leave --rate out")
-    return (rate or float(f"{own:.7g}")), None
-
-
 def _response(columns: dict[str, Floats], shown: str, motion: Motion) -> FrequencyResponse:
     hertz, real, imaginary = (_of(columns, names) for names in (_HERTZ, _REAL, _IMAGINARY))
     if hertz is None or real is None or imaginary is None:
         raise InputError(Fault(shown, "the columns f_hz, re and im", ", ".join(columns)))
-    steps = np.diff(np.where(np.abs(hertz) < _LATEST, hertz, -1.0))
-    if hertz.size < 100 or hertz[0] < 0 or not (steps > 0).all() or np.ptp(steps) > 2e-2 * float(np.mean(steps)):
-        raise InputError(
-            Fault(f"{shown} f_hz", "a hundred evenly spaced lines or more, rising", f"{hertz.size} others")
-        )
+    require_lines(hertz, shown)
     values = np.stack([real, imaginary], axis=1).view(complex)[:, 0]  # without arithmetic: they may be no numbers
     return FrequencyResponse(shown, hertz, values, _of(columns, _COHERENCE), motion)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.errors import Fault, InputError
-from bayesplate.recordings.forces import force_fault
+from bayesplate.recordings.channels import force_fault, is_cut_to_silence, is_pulse
+from bayesplate.recordings.checks import phase_fault
 from bayesplate.recordings.hits import LEAST_DURATION, Hit, find_hits, rising_again, usable
 from bayesplate.recordings.padding import common_padding
 from bayesplate.recordings.reading import Read
@@ -60,43 +61,77 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
         With every file that has no hit that can be used, or that does not go with the others.
     """
     every = [one for file in files for one in file]
+    remarks = [told for one in every for told in one.remarks]
     responses = [one for one in every if isinstance(one, FrequencyResponse)]
     if responses:
-        faults = _response_faults(every, responses)
-        if faults:
+        if faults := _response_faults(every, responses):
             raise InputError(faults)
         padding = common_padding(responses)
-        told = (
-            f"{responses[0].name}: of every {padding} lines one was measured and is used, the others are interpolated"
-        )
-        return Heard(response_spectra(responses, highest, padding), (), (told,) if padding > 1 else ())
+        if padding > 1:
+            told = f"of every {padding} lines one was measured and is used, the others are interpolated"
+            remarks.append(f"{responses[0].name}: {told}")
+        return Heard(response_spectra(responses, highest, padding), (), tuple(remarks))
     recordings = [one for one in every if isinstance(one, Recording)]
     faults = _recording_faults(recordings, highest)
+    pulses = [one for one in recordings if one.force is None and is_pulse(one.response, one.rate)]
+    told = "it is silent after its pulse: is it the force?"
+    if len(pulses) == len(recordings):
+        remedy = "--channels, or the name of its column"
+        raise InputError([*faults, *(Fault(one.name, "a response, which rings", told, remedy) for one in pulses)])
+    remarks += [f"{one.name} left out: {told}" for one in pulses]
+    found = [
+        [(one, find_hits(one)) for one in file if isinstance(one, Recording) and one not in pulses] for file in files
+    ]
     heard: list[tuple[Recording, list[Hit]]] = []
-    remarks: list[str] = []
-    for one in recordings:
-        if (no_force := force_fault(one)) is not None:
-            faults.append(no_force)
-            continue
-        hits = find_hits(one)
-        good = usable(hits)
-        bad = [(number, hit) for number, hit in enumerate(hits, start=1) if hit.fault]
-        if not hits:
-            wanted = "a hit that stands out of the quiet"
-            faults.append(Fault(one.name, wanted, "none", "leave a moment of quiet before each hit"))
-        elif 2 * len(good) < len(hits) or not good:
-            faults += [_hit_fault(one, number, hit) for number, hit in bad]
-        else:
-            remarks += [
-                f"{one.name}: hit {number} at {hit.onset / one.rate:.2f} s left out, {hit.fault}" for number, hit in bad
-            ]
-            heard.append((one, good))
+    for own in found:
+        for one, hits in own:
+            if not hits and any(others for _, others in own):
+                remarks.append(f"{one.name} left out: no hit stands out of its noise (is it connected?)")
+            elif wrong := _hit_faults(one, hits):
+                faults += wrong
+            else:
+                remarks += _told_of(one, hits)
+                heard.append((one, usable(hits)))
     if faults:
         raise InputError(faults)
     kept, short = _without_short(heard)
     spectra = decay_spectra(kept, highest)
     remarks += [*short, *_risen(kept, spectra.duration)]
     return Heard(spectra, tuple((one, tuple(hits)) for one, hits in kept), tuple(remarks))
+
+
+def _hit_faults(one: Recording, hits: Sequence[Hit]) -> list[Fault]:
+    """Why nothing can be taken from a recording."""
+    if (no_force := force_fault(one)) is not None:
+        return [no_force]
+    if not hits:
+        wanted = "a hit that stands out of the quiet"
+        return [Fault(one.name, wanted, "none", "leave a moment of quiet before each hit")]
+    good = len(usable(hits))
+    if good and 2 * good >= len(hits):
+        return []
+    remedy = "hit again, and wait until it is silent"
+    if is_cut_to_silence(one.response, one.rate):
+        remedy = "digital silence between: switch off the noise gate, or noise suppression, and hit again"
+    return [
+        Fault(f"{one.name} {_which(one, number, hit)}", "one hit, and time to ring down", hit.fault, remedy)
+        for number, hit in enumerate(hits, start=1)
+        if hit.fault
+    ]
+
+
+def _told_of(one: Recording, hits: Sequence[Hit]) -> list[str]:
+    """What is told of the hits of a recording that is used."""
+    bad = [(number, hit) for number, hit in enumerate(hits, start=1) if hit.fault]
+    told = [f"{one.name}: {_which(one, number, hit)} left out, {hit.fault}" for number, hit in bad]
+    if after := [(hit.stop - hit.onset) / one.rate for hit in usable(hits) if hit.is_gated]:
+        what = "a noise gate, or noise suppression? (switch it off)"
+        told.append(f"{one.name}: the sound breaks off {min(after):.2g} s after a hit: {what}")
+    return told
+
+
+def _which(one: Recording, number: int, hit: Hit) -> str:
+    return f"hit {number} at {hit.onset / one.rate:.2f} s"
 
 
 def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> Heard:
@@ -110,19 +145,14 @@ def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> 
     if faults:
         raise InputError(faults)
     hits = tuple((one, (hit,)) for one, hit in impulses)
-    return Heard(decay_spectra(hits, highest), hits, ())
-
-
-def _hit_fault(one: Recording, number: int, hit: Hit) -> Fault:
-    place = f"{one.name} hit {number} at {hit.onset / one.rate:.2f} s"
-    return Fault(place, "one hit, and time to ring down", hit.fault, "hit again, and wait until it is silent")
+    return Heard(decay_spectra(hits, highest), hits, tuple(told for one, _ in impulses for told in one.remarks))
 
 
 def _response_faults(every: Sequence[Read], responses: Sequence[FrequencyResponse]) -> list[Fault]:
     if len(responses) < len(every):
         return [Fault("FILES", "recordings or frequency responses", "both", "pick them apart")]
     first = responses[0]
-    faults = []
+    faults = [fault for one in responses if (fault := phase_fault(one)) is not None]
     for one in responses[1:]:
         if one.frequency.shape != first.frequency.shape or not np.allclose(one.frequency, first.frequency, rtol=1e-6):
             faults.append(Fault(f"{one.name} frequencies", f"those of {first.name}", "others", "pick them apart"))

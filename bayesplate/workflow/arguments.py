@@ -229,6 +229,12 @@ def _sand(name: str, value: object) -> Iterator[Fault]:
         yield from _path(f"{name} {_shown(hertz)}", picture)
 
 
+def _channels(name: str, value: object) -> Iterator[Fault]:
+    """What two channels are, or the number of one."""
+    if not (isinstance(value, str) and value.isdecimal() and int(value) > 0):
+        yield from _word(CHANNELS)(name, value)
+
+
 def _is_number(value: object) -> TypeGuard[float]:
     is_truth = isinstance(value, bool | np.bool_)
     return not is_truth and isinstance(value, Real) and bool(np.isfinite(float(value)))
@@ -259,7 +265,7 @@ _CHECKS: dict[str, Check] = {
     "rate": _rate,
     "places": _given_places,
     "sensor_mass": _sensor_mass,
-    "channels": _word(CHANNELS),
+    "channels": _channels,
     "motion": _word(MOTIONS),
     "polarity": _word(("same", "opposite")),
     "band": _band,

@@ -15,7 +15,7 @@ from bayesplate.recordings.picking import HIGHEST, LOWEST, Picked, pick_modes
 from bayesplate.recordings.reading import read_recordings
 from bayesplate.recordings.sand import read_picture
 from bayesplate.recordings.signals import Motion, Recording
-from bayesplate.recordings.sweeps import impulse_response, read_sweep
+from bayesplate.recordings.sweeps import Sweep, impulse_response, read_sweep
 from bayesplate.recordings.taking import Heard, take, take_impulses
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import FIGURES
@@ -88,7 +88,7 @@ def pick(
     Parameters
     ----------
     files : sequence of path
-        WAV or CSV; FLAC and UFF with the extra `bayesplate[recordings]`. Files of which both places are given
+        WAV, FLAC or CSV; UFF with the extra `bayesplate[recordings]`. Files of which both places are given
         and the same are repeats.
     card : str or path, optional
         A board card with sizes and edges, which may be without frequencies: labels are computed for it.
@@ -99,7 +99,8 @@ def pick(
     sensor_mass : (float, float), optional, kg
         Of the accelerometer, and its standard deviation; it is passed on to the card.
     channels : str
-        What two channels of a sound file are: "force,response", "response,force" or "response,response".
+        What two channels of a sound file are, "force,response", "response,force" or "response,response", or the number
+        of the only one that is used.
     motion : str
         What a response is whose file does not say it: "acceleration", "velocity", "displacement" or "pressure".
     polarity : str, optional
@@ -163,8 +164,7 @@ def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recordin
         wanted = "one channel with the response to the sweep"
         raise InputError([Fault(name, wanted, "another kind of file", "leave --sweep out for hits") for name in wrong])
     if not os.path.exists(sweep):
-        played = read_sweep(sweep)
-        return [impulse_response(one, played) for one in recordings]
+        return _turned_back(recordings, read_sweep(sweep))
     ((itself, *_),) = read_recordings([sweep], was_played=True)
     if not isinstance(itself, Recording):
         raise InputError(Fault(plain(sweep), "a recording of the sweep", "a frequency response"))
@@ -173,7 +173,19 @@ def _impulses(read: Sequence[Sequence[Read]], sweep: str) -> list[tuple[Recordin
         raise InputError(
             [Fault(f"{one.name} rate", f"{itself.rate:g} Hz, as the sweep", f"{one.rate:g} Hz") for one in off]
         )
-    return [impulse_response(one, itself.response) for one in recordings]
+    return _turned_back(recordings, itself.response)
+
+
+def _turned_back(recordings: Sequence[Recording], sweep: Sweep | Floats) -> list[tuple[Recording, Hit]]:
+    found, faults = [], list[Fault]()
+    for one in recordings:
+        try:
+            found.append(impulse_response(one, sweep))
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    return found
 
 
 def _summary(
@@ -188,7 +200,7 @@ def _summary(
     names = tuple(plain(Path(one).name) for one in files)
     numbers = [number for number, mode in enumerate(picked.modes) if mode.is_likely]
     flips = None if polarity is None else polarity == "opposite"
-    remarks = list(heard.remarks)
+    remarks = [*heard.remarks, *picked.remarks]
     labels = None
     if prepared is not None:
         kept, turned = upright(prepared.board, pictures)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,9 +23,9 @@ MODE = Verdict(0.02, "")
 
 
 def mode(frequency: float, damping: float = 0.007) -> Mode:
-    one, none = np.ones(1, dtype=complex), np.zeros((1, 2))
-    decay = damping * frequency
-    return Mode(frequency, decay, 1e-4 * np.eye(2), none, none + 1.0, one, np.ones(1), 1e4, 0.0, np.zeros(2), 1.0)
+    noise, none = np.full(2, 0.01), np.zeros(2)
+    one = np.ones(1, dtype=complex)
+    return Mode(frequency, damping * frequency, noise, none, none, one, np.ones(1), 1e4, 0.0, 1.0)
 
 
 def answer(strength: float = 1.0) -> Answer:
@@ -69,7 +68,8 @@ def test_broad_things_do_not_tell_how_the_board_damps_where_they_are_weak():
 
 HERTZ = np.arange(20.0, 1000.0, 0.5)
 ONES = np.ones((HERTZ.size, 1), dtype=complex)
-SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), np.zeros(1, dtype=np.intp), ((None, None),), "acceleration", 2.0)
+FIRST = np.zeros(1, dtype=np.intp)
+SPECTRA = Spectra(HERTZ, ONES, ONES, ("frf",), FIRST, FIRST, ((None, None),), "acceleration", 2.0)
 
 
 def test_a_verdict_says_that_something_is_broad():
@@ -125,9 +125,8 @@ def test_a_mode_is_averaged_with_what_was_nearest_to_it_while_the_part_was_there
 
 def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits():
     as_whole, beside_part = mode(400.0, damping=0.005), mode(401.0, damping=0.007)
-    spectra = SimpleNamespace(between=((None, None),), places=np.zeros(1, dtype=int))
 
-    one = picking._picked(spectra, picking._Peak(as_whole, answer(), MODE, beside_part, doubt=0.8), 1.0)
+    one = picking._picked(picking._Peak(as_whole, answer(), MODE, beside_part, doubt=0.8), 1.0)
 
     decay, other = as_whole.decay, beside_part.decay
     assert one.frequency == pytest.approx(400.2)
@@ -136,10 +135,9 @@ def test_damping_is_averaged_as_the_frequency_is_and_its_error_holds_both_fits()
 
 
 def test_damping_carries_by_how_much_it_moves_with_the_choice_of_lines():
-    moved = replace(mode(400.0), shift=np.array([0.0, 0.2]))
-    spectra = SimpleNamespace(between=((None, None),), places=np.zeros(1, dtype=int))
+    moved = replace(mode(400.0), window=np.array([0.0, 0.2]))
 
-    one = picking._picked(spectra, picking._Peak(moved, answer(), MODE, moved), 1.0)
+    one = picking._picked(picking._Peak(moved, answer(), MODE, moved), 1.0)
 
     assert one.window_sd == 0.0
-    assert one.damping_sd == pytest.approx(np.hypot(0.01, 0.2 / np.sqrt(2.0)) / 400.0)
+    assert one.damping_sd == pytest.approx(np.hypot(0.01, 0.2) / 400.0)

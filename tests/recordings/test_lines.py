@@ -1,0 +1,115 @@
+"""Lines that are not the board: a steady tone, hum and rumble take no mode with them and refuse no tap; noise gates."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from made_recordings import board, hits
+
+from bayesplate.errors import InputError
+from bayesplate.recordings.hits import find_hits
+from bayesplate.recordings.picking import Picked, pick_modes
+from bayesplate.recordings.signals import Recording
+from bayesplate.recordings.taking import take
+
+RATE, SECONDS, HIGHEST = 8000.0, 7.5, 300.0
+TIMES = [0.5, 1.9, 3.3, 4.7, 6.1]
+AT = np.arange(round(SECONDS * RATE)) / RATE
+
+
+@lru_cache(maxsize=1)
+def taps() -> np.ndarray:
+    """Five taps, their greatest value 1."""
+    heard = hits(np.random.default_rng(21), TIMES, (0.03, 0.02), (0.52, 0.03), rate=RATE, seconds=SECONDS)[1]
+    return heard / np.abs(heard).max()
+
+
+def tone(hertz: float, share: float) -> np.ndarray:
+    """A steady tone of a share of the greatest value of the taps."""
+    return share * np.sin(2.0 * np.pi * hertz * AT + hertz)
+
+
+def picked(added: np.ndarray) -> Picked:
+    """Modes of the taps with something added, from all five of them."""
+    taken = take([[Recording("tap.wav", RATE, taps() + added)]], HIGHEST)
+    assert (len(taken.spectra.names), taken.remarks) == (5, ())
+    return pick_modes(taken.spectra, 20.0, HIGHEST)
+
+
+LINES = {
+    "hum with harmonics": (sum(tone(60.01 * k, 0.04 / k) for k in (1, 2, 3, 4)), "hum"),
+    "loud hum beside a mode": (tone(50.01, 0.2), "hum"),
+    "a fan between two modes": (tone(137.3, 0.05), "a steady line"),
+    "a tone on a mode": (tone(float(board().damped[2]) + 0.3, 0.03), "a steady line"),
+    "a faint tone": (tone(87.3, 0.003), "a steady line"),
+}
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_a_steady_tone_takes_no_mode_with_it_and_is_named(name):
+    added, kind = LINES[name]
+    found = picked(added)
+
+    truth = board().damped[board().damped < 0.98 * HIGHEST]
+    likely = [mode for mode in found.likely if mode.frequency < 0.98 * HIGHEST]
+    np.testing.assert_allclose([mode.frequency for mode in likely], truth, rtol=5e-4)
+    assert max(mode.amplitude for mode in likely) == 1.0
+    assert kind in {mode.kind for mode in found.modes if not mode.is_likely}
+
+
+BEYOND = {
+    "rumble, slow": tone(1.0, 2.0),
+    "rumble, quick": tone(9.0, 0.3),
+    "an offset": np.ones(AT.size),
+    "a whistle": tone(3100.0, 0.1),
+    "two whistles": tone(1000.3, 0.1) + tone(2400.0, 0.1),
+}
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_what_lies_beyond_the_band_refuses_no_tap_and_makes_no_mode(name):
+    found = picked(BEYOND[name])
+
+    truth = board().damped[board().damped < 0.98 * HIGHEST]
+    np.testing.assert_allclose([m.frequency for m in found.likely if m.frequency < 0.98 * HIGHEST], truth, rtol=5e-4)
+
+
+def test_a_tone_alone_is_no_hit():
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(AT.size)
+
+    assert find_hits(Recording("tone.wav", RATE, tone(1000.0, 1.0) + noise)) == []
+
+
+def gated(heard: np.ndarray, threshold: float, fade: float) -> np.ndarray:
+    """What a noise gate leaves: it shuts, within some time, where the level stays below a threshold for 50 ms."""
+    loud = np.flatnonzero(np.abs(heard) > threshold)
+    since = AT - AT[loud[np.maximum(np.searchsorted(loud, np.arange(AT.size), side="right") - 1, 0)]]
+    return heard * np.clip(1.0 - (since - 0.05) / fade, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("threshold", "fade"), [(0.008, 0.005), (0.008, 0.05), (0.02, 0.02)])
+def test_what_a_noise_gate_cuts_off_is_not_used_and_it_is_named(threshold, fade):
+    taken = take([[Recording("gate.wav", RATE, gated(taps(), threshold, fade))]], HIGHEST)
+    found = pick_modes(taken.spectra, 20.0, HIGHEST)
+
+    truth = board().damped[board().damped < 0.98 * HIGHEST]
+    np.testing.assert_allclose([m.frequency for m in found.likely if m.frequency < 0.98 * HIGHEST], truth, rtol=2e-3)
+    (told,) = taken.remarks
+    assert told.startswith("gate.wav: the sound breaks off ")
+    assert "a noise gate" in told
+
+
+def test_a_gate_that_leaves_too_little_is_named_in_the_refusal():
+    heard = np.where((AT - 0.5) % 1.4 < 0.15, taps(), 0.0)
+
+    with pytest.raises(InputError, match=r"time to ring down, .*digital silence between: switch off the noise gate"):
+        take([[Recording("gate.wav", RATE, heard)]], HIGHEST)
+
+
+def test_rounding_to_nothing_is_no_gate():
+    """A soft recording of 16 bits whose end is smaller than the last of them."""
+    heard = np.round(200.0 * taps()) / 2.0**15
+
+    assert take([[Recording("soft.wav", RATE, heard)]], HIGHEST).remarks == ()
