@@ -20,9 +20,11 @@ from numpy.typing import NDArray
 from bayesplate.cards import PriorCard
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.verdict import WITHIN, Answer, answer_words, answers
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import with_forms
 from bayesplate.planning.beliefs import (
     N_TERMS,
@@ -113,12 +115,6 @@ def _explanation(found: Found, answer: Answer, probability: float, rng: np.rando
     start[:, :n], start[:, first:] = table.moved[cells], z
     slopes = design @ np.linalg.inv(turn)
     shift = own.middle + table.shift[cells] - np.einsum("tru,tu->tr", slopes, start)
-    shift[:, ~own.is_mode] = np.nan
-    rows = np.arange(own.n_modes)
-    if hypothesis.swap is not None:
-        rows[[hypothesis.swap.first, hypothesis.swap.second]] = hypothesis.swap.second, hypothesis.swap.first
-    same = (own.rows[rows, None] == base.rows) & own.is_mode[rows, None]
-    taken = np.where(same.any(axis=1), same.argmax(axis=1), -1)
     middle, gradient = log_moduli(base.board, base.log_rigidities)
     return Explanation(
         members=hypothesis.members,
@@ -130,8 +126,19 @@ def _explanation(found: Found, answer: Answer, probability: float, rng: np.rando
         middle=np.tile(middle, (N_TERMS, 1)),
         wanted=np.tile(np.pad(gradient, ((0, 0), (0, n_u - first))), (N_TERMS, 1, 1)),
         forms=forms,
-        again=AtHand(shift[:, rows], slopes[:, rows], taken),
+        again=_at_hand(hypothesis, own, base, shift, slopes),
     )
+
+
+def _at_hand(hypothesis: Hypothesis, own: Baseline, base: Baseline, shift: Floats, slopes: Floats) -> AtHand:
+    """The readings as a hypothesis takes them, of its own labels: what is expected of each of these modes is given."""
+    rows = np.arange(own.n_modes)
+    if hypothesis.swap is not None:
+        rows[[hypothesis.swap.first, hypothesis.swap.second]] = hypothesis.swap.second, hypothesis.swap.first
+    is_mode = own.is_mode[rows]
+    same = (own.rows[rows, None] == base.rows) & is_mode[:, None]
+    expected = np.where(is_mode, shift[:, rows], np.nan)
+    return AtHand(expected, slopes[:, rows], np.where(same.any(axis=1), same.argmax(axis=1), -1))
 
 
 def _sizes(found: Found, answer: Answer, cells: Rows, first: int) -> tuple[tuple[FormTerms, ...], Floats, Floats]:

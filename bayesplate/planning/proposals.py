@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard
@@ -131,20 +131,17 @@ class Planner:
         listed += self._of_looks()
         for one in further_boards(self.beliefs, priors, shared):
             minutes = self.costs.board + len(one.labels) * self.costs.reading
-            about, where = one.sentence, ("board", "", one.like.setups[0].name)
-            listed.append(self._proposal(where, one.sentence, minutes, one.readings, about, labels=one.labels))
+            setup, told = one.like.setups[0].name, one.sentence
+            listed.append(self._proposal("board", "", setup, told, minutes, one.readings, told, one.labels))
         kept = [one for one in listed if one.entry.gain.score > least]
         return tuple(sorted(kept, key=lambda one: -one.entry.gain.score))
 
     def _proposal(
-        self, where: tuple[str, str, str], sentence: str, minutes: float, readings: Readings, about: str,
-        known: KnownBoard | None = None, read: StationReadings | None = None, rows: tuple[int, ...] = (), spot: int = 0,
-        labels: tuple[str, ...] = (),
+        self, what: str, board: str, setup: str, sentence: str, minutes: float, readings: Readings, about: str,
+        modes: tuple[str, ...] = (),
     ) -> Proposal:  # fmt: skip
-        if read is not None:
-            labels = tuple(str(read.law.station.setup.labels[i]) for i in rows)
-        entry = ProposalEntry(*where, sentence, minutes, labels, self.gain(readings, minutes))
-        return Proposal(entry, readings, about, known, read, rows, spot)
+        entry = ProposalEntry(what, board, setup, sentence, minutes, modes, self.gain(readings, minutes))
+        return Proposal(entry, readings, about)
 
     def _of_modes(self, known: KnownBoard) -> Iterator[Proposal]:
         """Frequencies: further modes, the same again, the same with a known mass, and the board held another way."""
@@ -166,8 +163,9 @@ class Planner:
         def made(
             what: str, told: str, minutes: float, readings: Readings, rows: tuple[int, ...], spot: int = 0
         ) -> Proposal:
-            place, minutes = (what, name, station.setup.name), minutes + len(rows) * costs.reading
-            return self._proposal(place, told, minutes, readings, about, known, read, rows, spot)
+            labels, minutes = tuple(str(station.setup.labels[i]) for i in rows), minutes + len(rows) * costs.reading
+            one = self._proposal(what, name, station.setup.name, told, minutes, readings, about, labels)
+            return replace(one, known=known, read=read, rows=rows, spot=spot)
 
         for some in self._best_modes(read):
             rows, readings = tuple(read.rows[i] for i in some), read.further.some(some)
@@ -213,9 +211,9 @@ class Planner:
                 continue
             of = "" if is_shared or len(self.beliefs.boards) == 1 else f", board {name}"
             told = one.sentence.replace("to the board", "to every board") if is_shared else one.sentence + of
-            where = ("size", "" if is_shared else name, "")
-            about, readings = f"{name}: {one.parameter.name}", input_readings(self.beliefs, known, one)
-            yield self._proposal(where, told, one.n * self.costs.reading, readings, about)
+            about, minutes = f"{name}: {one.parameter.name}", one.n * self.costs.reading
+            readings, its = input_readings(self.beliefs, known, one), "" if is_shared else name
+            yield self._proposal("size", its, "", told, minutes, readings, about)
 
     def _of_looks(self) -> Iterator[Proposal]:
         """Effects that are looked at without a frequency."""
@@ -223,7 +221,7 @@ class Planner:
             readings, name = look_readings(self.beliefs, effect), self.beliefs.boards[0].board.name
             if readings is not None:
                 minutes = look.n * self.costs.reading
-                yield self._proposal(("size", name, ""), look.sentence, minutes, readings, effect)
+                yield self._proposal("size", name, "", look.sentence, minutes, readings, effect)
 
     def sequences(self, listed: Sequence[Proposal]) -> tuple[tuple[tuple[Proposal, ...], SequenceEntry], ...]:
         """The best two and the best three together, found one by one: each goes with those found before it.

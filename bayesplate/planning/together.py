@@ -69,7 +69,7 @@ def beliefs_together(
     known = list(beliefs.boards)
     for i in _telling(known):
         board, values = known[i].board, known[i].values
-        ways = (bare_law(board, way, values) for way in new_stations(board, values, priors[i]))
+        ways = (_from_estimate(bare_law(board, way, values)) for way in new_stations(board, values, priors[i]))
         known[i] = replace(known[i], laws=(*known[i].laws, *ways))
     return replace(beliefs, boards=tuple(known))
 
@@ -120,7 +120,7 @@ def _linear(board: Board, prior: PriorCard, shared: Sequence[Shared]) -> _Linear
     """Solve a board at its least-squares estimate, and take the slopes there."""
     estimate = weighted_least_squares(board)
     noise = np.array([setup.noise.median for setup in board.setups]) * noise_widenings(board, estimate.residuals)
-    laws = tuple(_with_peaks(law) for law in laws_of(board, estimate.values, prior, is_elsewhere=False))
+    laws = tuple(_from_estimate(_with_peaks(law)) for law in laws_of(board, estimate.values, prior, is_elsewhere=False))
     return _judged(board, prior, shared, estimate.values, noise, laws)
 
 
@@ -146,6 +146,11 @@ def _telling(boards: Sequence[KnownBoard]) -> list[int]:
     """The boards that tell most of what is shared."""
     told = [0.0 if one.pull is None else float(np.trace(one.pull)) for one in boards]
     return sorted(range(len(told)), key=lambda i: -told[i])[:_TELLING]
+
+
+def _from_estimate(law: BareLaw) -> BareLaw:
+    """The law counted from the estimate, where all columns of u are zero, inputs and what is shared among them."""
+    return replace(law, middle=law.solved[0])
 
 
 def _with_peaks(law: BareLaw) -> BareLaw:
@@ -239,7 +244,7 @@ def _cut(one: KnownBoard, noise: Floats, prior: PriorCard, shared: Sequence[Shar
     values = {name: value for name, value in one.values.items() if name in bare.inputs or name in RIGIDITIES}
     values |= {name: np.asarray(SHORT * float(one.values[name])) for name in halved}
     law = laws_of(bare, values, prior, is_elsewhere=False)[0]
-    read = law.station.setup.readings[: one.laws[0].station.n_old]
+    read = law.station.setup.readings[: len(board.setups[0].readings)]
     station = replace(law.station, base=replace(law.station.base, readings=read), n_old=len(read))
     return _judged(bare, prior, shared, values, noise, (replace(law, station=station),)).known
 

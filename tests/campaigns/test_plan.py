@@ -118,6 +118,10 @@ def test_modes_to_look_for_have_a_sheet_with_the_sensor_where_it_stands(posed, p
         (asked,) = [one.entry for one in listed if (one.entry.board, one.entry.setup) == (bench.board, bench.setup)
                     and one.entry.what in ("modes", "edges")]  # fmt: skip
         assert {mode.label for mode in bench.modes} == set(asked.modes)
+        (law,) = [law for one in planner.beliefs.boards for law in one.laws
+                  if (one.board.name, law.station.setup.name) == (bench.board, bench.setup)]  # fmt: skip
+        at_estimate = dict(zip(map(str, law.station.setup.labels), np.exp(law.solved[0]), strict=True))
+        assert [mode.hz for mode in bench.modes] == pytest.approx([at_estimate[mode.label] for mode in bench.modes])
         assert all(mode.low_hz < mode.hz < mode.high_hz for mode in bench.modes)
         if asked.what == "edges":
             continue

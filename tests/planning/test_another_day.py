@@ -10,7 +10,9 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, setup_of
 
+from bayesplate.diagnosis.evidence.hypotheses import Swap
 from bayesplate.planning.beliefs import AtHand, Explanation
+from bayesplate.planning.explained import _at_hand
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import REPEATED, _expected, given_first
 from bayesplate.plate.parameter import Owner
@@ -120,3 +122,28 @@ def test_a_reading_that_is_no_mode_or_an_unread_one_says_nothing_of_another_day(
     taken = np.array([1, 0, np.nan, np.nan, 4, 5])
     assert shift[0] == pytest.approx(np.r_[102.0 + taken, N, taken + N + 1, 2 * N + 1], nan_ok=True)
     assert read_as(None)[0][0] == pytest.approx(np.arange(2.0 * (N + 1)))
+
+
+def at_hand(rows, swap=None):
+    """Of eight readings, which are the modes 2 to 9 by their labels, what an explanation with other labels expects."""
+    of_label, taken = np.arange(2, 10), np.asarray(rows)
+    base, own = SimpleNamespace(rows=of_label), SimpleNamespace(n_modes=8, rows=taken, is_mode=taken >= 0)
+    shift, slopes = 10.0 + np.arange(8.0)[None], np.arange(8.0)[None, :, None]
+    return _at_hand(SimpleNamespace(swap=swap), own, base, shift, slopes)
+
+
+def test_an_exchange_of_two_labels_expects_each_peak_where_the_other_mode_is():
+    found = at_hand(range(2, 10), Swap(3, 5))
+
+    exchanged = [0, 1, 2, 5, 4, 3, 6, 7]
+    assert found.taken.tolist() == exchanged
+    assert found.shift[0] == pytest.approx(10.0 + np.array(exchanged))
+    assert found.slopes[0, :, 0] == pytest.approx(exchanged)
+
+
+def test_a_reading_taken_for_an_unread_mode_has_no_label_and_one_taken_for_none_is_not_expected():
+    found = at_hand([2, 3, 5, 4, 30, -1, 8, 9])
+
+    assert found.taken.tolist() == [0, 1, 3, 2, -1, -1, 6, 7]
+    assert np.flatnonzero(np.isnan(found.shift[0])).tolist() == [5]
+    assert found.shift[0, 2] == 12.0  # its own arrays are those of the mode that it is taken for
