@@ -55,7 +55,7 @@ def to_arviz(tree: Any) -> Any:
     arviz = load_arviz()
     if "InferenceData" in vars(arviz):  # 1.3 answers to the name with a warning, and has a tree behind it
         return arviz.InferenceData.from_datatree(tree)
-    return tree
+    return tree.copy()
 
 
 def write_tree(path: Path, tree: Any) -> None:

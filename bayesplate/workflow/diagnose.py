@@ -39,7 +39,6 @@ from bayesplate.plate.material import MODULI
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots
-from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import BEFORE, DIAGNOSIS, run_of_its_own
 from bayesplate.results.summary import Summary
@@ -93,8 +92,7 @@ class DiagnoseResult:
 
     def to_arviz(self) -> Any:
         """The draws of the model that the diagnosis ends with, as of `bayesplate.FitResult.to_arviz`."""
-        attributes = attributes_of(self.after.inference, self.summary, self.after.problem.prepared.card_text)
-        return to_arviz(posterior_tree(self.after.inference, self.after.draws, attributes))
+        return self.after.to_arviz()
 
     def to_json(self) -> dict[str, Any]:
         """The content of diagnosis.json."""

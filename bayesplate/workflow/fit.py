@@ -7,20 +7,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.files import write_text, writing
 from bayesplate.frequencies.laws import LawName
-from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import FitPlots
-from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz, write_tree
+from bayesplate.results.archive import write_tree
 from bayesplate.results.contract import json_text
 from bayesplate.results.folder import ARCHIVE, PAGE, SUMMARY, run_of_its_own
 from bayesplate.results.summarise import unconverged_summary
-from bayesplate.results.summary import Summary, versions
+from bayesplate.results.summary import versions
 from bayesplate.workflow.arguments import require_arguments
 from bayesplate.workflow.campaign import Campaign, problem_or_campaign
 from bayesplate.workflow.fitting import Fitted, fitted, not_converged, opened
@@ -34,42 +33,21 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FitResult:
-    """What a fit leaves.
+class FitResult(Fitted):
+    """What a fit leaves, and where.
 
     Attributes
     ----------
     folder : Path or None
         Where its files are; None if none were asked for.
-    problem : Problem
-    summary : Summary
-        What summary.json holds: constants, modes, errors, the sampler's health.
-    inference : Inference
-        Chains and the verdict of the convergence gate.
-    draws : Draws
-        The thinned posterior by name.
     """
 
-    folder: Path | None
-    problem: Problem
-    summary: Summary
-    inference: Inference
-    draws: Draws
+    folder: Path | None = None
 
     @cached_property
     def plot(self) -> FitPlots:
         """The figures: `result.plot.constants()`."""
         return FitPlots(self.inference, self.draws, self.summary)
-
-    def to_arviz(self) -> Any:
-        """The draws as ArviZ works with them: InferenceData in ArviZ 0.23, DataTree in 1.x; as in posterior.nc.
-
-        Returns
-        -------
-        arviz.InferenceData or xarray.DataTree
-        """
-        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card_text)
-        return to_arviz(posterior_tree(self.inference, self.draws, attributes))
 
     def __repr__(self) -> str:
         return repr(self.summary).replace("<Summary", "<FitResult", 1)
@@ -152,19 +130,19 @@ def fit(
     def refuse(inference: Inference) -> None:
         refuse_unconverged(inference, seed, problem, run.path)
 
-    result = fitted(problem, seed, run.checkpoints(), refuse, progress)
+    found = fitted(problem, seed, run.checkpoints(), refuse, progress)
+    result = FitResult(found.problem, found.inference, found.draws, found.summary, run.path)
     if run.folder is not None:
         write_fit(run.folder.path, result)
         if report:
             write_page(run.folder.path, result)
         run.folder.close()
-    return FitResult(run.path, problem, result.summary, result.inference, result.draws)
+    return result
 
 
 def write_fit(folder: Path, result: Fitted) -> None:
     """Write summary and archive of a fit into a folder that is there."""
-    attributes = attributes_of(result.inference, result.summary, result.problem.prepared.card_text)
-    write_tree(folder / ARCHIVE, posterior_tree(result.inference, result.draws, attributes))
+    write_tree(folder / ARCHIVE, result.tree)
     write_text(folder / SUMMARY, json_text(result.summary))
 
 

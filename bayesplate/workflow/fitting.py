@@ -7,7 +7,9 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from bayesplate.errors import CheckpointError, NotConvergedError
 from bayesplate.plate.board import Board
@@ -20,6 +22,7 @@ from bayesplate.posterior.likely_labels import with_likely_labels
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.posterior.reweighting import linear_is_enough, linearisation
 from bayesplate.posterior.sampling import Progress, SamplerSettings
+from bayesplate.results.archive import attributes_of, posterior_tree, to_arviz
 from bayesplate.results.folder import OutputFolder
 from bayesplate.results.summarise import summarise
 from bayesplate.results.summary import Summary, versions
@@ -34,14 +37,32 @@ class Fitted:
     ----------
     problem : Problem
     inference : Inference
+        Chains and the verdict of the convergence gate.
     draws : Draws
+        The thinned posterior by name.
     summary : Summary
+        What summary.json holds: constants, modes, errors, the sampler's health.
     """
 
     problem: Problem
     inference: Inference
     draws: Draws
     summary: Summary
+
+    @cached_property
+    def tree(self) -> Any:
+        """The draws as posterior.nc holds them: an xarray.DataTree."""
+        attributes = attributes_of(self.inference, self.summary, self.problem.prepared.card_text)
+        return posterior_tree(self.inference, self.draws, attributes)
+
+    def to_arviz(self) -> Any:
+        """The draws as ArviZ works with them: InferenceData in ArviZ 0.23, DataTree in 1.x; as in posterior.nc.
+
+        Returns
+        -------
+        arviz.InferenceData or xarray.DataTree
+        """
+        return to_arviz(self.tree)
 
 
 @dataclass(frozen=True, eq=False)
