@@ -7,7 +7,6 @@ from pathlib import Path
 from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.picking import Picked
 from bayesplate.recordings.responses import averaged
-from bayesplate.recordings.taking import Heard
 from bayesplate.report.page import from_template, save_page
 from bayesplate.report.recordings_figures import every_picture
 from bayesplate.report.saving import drawing
@@ -18,7 +17,7 @@ RECORDINGS_PAGE = "recordings.html"
 
 
 @drawing()
-def write_recordings_page(folder: Path, report: PickReport, picked: Picked, heard: Heard) -> Path:
+def write_recordings_page(folder: Path, report: PickReport, picked: Picked) -> Path:
     """Write the page and its figures as PNG and SVG.
 
     Parameters
@@ -27,7 +26,6 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked, hear
         Made if it is not there.
     report : PickReport
     picked : Picked
-    heard : Heard
 
     Returns
     -------
@@ -37,7 +35,7 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked, hear
     aside = [peak for peak in report.peaks if not peak.is_likely]
     return save_page(
         folder / RECORDINGS_PAGE,
-        {"every": every_picture(report, averaged(heard), picked.paths)},
+        {"every": every_picture(report, averaged(picked.spectra), picked.paths)},
         lambda pictures: from_template(
             "recordings.html",
             title=", ".join(report.files[:3]) + (" and others" if len(report.files) > 3 else ""),
