@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.recordings.hits import Hit
-from bayesplate.recordings.taking import Heard
+from bayesplate.recordings.spectra import Spectra
 
 Floats = NDArray[np.float64]
-_BEFORE = 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,59 +35,26 @@ class Averaged:
     n_hits: int
 
 
-def averaged(heard: Heard) -> tuple[Averaged, ...]:
-    """The response of each pair of places.
+def averaged(spectra: Spectra) -> tuple[Averaged, ...]:
+    """The response of each pair of places, from what rings down after the hits.
 
     H1 is the sum over hits of the conjugate of the force times the response, over the sum of the force's power: noise
     of the response averages out of it. The coherence is the share of the response's power that the force explains.
     """
-    spectra = heard.spectra
-    responses, forces = _whole(heard) if heard.hits else (spectra.values, spectra.force)
     found = []
     for place in range(len(spectra.between)):
         own = spectra.places == place
-        y = responses[:, own]
-        coherence = None
-        if forces is None:
+        y, coherence = spectra.values[:, own], None
+        if spectra.force is None:
             y = y / np.maximum(np.sqrt(np.mean(np.abs(y) ** 2, axis=0)), 1e-300)
             level = np.sqrt(np.mean(np.abs(y) ** 2, axis=1))
         else:
-            f = forces[:, own]
+            f = spectra.force[:, own]
             power = np.maximum(np.sum(np.abs(f) ** 2, axis=1), 1e-300)
             cross = np.sum(f.conj() * y, axis=1)
             level = np.abs(cross) / power
-            if own.sum() > 1 and heard.hits:
+            if own.sum() > 1:
                 coherence = np.abs(cross) ** 2 / power / np.maximum(np.sum(np.abs(y) ** 2, axis=1), 1e-300)
         name = spectra.names[int(np.flatnonzero(own)[0])].rpartition(" hit ")[0] or spectra.names[0]
         found.append(Averaged(name, spectra.frequency, level, coherence, int(own.sum())))
     return tuple(found)
-
-
-def _whole(heard: Heard) -> tuple[NDArray[np.complex128], NDArray[np.complex128] | None]:
-    """Spectra of force and response from before each hit on: decays alone would lack what happens under it."""
-    from scipy.fft import rfft
-
-    spectra = heard.spectra
-    n_lines = spectra.frequency.size
-    responses, forces = [], []
-    for recording, hits in heard.hits:
-        n = round(spectra.duration * recording.rate)
-        for hit in hits:
-            first = max(hit.onset - round(_BEFORE * recording.rate), 0)
-            responses.append(rfft(_cut(recording.response, first, first + n))[:n_lines])
-            if recording.force is not None:
-                forces.append(rfft(_pulse(recording.force, hit, first, n))[:n_lines])
-    return np.stack(responses, axis=1), np.stack(forces, axis=1) if len(forces) == len(responses) else None
-
-
-def _cut(signal: Floats, first: int, last: int) -> Floats:
-    cut = signal[first:last]
-    return np.pad(cut, (0, last - first - cut.size))
-
-
-def _pulse(force: Floats, hit: Hit, first: int, n: int) -> Floats:
-    """The force of one hit; beyond the pulse it is noise and left out."""
-    pulse = np.zeros(n)
-    length = min(hit.start - first, n)
-    pulse[:length] = force[first : first + length] - np.median(force)
-    return pulse

@@ -92,12 +92,12 @@ def decay_spectra(heard: Sequence[tuple[Recording, Sequence[Hit]]], highest: flo
     -------
     Spectra
     """
-    from scipy.fft import rfft
+    from scipy.fft import prev_fast_len, rfft
 
     rate = heard[0][0].rate
     every = [(recording, number, hit) for recording, hits in heard for number, hit in enumerate(hits, start=1)]
     shortest = min(hit.stop - hit.start for _, _, hit in every)
-    n_samples = _fast(min(shortest, round(LONGEST_DURATION * rate)))
+    n_samples = prev_fast_len(min(shortest, round(LONGEST_DURATION * rate)), real=True)
     n_lines = min(int(_ABOVE * highest * n_samples / rate) + 1, n_samples // 2)
     frequency = np.arange(n_lines) * rate / n_samples
     columns, forces = [], []
@@ -171,16 +171,3 @@ def _grouped(
     order = list(dict.fromkeys(keys))
     places = np.array([order.index(key) for key in keys], dtype=np.intp)
     return places, tuple(between[keys.index(key)] for key in order)
-
-
-def _fast(length: int) -> int:
-    """The longest length up to this one of which transforms are fast: 2^a 3^b 5^c."""
-    best = 1
-    five = 1
-    while five <= length:
-        three = five
-        while three <= length:
-            best = max(best, three << int(np.log2(length // three)))
-            three *= 3
-        five *= 5
-    return best

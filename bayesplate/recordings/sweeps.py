@@ -1,8 +1,8 @@
-"""Exponential sine sweeps to impulse responses: the response is turned back by the sweep's inverse filter.
+"""Exponential sine sweeps to impulse responses: the response is divided by the sweep, frequency by frequency.
 
 An exponential sweep x(t) = sin(K (exp(t / L) - 1)) with L = T / ln(f2 / f1) and K = 2 pi f1 L passes each octave in
-the same time. Reversed in time, with a level that falls by 6 dB an octave, it is its own inverse; what the loudspeaker
-adds in harmonics comes out before the impulse response and is cut away.
+the same time, so that what the loudspeaker adds in harmonics comes out before the impulse response and is cut away.
+Where another sweep was played, its frequencies come out one after the other: that is no impulse, and is refused.
 
 References
 ----------
@@ -56,16 +56,6 @@ class Sweep:
         scale = self.duration / np.log(self.last / self.first)
         return np.asarray(np.sin(2.0 * np.pi * self.first * scale * np.expm1(times / scale)))
 
-    def inverse(self, rate: float) -> Floats:
-        """Its inverse filter: reversed, and falling with the frequency: (n_samples,) array."""
-        signal = self.signal(rate)
-        falling = np.exp(-np.arange(signal.size) / rate * np.log(self.last / self.first) / self.duration)
-        reverse = signal[::-1] * falling
-        # at the middle of the band sweep and inverse together have a gain of one
-        middle = np.sqrt(self.first * self.last)
-        at = np.exp(-2j * np.pi * middle / rate * np.arange(signal.size))
-        return np.asarray(reverse / abs((signal @ at) * (reverse @ at)))
-
 
 def read_sweep(text: str) -> Sweep:
     """A sweep from its parameters, "F1,F2,SECONDS".
@@ -105,13 +95,8 @@ def impulse_response(recording: Recording, sweep: Sweep | Floats) -> tuple[Recor
     InputError
         If what comes out is no impulse response: the sweep was another.
     """
-    from scipy.signal import oaconvolve
-
     rate = recording.rate
-    if isinstance(sweep, Sweep):
-        whole = oaconvolve(recording.response, sweep.inverse(rate))
-    else:
-        whole = _divided(recording.response, sweep)
+    whole = _divided(recording.response, sweep.signal(rate) if isinstance(sweep, Sweep) else sweep)
     onset = int(np.argmax(np.abs(whole)))
     about, apart = round(_ABOUT * rate), round(_APART * rate)
     before = np.sum(whole[max(onset - apart - about, 0) : max(onset - apart, 0)] ** 2)

@@ -31,14 +31,11 @@ class Heard:
     Attributes
     ----------
     spectra : Spectra
-    hits : tuple of (Recording, tuple of Hit)
-        Those that were used; empty for frequency responses.
     remarks : tuple of str
         What was left out, and why.
     """
 
     spectra: Spectra
-    hits: tuple[tuple[Recording, tuple[Hit, ...]], ...]
     remarks: tuple[str, ...]
 
 
@@ -70,7 +67,7 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
         if padding > 1:
             told = f"of every {padding} lines one was measured and is used, the others are interpolated"
             remarks.append(f"{responses[0].name}: {told}")
-        return Heard(response_spectra(responses, highest, padding), (), tuple(remarks))
+        return Heard(response_spectra(responses, highest, padding), tuple(remarks))
     recordings = [one for one in every if isinstance(one, Recording)]
     faults = _recording_faults(recordings, highest)
     pulses = [one for one in recordings if one.force is None and is_pulse(one.response, one.rate)]
@@ -97,7 +94,7 @@ def take(files: Sequence[Sequence[Read]], highest: float) -> Heard:
     kept, short = _without_short(heard)
     spectra = decay_spectra(kept, highest)
     remarks += [*short, *_risen(kept, spectra.duration)]
-    return Heard(spectra, tuple((one, tuple(hits)) for one, hits in kept), tuple(remarks))
+    return Heard(spectra, tuple(remarks))
 
 
 def _hit_faults(one: Recording, hits: Sequence[Hit]) -> list[Fault]:
@@ -144,8 +141,8 @@ def take_impulses(impulses: Sequence[tuple[Recording, Hit]], highest: float) -> 
     ]
     if faults:
         raise InputError(faults)
-    hits = tuple((one, (hit,)) for one, hit in impulses)
-    return Heard(decay_spectra(hits, highest), hits, tuple(told for one, _ in impulses for told in one.remarks))
+    spectra = decay_spectra([(one, (hit,)) for one, hit in impulses], highest)
+    return Heard(spectra, tuple(told for one, _ in impulses for told in one.remarks))
 
 
 def _response_faults(every: Sequence[Read], responses: Sequence[FrequencyResponse]) -> list[Fault]:

@@ -12,7 +12,6 @@ from bayesplate.recordings.contract import PickedRow, PickReport
 from bayesplate.recordings.modes_found import Path as FoundPath
 from bayesplate.recordings.picking import Picked
 from bayesplate.recordings.responses import Averaged, averaged
-from bayesplate.recordings.taking import Heard
 from bayesplate.report.modes import short_label
 from bayesplate.report.page import from_template, save_page
 from bayesplate.report.saving import drawing
@@ -167,7 +166,7 @@ RECORDINGS_PAGE = "recordings.html"
 
 
 @drawing()
-def write_recordings_page(folder: Path, report: PickReport, picked: Picked, heard: Heard) -> Path:
+def write_recordings_page(folder: Path, report: PickReport, picked: Picked) -> Path:
     """Write the page and its figures as PNG and SVG.
 
     Parameters
@@ -176,7 +175,6 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked, hear
         Made if it is not there.
     report : PickReport
     picked : Picked
-    heard : Heard
 
     Returns
     -------
@@ -186,7 +184,7 @@ def write_recordings_page(folder: Path, report: PickReport, picked: Picked, hear
     aside = [peak for peak in report.peaks if not peak.is_likely]
     return save_page(
         folder / RECORDINGS_PAGE,
-        {"every": every_picture(report, averaged(heard), picked.paths)},
+        {"every": every_picture(report, averaged(picked.spectra), picked.paths)},
         lambda pictures: from_template(
             "recordings.html",
             title=", ".join(report.files[:3]) + (" and others" if len(report.files) > 3 else ""),

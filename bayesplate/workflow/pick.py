@@ -144,7 +144,7 @@ def pick(
     picked = pick_modes(heard.spectra, lowest, highest)
     summary = _summary(files, heard, picked, prepared, polarity, pictures, sensor_mass)
     if out is not None:
-        _write(Path(out), targets, summary, picked, heard)
+        _write(Path(out), targets, summary, picked)
     return PickResult(summary, picked, None if out is None else Path(out))
 
 
@@ -261,11 +261,11 @@ def _each_once(named: Mapping[int, tuple[str, float]]) -> dict[int, tuple[str, f
     return {number: one for number, one in named.items() if best[one[0]] == number}
 
 
-def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked, heard: Heard) -> None:
+def _write(folder: Path, targets: Sequence[Path], summary: PickReport, picked: Picked) -> None:
     from bayesplate.report.recordings import write_recordings_page
 
     make_folder(folder / FIGURES)
     fragment, _, numbers = targets
     write_text(fragment, summary.fragment)
     write_text(numbers, json_text(summary))
-    write_recordings_page(folder, summary, picked, heard)
+    write_recordings_page(folder, summary, picked)

@@ -80,7 +80,7 @@ def test_residues_between_the_places_have_the_signs_and_sizes_of_the_shapes(pick
 
 def test_the_averaged_response_is_the_board_and_its_coherence_falls_in_the_noise(heard):
     """H1 near resonances against the modal sum; the coherence of three hits is near one there."""
-    one = averaged(heard)[0]
+    one = averaged(heard.spectra)[0]
     truth = board().damped[1:8]
     at = [int(np.argmin(np.abs(one.frequency - hertz))) for hertz in truth]
 

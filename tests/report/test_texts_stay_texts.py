@@ -109,7 +109,7 @@ def test_a_text_stays_a_text_on_the_page_of_recordings(tmp_path, monkeypatch):
     peaks = (ROW, PickedRow(**{**vars(ROW), "labels": (LabelChance(payload, 0.9),)}))
     report = PickReport(1, (payload, payload), 1, 1, 1.5, 20.0, 200.0, peaks, "same", payload, payload, (payload,))
     (tmp_path / "figures").mkdir()
-    home.write_recordings_page(tmp_path, report, SimpleNamespace(paths=()), SimpleNamespace())
+    home.write_recordings_page(tmp_path, report, SimpleNamespace(paths=(), spectra=None))
     text = (tmp_path / "recordings.html").read_text(encoding="utf-8")
     page = Read(text)
 
