@@ -245,7 +245,8 @@ def _differences(names: Sequence[str], groups: Sequence[dict[int, Seen]], n_reco
             told.append((abs(off), f"{name} {100.0 * abs(off):.2g} % {'higher' if off > 0.0 else 'lower'}"))
     others = "the other" if len(names) == 2 else "the others"
     most = [words for _, words in sorted(told, reverse=True)[: 1 if len(names) == 2 else _MOST_NAMED]]
-    how = f"in frequency ({', '.join(most)} than {others})" if most else "in damping"
+    little = "in damping, or by less than 0.1 % in frequency"
+    how = f"in frequency ({', '.join(most)} than {others})" if most else little
     are_hits = any(" hit " in name for name in names)
     what, which = ("hits" if are_hits else "recordings"), "each"
     if are_hits and len(names) < n_records:

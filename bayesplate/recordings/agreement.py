@@ -24,7 +24,7 @@ _REACH, _LEAST_LINES, _WIDEST = 6.0, 7, 0.03
 """Widths of a peak on either side of it that are fitted, lines at least, and share of its frequency at most."""
 _SURE, _SIMPLE = 0.02, 0.1
 """Error of a pole over its decay rate, and what a fit leaves over the highest line, of records that tell."""
-_ALIKE = 0.035
+_ALIKE = 0.025
 """Root mean square of poles over their decay rates up to which records have the same modes."""
 
 

@@ -18,6 +18,8 @@ _BELOW_LOUDEST = 26.0
 _LOOK_BACK = 5
 _ORDER = 16
 """Samples from which the next one is predicted."""
+_QUIET_BLOCK, _QUIET = 0.05, 0.25
+"""s of a block, and share of the blocks that are quiet."""
 _BOARD_RATE = 4000.0
 """Samples a second that hold what a board rings at: hiss above it is louder than a soft tap."""
 _LONG_BLOCK, _SOFT_RISE = 0.01, 6.0
@@ -26,7 +28,7 @@ _LONG_BLOCK, _SOFT_RISE = 0.01, 6.0
 
 def onsets(response: Floats, rate: float) -> list[int]:
     """First samples of every hit that is heard, by its click in all that was recorded or by how the board rings."""
-    changes = [(_unforeseen(heard), own_rate) for heard, own_rate in heard_as(response, rate)]
+    changes = [(_unforeseen(heard, own_rate), own_rate) for heard, own_rate in heard_as(response, rate)]
     found = np.concatenate([_rises(*change, _BLOCK, _RISE, _ABOVE_FLOOR) for change in changes])
     return _first_of_each(np.sort(np.rint(found * rate).astype(np.intp)), rate)
 
@@ -69,17 +71,21 @@ def _curved(response: Floats) -> Floats:
     return np.diff(response, n=2, prepend=[response[0]] * 2) if response.size else response
 
 
-def _unforeseen(response: Floats) -> Floats:
-    """What a linear prediction by the samples before does not foresee: a hit is a click, ringing and tones go on."""
+def _unforeseen(response: Floats, rate: float) -> Floats:
+    """What a linear prediction learnt where it is quiet does not foresee: hum and tones go on, a hit does not."""
     from scipy.linalg import solve_toeplitz
     from scipy.signal import lfilter
 
     change = _curved(response)
-    after = change[_ORDER:]
-    lags = np.array([after @ change[_ORDER - k : change.size - k] for k in range(_ORDER + 1)])
-    lags[0] *= 1.0 + 1e-9
-    if change.size <= 2 * _ORDER or lags[0] <= 0.0:
+    block = max(round(_QUIET_BLOCK * rate), 2 * _ORDER)
+    n = change.size // block
+    blocks = change[: n * block].reshape(n, block)
+    power = np.sum(blocks**2, axis=1)
+    quiet = blocks[power <= np.quantile(power, _QUIET)] if n else blocks
+    lags = np.array([np.sum(quiet[:, k:] * quiet[:, : block - k]) for k in range(_ORDER + 1)])
+    if lags[0] <= 0.0:
         return change
+    lags[0] *= 1.0 + 1e-9
     weights = solve_toeplitz(lags[:-1], lags[1:])
     rest = np.asarray(lfilter([1.0, *-weights], 1.0, change))
     rest[: _ORDER + 2] = 0.0  # nothing came before

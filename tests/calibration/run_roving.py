@@ -107,8 +107,8 @@ def simulate_one(base_seed: int, index: int) -> Record:
             round(float((elastic[name].mean - value) / elastic[name].sd), 3)
             for name, value in zip(("E_x", "E_y", "G_xy"), moduli, strict=True)
         ],
-        "twice": sum(abs(far) < NEAR for far in off) - len(of_mode),
-        "false": sum(abs(far) >= NEAR for far in off),
+        "twice": int(sum(abs(far) < NEAR for far in off)) - len(of_mode),
+        "false": int(sum(abs(far) >= NEAR for far in off)),
         "missed": int(np.sum(truth < 0.98 * HIGHEST)) - len(of_mode),
     }
 

@@ -86,6 +86,17 @@ def test_a_soft_tap_is_found_in_the_hiss_of_a_wide_band_and_a_softer_one_is_told
     assert take([[with_hiss(0.4)]], 500.0).remarks == ()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_ringing_board_is_not_heard_as_a_second_hit(seed):
+    """Little noise: as the higher modes fade, what is left beats and rises now and then."""
+    times = [0.1 + 1.6 * k for k in range(5)]
+    _, heard = hits(np.random.default_rng(seed), times, (0.15, 0.19), (0.52, 0.03), rate=8000.0, seconds=8.0)
+
+    found = find_hits(Recording("tap.wav", 8000.0, heard))
+
+    np.testing.assert_allclose([hit.onset / 8000.0 for hit in found], times, atol=0.004)
+
+
 def test_hum_alone_is_no_hit_where_the_recording_begins():
     times = np.arange(88_200) / 44_100.0
     noise = 1e-3 * np.random.default_rng(3).standard_normal(times.size)
