@@ -47,7 +47,7 @@ def known_effects(boards: Sequence[str]) -> dict[str, tuple[KnownModel, ...]]:
     dict of tuple of KnownModel
         By board; the board as it stands first.
     """
-    return {board: known_models(known_fits(Problem.from_card(board).posed, {})) for board in boards}
+    return {board: known_models(known_fits(Problem.from_card(board).posed)) for board in boards}
 
 
 def rows(found: Mapping[str, Sequence[KnownModel]]) -> list[tuple[str | float | None, ...]]:

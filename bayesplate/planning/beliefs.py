@@ -128,7 +128,7 @@ def believed(found: Found, survivors: Sequence[Answer], rng: np.random.Generator
 def _explained(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Explanation:
     """An answer of the search as terms: cells and levels of noise drawn by what they weigh now."""
     hypothesis = found.ground.hypotheses[answer.index]
-    terms = hypothesis.terms(found.ground.whole)
+    terms = hypothesis.terms
     seen = hypothesis.seen(found.ground.baseline, found.residual[None, :])
     shares = normalised(terms.log_densities(seen)[:, 0])
     picked = picked_by(shares, N_TERMS, rng)
@@ -163,7 +163,7 @@ def picked_by(shares: Floats, n: int, rng: np.random.Generator) -> Rows:
 
 def _conditioned(terms: Terms, seen: Floats, cells: Rows, noise: Floats) -> tuple[Floats, Floats]:
     """Mean and covariance of u in some terms, given the residuals of the readings that are used."""
-    base, used, table = terms.fold.baseline, terms.fold.used, terms.table
+    base, used, table = terms.baseline, terms.baseline.used, terms.table
     sides = np.concatenate([base.slopes, base.input_slopes], axis=1)[used]
     tangents = table.slopes[cells][:, used]
     design = np.concatenate([np.tile(sides, (len(cells), 1, 1)), tangents], axis=2)

@@ -10,8 +10,7 @@ import numpy as np
 from bayesplate.cards import PriorCard
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.verdict import Answer, answers
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.search import PASSES, Found
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.beliefs import Beliefs, believed
 from bayesplate.planning.gains import Gain

@@ -254,10 +254,7 @@ def _modes_taken(one: Explanation, station: Station, found: Found) -> NDArray[np
     baseline, hypothesis = found.ground.baseline, found.ground.hypotheses[one.hypothesis]
     setup = [each.name for each in baseline.board.setups].index(station.base.name)
     here = np.flatnonzero(baseline.setup_index == setup)
-    own = baseline.rows.copy() if hypothesis.own is None else hypothesis.own.rows
-    if hypothesis.swap is not None:
-        pair = [hypothesis.swap.first, hypothesis.swap.second]
-        own[pair] = own[pair[::-1]]
+    own = hypothesis.own.rows
     same = (own[here, None] == baseline.rows[here]) & (own[here, None] >= 0)
     return np.asarray(np.where(same.any(axis=1), same.argmax(axis=1), -1))
 

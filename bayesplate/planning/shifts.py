@@ -78,7 +78,7 @@ def _shares(found: Found, name: str) -> Floats:
     """Probability of each cell of an effect's table, the effect alone being present: (n_cells,) array."""
     hypotheses = found.ground.hypotheses
     one = next(h for h in hypotheses if h.members == (name,) and h.swap is None)
-    terms = one.terms(found.ground.whole)
+    terms = one.terms
     log_density = terms.log_densities(one.seen(found.ground.baseline, found.residual[None, :]))[:, 0]
     return np.asarray(normalised(log_density).reshape(-1, terms.table.n_cells).sum(axis=0))
 

@@ -1,21 +1,20 @@
-"""The claim that an error is reduced: five conditions, each of which must be met."""
+"""The claim that an error is reduced: five conditions, each of which must be met; and what explains it in part."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.verdict import Verdict, answers
-from bayesplate.diagnosis.evidence.folds import Nested, log_score_gains, nested
-from bayesplate.diagnosis.evidence.leverages import carrying
+from bayesplate.diagnosis.decision.sizes import at_limit
+from bayesplate.diagnosis.decision.verdict import Verdict, answers, stands_out, turned
+from bayesplate.diagnosis.evidence.folds import Nested, carrying, log_score_gains, nested
 from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, varied
+from bayesplate.diagnosis.evidence.search import PASSES, Found
+from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, variants, varied
 from bayesplate.estimates.leave_one_out import indices_of
 
 Floats = NDArray[np.float64]
@@ -29,6 +28,10 @@ IMPROBABLE = 0.05
 """What the probability of no effect has to stay below, and that of one that is not told."""
 _FEWEST_GAINS = 2
 """Modes that count without which their gains have no scatter."""
+SURELY = 1e-4
+"""What the probability of no effect has to stay below where something explains the readings in part."""
+FALLS_TO = 2.0 / 3.0
+"""Nested left-out error after over before, at most: it falls by at least a third."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,48 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
             _passes(found.p_value(verdict.index)),
         )
     )
+
+
+def named_in_part(
+    found: Found,
+    verdict: Verdict,
+    control: NullControl,
+    folded: Nested | None = None,
+    others: Iterable[tuple[str, Found]] | None = None,
+) -> tuple[str, ...]:
+    """Effects that explain readings in part though something else remains; none where that cannot be said.
+
+    The verdict stays what it is, nothing is claimed, and the constants are not to be trusted.
+
+    Parameters
+    ----------
+    found : Found
+    verdict : Verdict
+    control : NullControl
+        What calls for an effect in a fold.
+    folded : Nested, optional
+        Of the board's own readings, where it is known already.
+    others : iterable of (str, Found), optional
+        The searches that a name has to survive, as of `bayesplate.diagnosis.decision.verdict.decide`.
+
+    Returns
+    -------
+    tuple of str
+        The members of what comes nearest, if it fails the gate and not the limits of its sizes, no effect is less
+        probable than `SURELY`, the name survives every other assumption, and the nested left-out error falls to
+        `FALLS_TO` or further.
+    """
+    nearest = verdict.nearest
+    if nearest is None or found.none >= SURELY:
+        return ()
+    if found.p_value(nearest.index) >= PASSES or at_limit(found, nearest.index):
+        return ()
+    folded = nested_of(found, control, nearest.index) if folded is None else folded
+    if folded is None or not folded.ratio[0] <= FALLS_TO:  # not a number where no mode is left to judge by
+        return ()
+    if not stands_out(nearest, answers(found)) or turned(found, nearest, variants(found) if others is None else others):
+        return ()
+    return nearest.members
 
 
 def nested_of(found: Found, control: NullControl, index: int = 0) -> Nested | None:

@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.draws import TermDraws, members_of, sizes_of
-from bayesplate.diagnosis.evidence.exact import draw_exact, under_exact_law
+from bayesplate.diagnosis.evidence.draws import sizes_of
 from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.evidence.sensitivity import draw_exact, under_exact_law
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.plate.material import MODULI, moduli
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class ConstantDraws:
-    """Draws of rigidities (N m) and moduli (Pa) by name: (n_draws,) arrays."""
-
-    values: dict[str, Floats]
-
-    def interval(self, name: str, probability: float = 0.9) -> tuple[float, float]:
-        """Equal-tailed interval."""
-        tail = 0.5 * (1.0 - probability)
-        low, high = np.quantile(self.values[name], [tail, 1.0 - tail])
-        return float(low), float(high)
+Constants = Mapping[str, Floats]
+"""Draws of rigidities (N m) and moduli (Pa) by name."""
 
 
 def draw_constants(
-    found: Found, rng: np.random.Generator, n_draws: int, among: Sequence[int] | None = None
-) -> ConstantDraws:
+    found: Found,
+    rng: np.random.Generator,
+    n_draws: int,
+    among: Sequence[int] | None = None,
+    sampled: Mapping[int, Constants] | None = None,
+) -> Constants:
     """Draw the constants from the normal terms of hypotheses, corrected to the exact law by weights.
 
     Parameters
@@ -42,34 +34,39 @@ def draw_constants(
     n_draws : int
     among : sequence of int, optional
         Hypotheses to average over, weighted by their probability; by default all, by that under the exact law.
+    sampled : dict, optional
+        Draws to take in place of these, of hypotheses that were sampled.
 
     Returns
     -------
-    ConstantDraws
+    dict of (n_draws,) array
         Uncertain inputs are drawn along with the constants.
     """
     weighed = (under_exact_law(found) or found) if among is None else found
     indices = np.arange(len(found.ground.hypotheses)) if among is None else np.asarray(among)
     shares = weighed.probability[indices] / weighed.probability[indices].sum()
-    counts = rng.multinomial(n_draws, shares)
-    drawn = [draw_exact(found, int(i), rng, int(n)) for i, n in zip(indices, counts, strict=True) if n]
-    parts = [(one.log_rigidities, *_inputs(found, one)) for one in drawn]
-    log_rigidities, thickness, nu_xy = (np.concatenate(part) for part in zip(*parts, strict=True))
-    values = found.ground.baseline.board.symmetry.rigidities(np.exp(log_rigidities).T, nu_xy)
-    constants = moduli(values["D_x"], values["D_y"], values["D_s"], thickness, nu_xy)
-    return ConstantDraws(values | dict(zip(MODULI, constants, strict=True)))
+    parts: list[Constants] = []
+    for index, n in zip(indices.tolist(), rng.multinomial(n_draws, shares).tolist(), strict=True):
+        if n and sampled and index in sampled:
+            picked = rng.integers(next(iter(sampled[index].values())).size, size=n)
+            parts.append({name: np.ravel(values)[picked] for name, values in sampled[index].items()})
+        elif n:
+            parts.append(_drawn(found, index, rng, n))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _inputs(found: Found, drawn: TermDraws) -> tuple[Floats, Floats]:
-    """Thickness (m) and nu_xy of each draw, where an effect replaces them by its own: (n,) arrays."""
-    names = ("thickness", "poisson_xy")
-    result = [_input(found.ground.baseline, name, drawn.inputs) for name in names]
-    for member in range(len(members_of(found, drawn.index))):
-        for law, rows, values in sizes_of(found, drawn, member):
+def _drawn(found: Found, index: int, rng: np.random.Generator, n_draws: int) -> Constants:
+    """The same under one hypothesis, whose effects may replace thickness (m) and nu_xy by their own."""
+    drawn, symmetry = draw_exact(found, index, rng, n_draws), found.ground.baseline.board.symmetry
+    inputs = {name: _input(found.ground.baseline, name, drawn.inputs) for name in ("thickness", "poisson_xy")}
+    for which in range(len(found.ground.members(index))):
+        for _, law, rows, values in sizes_of(found, index, drawn, which):
             for free in law.form.free:
-                if free.replaces in names:
-                    result[names.index(free.replaces)][rows] = values[free.name]
-    return result[0], result[1]
+                if free.replaces in inputs:
+                    inputs[free.replaces][rows] = values[free.name]
+    D = symmetry.rigidities(np.exp(drawn.log_rigidities).T, inputs["poisson_xy"])
+    constants = moduli(D["D_x"], D["D_y"], D["D_s"], inputs["thickness"], inputs["poisson_xy"])
+    return D | dict(zip(MODULI, constants, strict=True))
 
 
 def _input(baseline: Baseline, name: str, z: Floats) -> Floats:

@@ -8,9 +8,7 @@ import numpy as np
 
 from bayesplate.diagnosis.decision.verdict import CLEARLY, p_words
 from bayesplate.diagnosis.evidence.folds import FEWEST
-from bayesplate.diagnosis.evidence.predictive import PASSES, predictive_p_value
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.evidence.search import PASSES, Found, predictive_p_value
 from bayesplate.frequencies.laws import cents
 
 
@@ -42,16 +40,18 @@ def suspects(found: Found) -> tuple[Suspect, ...]:
     if ground.baseline.n_modes < FEWEST or found.p_value(0) >= PASSES:
         return ()  # too few to tell, or all of them agree
     bare = ground.hypotheses[0]
-    seen = bare.seen(ground.baseline, found.residual[None, :])
-    whole = float(bare.terms(ground.whole).log_evidence(seen)[0])
+    seen = found.seen(0)
+    whole = float(bare.terms.log_evidence(seen)[0])
+    errors = bare.terms.left_out(seen)[1][:, 0]
     told = []
-    for index in np.flatnonzero(bare.terms(ground.whole).fold.baseline.is_mode):
-        fold = Fold(ground.baseline, int(index))
-        p_value = float(predictive_p_value(bare, fold, found.residual[None, :])[0])
+    for index in bare.own.used:
+        rows = bare.own.rows.copy()
+        rows[index] = -1
+        others = bare.labelled(bare.own, rows)
+        p_value = float(predictive_p_value(others, bare.own, seen)[0])
         if p_value >= PASSES:
-            terms = bare.terms(fold)
-            weight = float(terms.log_evidence(seen)[0]) - whole
-            told.append(Suspect(int(index), p_value, float(terms.left_out_errors(seen)[0]), weight))
+            weight = float(others.terms.log_evidence(others.seen(bare.own, seen))[0]) - whole
+            told.append(Suspect(int(index), p_value, float(errors[index]), weight))
     return tuple(sorted(told, key=lambda one: -one.log_weight))
 
 

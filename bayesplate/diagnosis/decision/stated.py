@@ -7,16 +7,18 @@ constants of the first.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.decision.claim import STANDARD_ERRORS, score_gain
-from bayesplate.diagnosis.evidence.combinations import acting_at_known_size, stated_effects
-from bayesplate.diagnosis.evidence.known import KnownFit, predicted_errors
-from bayesplate.diagnosis.evidence.scores import scores_given
+from bayesplate.diagnosis.evidence.known import KnownFit, acting_at_known_size, fit_with, stated_effects
+from bayesplate.diagnosis.evidence.noise_grid import noise_grid, reach_of
+from bayesplate.diagnosis.evidence.terms import Terms
+from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.shifts.tables import nothing
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.board import Board
 from bayesplate.plate.sessions import same_modes
@@ -122,7 +124,7 @@ def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[Stat
     both = np.asarray(np.isfinite(before) & np.isfinite(after))
     both &= (without.errors.leverages.carries < 0) & (having.errors.leverages.carries < 0)
     modes = [mode for mode in same_modes(board) if both[list(mode)].all()]
-    scores = [scores_given(board, one.errors.in_sample, one.slopes, modes) for one in (without, having)]
+    scores = [scores_given(one.baseline, modes) for one in (without, having)]
     claims = [judge_stated(effects, "", before[both], after[both], scores[1] - scores[0])]
     further = [setup.name for setup in board.setups[1:] if _states_differently(board, effects, setup.name)]
     if further:
@@ -132,18 +134,47 @@ def stated_claims(problem: PosedProblem, fits: Sequence[KnownFit]) -> tuple[Stat
 
 def _of_further_setups(problem: PosedProblem, effects: Sequence[str], names: Sequence[str]) -> list[StatedClaim | None]:
     """Setups predicted by the constants of the first."""
-    board = problem.board
-    index = np.repeat(np.arange(len(board.setups)), [len(setup.readings) for setup in board.setups])
-    first = np.flatnonzero(index == 0).tolist()
-    sides = [predicted_errors(problem, one) for one in ((), effects)]
+    n_first = len(problem.board.setups[0].readings)
+    sides = [fit_with(problem, one, n_first) for one in ((), effects)]
     claims = []
-    for number, setup in enumerate(board.setups):
+    for number, setup in enumerate(problem.board.setups):
         if setup.name in names:
-            own = np.flatnonzero(index == number)
-            groups = [[reading] for reading in own.tolist()]
-            scores = [scores_given(board, *side, groups, [first] * len(groups)) for side in sides]
-            claims.append(judge_stated(effects, setup.name, sides[0][0][own], sides[1][0][own], scores[1] - scores[0]))
+            own = np.flatnonzero(sides[0].setup_index == number)
+            scores = [scores_given(one, [[i] for i in own.tolist()], range(n_first)) for one in sides]
+            before, after = (one.residual[own] for one in sides)
+            claims.append(judge_stated(effects, setup.name, before, after, scores[1] - scores[0]))
     return claims
+
+
+def scores_given(fit: Baseline, groups: Sequence[Sequence[int]], given: Iterable[int] | None = None) -> Floats:
+    """ln of the probability density of the readings of each group given others, by constants fitted to all.
+
+    To first order about the fit. The constants are left open and the noise is averaged over its prior, so that neither
+    a better fit to the reading itself nor a noise that follows it can raise its score.
+
+    Parameters
+    ----------
+    fit : Baseline
+        Of fixed inputs.
+    groups : sequence of sequence of int
+        Readings of one mode, in all sessions of a setup.
+    given : iterable of int, optional
+        Readings by which each group is predicted; by default all but its own.
+
+    Returns
+    -------
+    (n_groups,) array
+    """
+    reach = reach_of(fit.board, fit.setup_index, np.where(fit.is_mode, fit.residual, np.nan))
+    noise = noise_grid(fit.board, reach=reach if len(fit.board.setups) <= 2 else ())
+    empty = nothing(fit.n_modes, fit.log_rigidities.size)
+
+    def log_density(used: set[int]) -> float:
+        rows = np.where(np.isin(np.arange(fit.n_modes), list(used)), fit.rows, -1)
+        return float(Terms(empty, fit.labelled(rows), noise).log_evidence(fit.residual[None, :])[0])
+
+    every = set(range(fit.n_modes) if given is None else given)
+    return np.array([log_density(every | set(one)) - log_density(every - set(one)) for one in groups])
 
 
 def _states_differently(board: Board, effects: Sequence[str], name: str) -> bool:

@@ -6,21 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from bayesplate.diagnosis.evidence.draws import draw_terms, members_of, standard_sizes_of
+from bayesplate.diagnosis.decision.sizes import at_limit
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, are_stated
 from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.sensitivity import Variant, variants
-from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.evidence.search import PASSES, Found
+from bayesplate.diagnosis.evidence.sensitivity import variants
 from bayesplate.effects.words import effect_name, effect_names, joined
-from bayesplate.plate.parameter import unit_of_people
-from bayesplate.quantities import Quantity
 
-Floats = NDArray[np.float64]
 Word = Literal["none needed", "named", "indistinguishable group", "unexplained", "undetectable"]
 
 CLEARLY = 3.0
@@ -29,10 +21,6 @@ WITHIN = 10.0
 """Alternatives up to this factor below the best are listed with it."""
 _MOST_RIVALS = 3
 """Of a name that does not survive another assumption: the best there are told."""
-AT_LIMIT = 0.005
-"""Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
-
-_N_DRAWS = 2000
 
 NOTHING_LEFT = "three modes determine the three constants and leave nothing to judge by"
 NOTHING_LEFT_OF_ONE = "one mode determines the one constant and leaves nothing to judge by"
@@ -128,7 +116,7 @@ def answers(found: Found) -> tuple[Answer, ...]:
     return tuple(sorted(listed, key=lambda answer: -answer.support))
 
 
-def decide(found: Found, control: NullControl, others: Iterable[Variant] | None = None) -> Verdict:
+def decide(found: Found, control: NullControl, others: Iterable[tuple[str, Found]] | None = None) -> Verdict:
     """The verdict on one set of readings.
 
     Parameters
@@ -136,8 +124,9 @@ def decide(found: Found, control: NullControl, others: Iterable[Variant] | None 
     found : Found
     control : NullControl
         What the search makes of boards without any effect.
-    others : iterable of Variant, optional
-        The searches that a name has to survive; by default those of `variants`, made only if there is a name.
+    others : iterable of (str, Found), optional
+        The searches that a name has to survive, each with what is assumed there; by default those of `variants`, made
+        only if there is a name.
 
     Returns
     -------
@@ -178,19 +167,19 @@ def stands_out(one: Answer, ranked: Sequence[Answer]) -> bool:
     return all(one.support >= CLEARLY * other.support for other in ranked if other.index != one.index)
 
 
-def turned(found: Found, best: Answer, others: Iterable[Variant]) -> tuple[str, tuple[Answer, ...]] | None:
+def turned(found: Found, best: Answer, others: Iterable[tuple[str, Found]]) -> tuple[str, tuple[Answer, ...]] | None:
     """The first assumption under which a name no longer stands out, and what rivals it there; None if it always does.
 
     A rival is told with the probability that it has without the change.
     """
     usual = {one.index: one for one in answers(found)}
-    for variant in others:
-        there = {one.index: one for one in answers(variant.found)}
+    for words, other in others:
+        there = {one.index: one for one in answers(other)}
         own = there.get(best.index, Answer(best.members, best.index, 0.0))
         rivals = [one for one in there.values() if one.index != best.index and one.support * CLEARLY > own.support]
         if rivals:
             first = sorted(rivals, key=lambda one: -one.support)[:_MOST_RIVALS]
-            return variant.words, tuple(usual.get(one.index, one) for one in first)
+            return words, tuple(usual.get(one.index, one) for one in first)
     return None
 
 
@@ -200,75 +189,10 @@ def _without(found: Found, best: Answer | None) -> Verdict:
     if passed < PASSES:
         reason = f"the misfit is too large for the noise ({p_words(passed)}), but no effect is probable enough"
         return Verdict("unexplained", (), 0, best, reason)
-    hidden = all(found.ground.is_below_detection_limit(name) for name in found.ground.candidates)
+    hidden = all(one.signature.is_below_detection_limit for one in found.ground.candidates.values())
     if found.ground.candidates and hidden:
         return Verdict("undetectable", (), 0, best, "every effect is below what these readings could show")
     return Verdict("none needed", (), 0, best, f"the misfit is what the noise would leave ({p_words(passed)})")
-
-
-def at_limit(found: Found, index: int) -> str:
-    """Which size of a hypothesis sits at the limit of its range; empty if none does.
-
-    A size that may be zero is not at a limit there: zero is no effect. The size is looked at by draws, for a cell of a
-    table may be wider than what counts as the limit.
-    """
-    drawn = draw_terms(found, index, np.random.default_rng(0), _N_DRAWS)
-    for member in range(len(members_of(found, index))):
-        for law, rows, z in standard_sizes_of(found, drawn, member):
-            if 2 * rows.size < drawn.n_draws:
-                continue
-            for free, column in zip(law.form.free, z.T, strict=True):
-                median = _median_within(free.prior, column)
-                if _is_extreme(free.prior, median):
-                    factor, unit = unit_of_people(free.unit)
-                    return f"{free.key} = {factor * float(free.prior.value(median)):.3g} {unit}".rstrip()
-    return ""
-
-
-def _median_within(prior: Quantity, z: Floats) -> float:
-    """Median of the draws that lie within the bounds of a prior; the bound next to them where none does."""
-    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
-    inside = z[(low <= z) & (z <= high)]
-    return float(np.median(inside) if inside.size else np.clip(np.median(z), low, high))
-
-
-def size_posterior(found: Found, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
-    """Probability and standard coordinate of each cell of a member's form, under one hypothesis.
-
-    Parameters
-    ----------
-    found : Found
-    index : int
-        Of the hypothesis.
-    member : int
-        0 or 1: which of its effects.
-    form, parameter : int
-        Which form of that effect, and which of its parameters.
-    """
-    ground, hypothesis = found.ground, found.ground.hypotheses[index]
-    terms = hypothesis.terms(ground.whole)
-    log_density = terms.log_densities(hypothesis.seen(ground.baseline, found.residual[None, :]))[:, 0]
-    by_cell = normalised(log_density).reshape(hypothesis.noise.weights.size, -1).sum(axis=0)
-    if len(hypothesis.members) == 1:
-        own = hypothesis.table
-    else:
-        tables = [ground.candidates[name].coarse for name in hypothesis.members]
-        by_cell = by_cell.reshape(tables[0].n_cells, tables[1].n_cells).sum(axis=1 - member)
-        own = tables[member]
-    of_form = own.form == form
-    return by_cell[of_form], own.z[of_form, parameter]
-
-
-def _is_extreme(prior: Quantity, z: float) -> bool:
-    """Whether hardly any of a prior lies between a size and a bound; a zero that means no effect is no bound."""
-    from scipy.special import ndtr
-
-    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
-    whole = ndtr(high) - ndtr(low)
-    starts_at_nothing = prior.lower == 0.0 and prior.mean == 0.0
-    near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
-    near_bottom = np.isfinite(low) and not starts_at_nothing and (ndtr(z) - ndtr(low)) / whole < AT_LIMIT
-    return bool(near_top or near_bottom)
 
 
 def answer_words(found: Found, answer: Answer) -> str:

@@ -1,6 +1,7 @@
 """Leave one mode out, choose again, predict it: what a chosen effect is worth where it has not been fitted.
 
 A mode is one reading; of several sessions of one setup it is its readings in all of them, for each tells of the others.
+A mode that alone carries a constant or a size says nothing when it is left out, and is not counted.
 """
 
 from __future__ import annotations
@@ -11,10 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none, probabilities
-from bayesplate.diagnosis.evidence.search import Ground
-from bayesplate.diagnosis.evidence.terms import Fold
-from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, odds_against_none, probabilities
+from bayesplate.diagnosis.evidence.search import Found, Ground
+from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, leverages_of, united
 
 Floats = NDArray[np.float64]
 
@@ -86,54 +86,27 @@ def nested(ground: Ground, residuals: Floats, needed_from: float = CERTAINLY_NEE
     Nested or None
         None if there are too few readings.
     """
-    modes = ground.baseline.same_modes
-    if len(modes) < FEWEST:
+    if len(ground.baseline.same_modes) < FEWEST:
         return None
-    none = ground.hypotheses[0]
-
-    def folded(mode: tuple[int, ...]) -> NDArray[np.float64]:
-        chosen = choices(ground, _without(ground.baseline, mode[0], mode), residuals, needed_from)
-        return np.stack([predicted(_without(ground.baseline, reading, mode), chosen) for reading in mode])
-
-    def predicted(fold: Fold, chosen: NDArray[np.intp]) -> Floats:
-        before = none.terms(fold).left_out_errors(none.seen(ground.baseline, residuals))
-        after = before.copy()
-        for index in np.unique(chosen[chosen > 0]):
-            sets = chosen == index
-            hypothesis = ground.hypotheses[index]
-            seen = hypothesis.seen(ground.baseline, residuals[sets])
-            after[sets] = hypothesis.terms(fold).left_out_errors(seen)
-        return np.stack([before, after, chosen])
-
-    found = np.concatenate([folded(mode) for mode in modes])[np.argsort(np.concatenate(modes))]
-    before, after, chosen = np.moveaxis(found, 0, 2)
-    return Nested(before, after, chosen.astype(np.intp))
+    evidences, errors = [], []
+    for one in ground.hypotheses:
+        log_evidence, missed = one.terms.left_out(one.seen(ground.baseline, residuals))
+        evidences.append(log_evidence + one.log_labels)
+        errors.append(missed)
+    chosen = choices(ground.hypotheses, np.stack(evidences), needed_from)[ground.baseline.mode_index]
+    after = np.take_along_axis(np.stack(errors), chosen[None], axis=0)[0]
+    return Nested(errors[0].T, after.T, chosen.T)
 
 
-def _without(baseline: Baseline, reading: int, mode: tuple[int, ...]) -> Fold:
-    """The fold in which a reading is to be predicted, every reading of its mode left out."""
-    return Fold(baseline, reading, tuple(other for other in mode if other != reading))
+def choices(found: Sequence[Hypothesis], evidences: Floats, needed_from: float = CERTAINLY_NEEDED) -> NDArray[np.intp]:
+    """The most probable effect by each evidence, or none where the odds against none are too low.
 
-
-def choices(ground: Ground, fold: Fold, residuals: Floats, needed_from: float = CERTAINLY_NEEDED) -> NDArray[np.intp]:
-    """The most probable effect for each data set, or none where the odds against none are too low: (n_sets,) array."""
-    evidences = log_evidences(ground.hypotheses, fold, residuals)
+    From an (n_hypotheses, ...) array one of the same shape but for its first axis.
+    """
     if len(evidences) == 1:
-        return np.zeros(len(residuals), dtype=np.intp)
-    best = 1 + np.argmax(probabilities(ground.hypotheses, evidences)[1:], axis=0)
-    return np.where(odds_against_none(ground.hypotheses, evidences) > needed_from, best, 0)
-
-
-def left_out(ground: Ground, index: int, residual: Floats) -> Floats:
-    """Errors of predicting each reading from the other modes under one hypothesis: (n_modes,) array, ln f."""
-    hypothesis = ground.hypotheses[index]
-    seen = hypothesis.seen(ground.baseline, residual[None, :])
-    errors = np.zeros(len(residual))
-    for mode in ground.baseline.same_modes:
-        for reading in mode:
-            terms = hypothesis.terms(_without(ground.baseline, reading, mode))
-            errors[reading] = terms.left_out_errors(seen)[0]
-    return errors
+        return np.zeros(evidences.shape[1:], dtype=np.intp)
+    best = 1 + np.argmax(probabilities(found, evidences)[1:], axis=0)
+    return np.where(odds_against_none(found, evidences) > needed_from, best, 0)
 
 
 def log_score(ground: Ground, index: int, residual: Floats, carried: Collection[int] = ()) -> float:
@@ -141,12 +114,7 @@ def log_score(ground: Ground, index: int, residual: Floats, carried: Collection[
 
     A ratio of two restricted densities each, noise and sizes averaged; without the modes of readings that are carried.
     """
-    return float(sum(_log_score_of(ground, index, residual, mode) for mode in _foretold(ground, carried)))
-
-
-def _foretold(ground: Ground, carried: Collection[int]) -> list[tuple[int, ...]]:
-    """Readings of each mode, but of those that alone carry a constant or a size."""
-    return [mode for mode in ground.baseline.same_modes if not set(mode) & set(carried)]
+    return float(_log_scores(ground, index, residual)[_foretold(ground, carried)].sum())
 
 
 def log_score_gains(
@@ -163,24 +131,51 @@ def log_score_gains(
     carried : collection of int
         Readings whose modes are not counted.
     """
-    modes = _foretold(ground, carried)
-    gains = np.zeros(len(modes))
-    for place, mode in enumerate(modes):
-        index = int(chosen[mode[0]])
-        if index:
-            one, none = (_log_score_of(ground, each, residual, mode) for each in (index, 0))
-            gains[place] = one - none
-    return gains
+    scores = {int(index): _log_scores(ground, int(index), residual) for index in {0, *chosen}}
+    gains = [scores[int(chosen[mode[0]])][i] - scores[0][i] for i, mode in enumerate(ground.baseline.same_modes)]
+    return np.array(gains)[_foretold(ground, carried)]
 
 
-def _log_score_of(ground: Ground, index: int, residual: Floats, mode: tuple[int, ...]) -> float:
-    """Log density of the readings of a mode given the others, under one hypothesis."""
-    hypothesis = ground.hypotheses[index]
-    seen = hypothesis.seen(ground.baseline, residual[None, :])
-    own = ground.baseline if hypothesis.own is None else hypothesis.own
-    alone = sum(own.log_alone(reading) for reading in mode if not own.is_mode[reading])
-    if not any(own.is_mode[reading] for reading in mode):
-        return float(alone)
-    fold = _without(ground.baseline, mode[0], mode)
-    whole, without = (hypothesis.terms(one).log_evidence(seen)[0] for one in (ground.whole, fold))
-    return float(alone + whole - without)
+def _foretold(ground: Ground, carried: Collection[int]) -> NDArray[np.bool_]:
+    """Which modes others foretell: all but those that alone carry a constant or a size."""
+    return np.array([not set(mode) & set(carried) for mode in ground.baseline.same_modes])
+
+
+def _log_scores(ground: Ground, index: int, residual: Floats) -> Floats:
+    """Log density of the readings of each mode given the others, under one hypothesis: (n_same_modes,) array."""
+    one = ground.hypotheses[index]
+    seen = one.seen(ground.baseline, residual[None, :])
+    alone = [sum(one.own.log_alone(i) for i in mode if not one.own.is_mode[i]) for mode in one.own.same_modes]
+    return np.array(alone) + one.terms.log_evidence(seen)[0] - one.terms.left_out(seen)[0][:, 0]
+
+
+def carrying(found: Found, index: int) -> tuple[CarryingMode, ...]:
+    """Modes that alone carry something without any effect or under a hypothesis: both are judged without them.
+
+    Parameters
+    ----------
+    found : Found
+    index : int
+        Of the hypothesis; 0: without any effect.
+    """
+    return united(*(_under(found, one) for one in dict.fromkeys((0, index))))
+
+
+def _under(found: Found, index: int) -> tuple[CarryingMode, ...]:
+    """The same under one hypothesis, at its most probable sizes: their priors count as one more observation each."""
+    terms, whole = found.ground.hypotheses[index].terms, found.ground.hypotheses[index].table
+    baseline, board = terms.baseline, terms.baseline.board
+    cell = int(np.argmax(found.cells(index)))
+    owners, widths = [], np.zeros(whole.slopes.shape[2])
+    for which, one in enumerate(found.ground.members(index)):
+        table, cells = whole.member(which)
+        tangents = whole.tangents(which)
+        owners += [one.name] * (tangents.stop - tangents.start)
+        widths[tangents] = table.z_slopes[cells[cell]]  # zero of tangents that the form of the effect does not have
+    tangents_there = terms.table.slopes[cell]
+    sizes = np.divide(tangents_there, widths, out=np.zeros_like(tangents_there), where=widths > 0.0)
+    columns = np.hstack([baseline.slopes, baseline.input_slopes, sizes])
+    scales = np.where(baseline.is_mode, baseline.scales, np.inf)
+    names = (*board.symmetry.moduli, *(one.effect or one.name for one in board.uncertain), *owners)
+    leverages = leverages_of(columns, scales, baseline.same_modes, board.symmetry.n)
+    return carrying_modes(board, leverages, names)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid, reach_of
-from bayesplate.diagnosis.evidence.terms import Fold, Terms, log_sum, normalised
+from bayesplate.diagnosis.evidence.terms import Terms, log_sum, normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.forms import with_readings_exchanged
 from bayesplate.diagnosis.shifts.tables import Table, nothing, together
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.board import Board
@@ -35,11 +35,11 @@ class Swap:
     first: int
     second: int
 
-    def applied(self, baseline: Baseline, residuals: Floats) -> Floats:
-        """Residuals with the two readings exchanged: (n_sets, n_modes) arrays."""
-        readings = residuals + baseline.log_frequency
-        readings[:, [self.first, self.second]] = readings[:, [self.second, self.first]]
-        return readings - baseline.log_frequency
+    def applied(self, baseline: Baseline) -> Baseline:
+        """The baseline with each of the two readings under the other label."""
+        rows = baseline.rows.copy()
+        rows[[self.first, self.second]] = rows[[self.second, self.first]]
+        return baseline.labelled(rows)
 
     def words(self, baseline: Baseline) -> str:
         """Which labels: "(2,0) and (1,2)", with the setup where there are several."""
@@ -47,24 +47,6 @@ class Swap:
         labels = [str(label) for setup in setups for label in setup.labels]
         where = f" in setup {setups[baseline.setup_index[self.first]].name}" if len(setups) > 1 else ""
         return f"{labels[self.first]} and {labels[self.second]}{where}"
-
-    def in_fold(self, fold: Fold) -> Fold:
-        """The fold that leaves out the same readings where the two are exchanged: they stand under the other label.
-
-        Each takes its own error and its rounding along.
-        """
-        baseline = self._exchanged(fold.baseline)
-        if fold.left_out is None:
-            return fold if baseline is fold.baseline else Fold(baseline)
-        exchanged = {self.first: self.second, self.second: self.first}
-        left_out, *others = (exchanged.get(one, one) for one in (fold.left_out, *fold.others))
-        return Fold(baseline, left_out, tuple(others))
-
-    def _exchanged(self, baseline: Baseline) -> Baseline:
-        """The baseline with each reading's own error under the other label; the same where both err alike."""
-        if baseline.own_variance[self.first] == baseline.own_variance[self.second]:
-            return baseline
-        return replace(baseline, board=with_readings_exchanged(baseline.board, self.first, self.second))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +59,12 @@ class Hypothesis:
         Effects that are present; empty for none.
     prior : float
     table : Table
+        Of all modes that readings may be.
     noise : NoiseGrid
+    own : Baseline
+        The baseline with the labels that readings have if it is the case.
     swap : Swap or None
-    wide : Table, optional
-        The table of all modes that readings may be; by default no other than that of the readings.
-    own : Baseline, optional
-        The baseline with the labels that readings have under this hypothesis, where these are not those on the board.
+        The two labels that it exchanges.
     log_labels : float
         ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand.
     """
@@ -91,28 +73,27 @@ class Hypothesis:
     prior: float
     table: Table
     noise: NoiseGrid
+    own: Baseline
     swap: Swap | None = None
-    wide: Table | None = None
-    own: Baseline | None = None
     log_labels: float = 0.0
 
-    def terms(self, fold: Fold) -> Terms:
-        """Normal terms in a fold, which names the reading that is left out by its place on the card."""
-        if self.own is not None:
-            fold = replace(fold, baseline=self.own)
-        return Terms(self.table, fold if self.swap is None else self.swap.in_fold(fold), self.noise)
+    @cached_property
+    def terms(self) -> Terms:
+        """Its normal terms for the readings under its labels."""
+        return Terms(self.table.of(self.own.rows), self.own, self.noise)
 
     def seen(self, baseline: Baseline, residuals: Floats) -> Floats:
-        """Residuals as this hypothesis reads them."""
-        if self.own is not None:
-            return residuals + (baseline.middle - self.own.middle)
-        return residuals if self.swap is None else self.swap.applied(baseline, residuals.copy())
+        """Residuals of a baseline with other labels as this hypothesis reads them: (n_sets, n_modes) arrays."""
+        return residuals + (baseline.middle - self.own.middle)
 
     def labelled(self, baseline: Baseline, rows: Rows) -> Hypothesis:
         """The same hypothesis, the readings of a baseline taken for other modes of its spectrum."""
-        wide = self.table if self.wide is None else self.wide
-        own = None if np.array_equal(rows, baseline.rows) else baseline.labelled(rows)
-        return replace(self, table=replace(wide.of(rows), weights=self.table.weights), wide=wide, own=own)
+        return replace(self, own=baseline.labelled(rows))
+
+    def cells(self, baseline: Baseline, residual: Floats) -> Floats:
+        """Posterior probability of each cell of its table: (n_cells,) array from an (n_modes,) residual."""
+        log_densities = self.terms.log_densities(self.seen(baseline, residual[None, :]))[:, 0]
+        return np.asarray(normalised(log_densities).reshape(-1, self.table.n_cells).sum(axis=0))
 
 
 def hypotheses(
@@ -136,16 +117,15 @@ def hypotheses(
     swaps = confusable(baseline)
     pairs = list(combinations([name for name in fine if name in paired], 2))
     each = ONE / max(len(fine) + bool(swaps), 1)
-    found = [Hypothesis((), NONE, empty, levels)]
-    found += [Hypothesis((name,), each, table, levels) for name, table in fine.items()]
-    found += [Hypothesis((RELABELLING,), each / len(swaps), empty, levels, swap) for swap in swaps]
+    found = [Hypothesis((), NONE, empty, levels, baseline)]
+    found += [Hypothesis((name,), each, table, levels, baseline) for name, table in fine.items()]
     found += [
-        Hypothesis(
-            pair, each if are_stated(board, pair) else TWO / len(pairs), together(*(coarse[name] for name in pair)), few
-        )
-        for pair in pairs
+        Hypothesis((RELABELLING,), each / len(swaps), empty, levels, swap.applied(baseline), swap) for swap in swaps
     ]
-    return tuple(replace(one, table=one.table.of(baseline.rows), wide=one.table) for one in found)
+    for pair in pairs:
+        prior = each if are_stated(board, pair) else TWO / len(pairs)
+        found.append(Hypothesis(pair, prior, together(*(coarse[name] for name in pair)), few, baseline))
+    return tuple(found)
 
 
 def are_stated(board: Board, pair: Sequence[str]) -> bool:
@@ -170,7 +150,7 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
     Either they belong to different symmetry classes; or to one, and stand in the other order than the modes of the
     fitted plate, which an effect that mixes the two may cause as well as a slip.
     """
-    readings = baseline.residual + baseline.log_frequency
+    readings = baseline.log_readings
     if baseline.every.is_open:
         return ()
     swaps = []
@@ -185,14 +165,12 @@ def confusable(baseline: Baseline) -> tuple[Swap, ...]:
     return tuple(swaps)
 
 
-def log_evidences(found: Sequence[Hypothesis], fold: Fold, residuals: Floats) -> Floats:
+def log_evidences(found: Sequence[Hypothesis], baseline: Baseline, residuals: Floats) -> Floats:
     """Logarithm of the evidence of every hypothesis for every data set: (n_hypotheses, n_sets) array.
 
     Summed over the ways to take peaks for modes, as far as the hypotheses know of any (`with_own_labels`).
     """
-    return np.stack(
-        [one.terms(fold).log_evidence(one.seen(fold.baseline, residuals)) + one.log_labels for one in found]
-    )
+    return np.stack([one.terms.log_evidence(one.seen(baseline, residuals)) + one.log_labels for one in found])
 
 
 def probabilities(found: Sequence[Hypothesis], evidences: Floats) -> Floats:

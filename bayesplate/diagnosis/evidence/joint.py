@@ -16,17 +16,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.draws import members_of
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, are_stated
+from bayesplate.diagnosis.evidence.hypotheses import are_stated
 from bayesplate.diagnosis.evidence.peaks import with_own_labels
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
-from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.evidence.search import PASSES, Found, Ground, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve, joint_law, joint_table
+from bayesplate.diagnosis.shifts.tables import JointLaws, Solve, joint_law, joint_table
 
 PLAUSIBLE = 0.05
 """Probability from which a pair is solved together where something explains the readings: each costs as much as a
@@ -82,11 +78,12 @@ def with_joint_pairs(found: Found, ground: Ground, solve: Solve = form_law) -> G
         return ground
     every, joint = list(ground.hypotheses), dict(ground.joint)
     for index in pairs:
-        one, other = members_of(found, index)
-        forms = [(one.laws[i].form, other.laws[j].form, (i, j)) for i, j in _forms_worth(found, index)]
-        laws: JointLaws = {place: joint_law(ground.baseline, first, second, solve) for first, second, place in forms}
-        wide = joint_table(ground.baseline, one.coarse, other.coarse, laws)
-        every[index] = replace(every[index], table=wide.of(ground.baseline.rows), wide=wide)
+        one, other = ground.members(index)
+        laws: JointLaws = {
+            (i, j): joint_law(ground.baseline, one.laws[i].form, other.laws[j].form, solve)
+            for i, j in _forms_worth(found, index)
+        }
+        every[index] = replace(every[index], table=joint_table(ground.baseline, every[index].table, laws))
         joint[every[index].members] = laws
     return replace(ground, hypotheses=tuple(every), joint=joint)
 
@@ -99,8 +96,8 @@ def _plausible(found: Found) -> list[int]:
     cheap = [
         int(i)
         for i in np.lexsort((-log_probability, -found.probability))  # by logarithms where they are too small to tell
-        if len(members_of(found, int(i))) == 2
-        and all(_is_cheap(law) for one in members_of(found, int(i)) for law in one.laws)
+        if len(members := found.ground.members(int(i))) == 2
+        and all(_is_cheap(law) for one in members for law in one.laws)
     ]
     stated = [i for i in cheap if are_stated(board, found.ground.hypotheses[i].members)]
     pairs = [i for i in cheap if i not in stated and (found.probability[i] >= PLAUSIBLE or not is_explained)]
@@ -109,23 +106,13 @@ def _plausible(found: Found) -> list[int]:
 
 def _is_cheap(law: FormLaw) -> bool:
     """Whether an effect leaves the plate thin: a shear-flexible one with a further effect takes minutes to solve."""
-    return bool(law.models) and all(model.system.theory == "thin" for model in law.models)
+    return all(model.system.theory == "thin" for model in law.models)
 
 
 def _forms_worth(found: Found, index: int) -> list[tuple[int, int]]:
     """Pairs of forms that have a share in the probability of a pair of effects."""
-    hypothesis = found.ground.hypotheses[index]
-    one, other = members_of(found, index)
-    shares = _of_cells(found, hypothesis)
-    first, second = np.divmod(np.arange(shares.size), other.coarse.n_cells)
-    by_forms = np.zeros((len(one.laws), len(other.laws)))
-    np.add.at(by_forms, (one.coarse.form[first], other.coarse.form[second]), shares)
+    table = found.ground.hypotheses[index].table
+    forms = np.stack([one.form[cells] for one, cells in (table.member(0), table.member(1))])
+    by_forms = np.zeros(forms.max(axis=1) + 1)
+    np.add.at(by_forms, tuple(forms), found.cells(index))
     return [(int(i), int(j)) for i, j in np.argwhere(by_forms > _WORTH)]
-
-
-def _of_cells(found: Found, hypothesis: Hypothesis) -> NDArray[np.float64]:
-    """Posterior probability of each cell of a hypothesis' table."""
-    terms = hypothesis.terms(found.ground.whole)
-    seen = hypothesis.seen(found.ground.baseline, found.residual[None, :])
-    shares = normalised(terms.log_densities(seen)[:, 0])
-    return np.asarray(shares.reshape(-1, hypothesis.table.n_cells).sum(axis=0))

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.evidence.folds import ALWAYS, CERTAINLY_NEEDED, Nested, nested
 from bayesplate.diagnosis.evidence.hypotheses import log_evidences, odds_against_none
-from bayesplate.diagnosis.evidence.predictive import noise_of_board
-from bayesplate.diagnosis.evidence.search import Ground
+from bayesplate.diagnosis.evidence.search import Ground, noise_of_board
 
 Floats = NDArray[np.float64]
 
@@ -108,7 +107,7 @@ def null_control(
     odds: list[Floats] = []
     for n_done in range(0, n_sets, _BATCH):
         sets.append(noise_of_board(ground.baseline, rng, min(_BATCH, n_sets - n_done)))
-        odds.append(odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, sets[-1])))
+        odds.append(odds_against_none(ground.hypotheses, log_evidences(ground.hypotheses, ground.baseline, sets[-1])))
         if _share(np.concatenate(odds) > against)[0] > FALSE_ALARMS:
             break
     return NullControl(np.concatenate(odds), residuals=np.concatenate(sets))

@@ -168,7 +168,7 @@ def _best(ground: Ground, one: Hypothesis, begun: Iterable[Rows]) -> Hypothesis:
 
 
 def _rows(baseline: Baseline, one: Hypothesis) -> Rows:
-    return baseline.rows if one.own is None else one.own.rows
+    return one.own.rows
 
 
 def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
@@ -179,9 +179,7 @@ def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
     from scipy.special import logsumexp
 
     residual = ground.baseline.residual[None, :]
-    evidence = np.array(
-        [one.terms(ground.whole).log_evidence(one.seen(ground.baseline, residual))[0] for one in labelled]
-    )
+    evidence = np.array([one.terms.log_evidence(one.seen(ground.baseline, residual))[0] for one in labelled])
     drawn = [_drawn(ground, one) for one in labelled]
     full = [log_summed(ground.baseline, each.predicted, each.noise) for each in drawn]
     both = zip(full, labelled, drawn, strict=True)
@@ -199,7 +197,7 @@ def _summed(ground: Ground, labelled: Sequence[Hypothesis]) -> Hypothesis:
 
 
 def _log_of(ground: Ground, one: Hypothesis, drawn: TermDraws) -> Floats:
-    own = ground.baseline if one.own is None else one.own
+    own = one.own
     return log_of_terms(own, own.middle + one.seen(ground.baseline, ground.baseline.residual[None, :])[0], drawn)
 
 
@@ -211,7 +209,7 @@ def log_mean(values: Floats) -> float:
 
 
 def _drawn(ground: Ground, one: Hypothesis, n_draws: int = _N_DRAWS) -> TermDraws:
-    return draw_hypothesis(ground.whole, one, ground.baseline.residual, np.random.default_rng(0), n_draws)
+    return draw_hypothesis(ground.baseline, one, ground.baseline.residual, np.random.default_rng(0), n_draws)
 
 
 def _by_setup(baseline: Baseline, log_frequency: Floats) -> list[Floats]:

@@ -1,4 +1,4 @@
-"""The search: from tables of shifts to the probability of every hypothesis and every effect."""
+"""The search: from tables of shifts to the probability of every hypothesis and effect, and to the p-value of each."""
 
 from __future__ import annotations
 
@@ -16,18 +16,22 @@ from bayesplate.diagnosis.evidence.hypotheses import (
     odds_against_none,
     probabilities,
 )
-from bayesplate.diagnosis.evidence.predictive import predictive_p_value
-from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.evidence.terms import Terms
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts.pairs import JointLaws, Solve
-from bayesplate.diagnosis.shifts.tables import COARSE, Table, nominal_shift, tabulate, traced_shift
+from bayesplate.diagnosis.shifts.signatures import Signature, signature
+from bayesplate.diagnosis.shifts.tables import COARSE, JointLaws, Solve, Table, refitted, tabulate
 
 Floats = NDArray[np.float64]
 
 LEAST_TRACE = 2.0
 """Length of a trace, in units of the readings' uncertainty, from which an effect may be one of two."""
+PASSES = 0.05
+_LEAST, _MOST = 1000, 20_000
+"""Simulated sets of readings: make the standard error of a p-value of 0.05 a seventh, or a thirtieth, of it."""
+_MOST_TERMS = 2_000_000
+"""Normal densities up to which more sets are simulated than the least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,26 +44,19 @@ class Candidate:
     laws : tuple of FormLaw
         Of its forms.
     fine, coarse : Table
-    raw, visible : (n_modes,) array
-        Shift at nominal size before and after the constants are refitted, ln f; of the form that shows most.
-    moved : (n_constants,) array
-        What that refit takes from ln D, so that the constants of a board with the effect are larger by it.
-    traced : (n_modes,) array, optional
-        The visible shift at the constants of a board with the effect that looks like the one at hand: what the search
-        goes by. By default the same as `visible`.
-    shown : int
-        Which of the laws `raw` and `visible` are of.
+    signature : Signature
+        Of the form that shows most.
+    trace : float
+        Length of its visible shift at nominal size, at the constants of a board with the effect that looks like the one
+        at hand, in units of the readings' uncertainty: what the search goes by.
     """
 
     name: str
     laws: tuple[FormLaw, ...]
     fine: Table
     coarse: Table
-    raw: Floats
-    visible: Floats
-    moved: Floats
-    traced: Floats | None = None
-    shown: int = 0
+    signature: Signature
+    trace: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,41 +77,19 @@ class Ground:
     hypotheses: tuple[Hypothesis, ...]
     joint: Mapping[tuple[str, ...], JointLaws] = field(default_factory=dict)
 
-    @cached_property
-    def whole(self) -> Fold:
-        """The fold that uses all readings."""
-        return Fold(self.baseline)
-
     @property
     def n_directions(self) -> int:
         """Directions of the readings that the constants cannot reach, and that are left to judge by."""
-        return len(self.whole.blind)
-
-    def visibility(self, name: str) -> float:
-        """Visible rms of a candidate in units of the rms that drowns in the noise: 2 noise / sqrt(n)."""
-        seen = self.candidates[name].visible / self.baseline.scales
-        return float(np.sqrt(np.mean(seen**2) * self.baseline.n_modes)) / 2.0
+        return len(self.baseline.blind)
 
     @property
     def paired(self) -> tuple[str, ...]:
         """Effects that may be one of two: those whose trace the search could see."""
-        return tuple(name for name in self.candidates if not self.trace(name) < LEAST_TRACE)
+        return tuple(name for name, one in self.candidates.items() if not one.trace < LEAST_TRACE)
 
-    def trace(self, name: str) -> float:
-        """Root of the sum of squares of a candidate's traced shift, in units of each reading's uncertainty."""
-        one = self.candidates[name]
-        seen = self.baseline.whitened(one.visible if one.traced is None else one.traced)
-        return float(np.sqrt(np.sum(seen**2)))
-
-    def is_below_detection_limit(self, name: str) -> bool:
-        """Whether this experiment could not see a candidate even if it were there."""
-        return self.visibility(name) < 1.0
-
-    def cosine(self, one: str, other: str) -> float:
-        """Likeness of the visible parts of two candidates, -1 to 1; 0 where nothing is visible."""
-        first, second = (self.candidates[name].visible / self.baseline.scales for name in (one, other))
-        norms = float(np.linalg.norm(first) * np.linalg.norm(second))
-        return float(first @ second) / norms if norms > 0 and self.n_directions else 0.0
+    def members(self, index: int) -> tuple[Candidate, ...]:
+        """The effects of a hypothesis; none where it only exchanges labels."""
+        return tuple(self.candidates[name] for name in self.hypotheses[index].members if name in self.candidates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,10 +127,18 @@ class Found:
         present = [name in one.members for one in self.ground.hypotheses]
         return float(self.probability[present].sum())
 
+    def seen(self, index: int) -> Floats:
+        """The residual as a hypothesis reads it: (1, n_modes) array."""
+        return self.ground.hypotheses[index].seen(self.ground.baseline, self.residual[None, :])
+
+    def cells(self, index: int) -> Floats:
+        """Posterior probability of each cell of the table of a hypothesis: (n_cells,) array."""
+        return self.ground.hypotheses[index].cells(self.ground.baseline, self.residual)
+
     def p_value(self, index: int) -> float:
         """The prior predictive p-value of a hypothesis."""
         if index not in self._p_values:
-            found = predictive_p_value(self.ground.hypotheses[index], self.ground.whole, self.residual[None, :])
+            found = predictive_p_value(self.ground.hypotheses[index], self.ground.baseline, self.residual[None, :])
             self._p_values[index] = float(found[0])
         return self._p_values[index]
 
@@ -209,13 +192,78 @@ def prepare_search(
 def search(ground: Ground, residual: Floats | None = None) -> Found:
     """Judge one set of readings: those of the board, or others given by their residual."""
     residual = ground.baseline.residual if residual is None else residual
-    evidence = log_evidences(ground.hypotheses, ground.whole, residual[None, :])
+    evidence = log_evidences(ground.hypotheses, ground.baseline, residual[None, :])
     return Found(ground, residual, evidence[:, 0], probabilities(ground.hypotheses, evidence)[:, 0])
 
 
 def _candidate(baseline: Baseline, name: str, laws: tuple[FormLaw, ...]) -> Candidate:
-    shifts = [nominal_shift(baseline, law) for law in laws]
-    shown = int(np.argmax([np.nansum((visible / baseline.scales) ** 2) for _, visible, _ in shifts]))
-    traced = max((traced_shift(baseline, law) for law in laws), key=lambda shift: float(np.nansum(shift**2)))
-    fine, coarse = tabulate(baseline, name, laws), tabulate(baseline, name, laws, COARSE)
-    return Candidate(name, laws, fine, coarse, *shifts[shown], traced, shown)
+    seen, traces = [], []
+    for law in laws:
+        free = law.form.free
+        nominal = {one.name: np.array([one.nominal]) for one in free}
+        there = law.log_frequencies(baseline, baseline.log_rigidities[None, :], nominal)[0]
+        seen.append(signature(baseline, name, free, there))
+        z = np.array([[float(one.prior.standard(one.nominal)) for one in free]])
+        shift = refitted(baseline, law, z)[0][0, baseline.rows]
+        traces.append(np.linalg.norm((shift - baseline.slopes @ (baseline.absorbing @ shift)) / baseline.scales))
+    shown = int(np.argmax([np.nansum((one.visible / one.scales) ** 2) for one in seen]))
+    fine, coarse = tabulate(baseline, laws), tabulate(baseline, laws, COARSE)
+    return Candidate(name, laws, fine, coarse, seen[shown], float(np.fmax.reduce(traces)))
+
+
+def predictive_p_value(hypothesis: Hypothesis, baseline: Baseline, residuals: Floats) -> Floats:
+    """Prior predictive probability of readings that a hypothesis expects as little as these.
+
+    The share of readings simulated under the hypothesis whose marginal density is no larger: noise and sizes are drawn
+    from their priors and integrated over in the density, so that a size that the prior hardly allows counts as misfit,
+    and neither noise nor size can follow the residual. Uniform if the hypothesis is true, whatever the number of setups
+    and however different their noise.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    baseline : Baseline
+    residuals : (n_sets, n_modes) array
+        Of its labels.
+
+    Returns
+    -------
+    (n_sets,) array
+        At least 1 / 1001, and 1 / 20,001 where nothing is lacking.
+
+    References
+    ----------
+    Box, Sampling and Bayes' inference in scientific modelling and robustness, J. R. Stat. Soc. A 143, 383 (1980).
+    """
+    terms = hypothesis.terms
+    observed = terms.log_evidence(hypothesis.seen(baseline, residuals))
+    expected = _expected(terms)
+    return np.asarray((1.0 + np.searchsorted(expected, observed, side="right")) / (1.0 + expected.size))
+
+
+def _expected(terms: Terms) -> Floats:
+    """ln of the marginal density of readings simulated under a hypothesis, in ascending order: (n_sets,) array."""
+    rng = np.random.default_rng(0)
+    n_batches = int(np.clip(_MOST_TERMS // terms.log_weights.size, _LEAST, _MOST)) // _LEAST
+    return np.sort(np.concatenate([terms.log_evidence(_simulated(terms, rng, _LEAST)) for _ in range(n_batches)]))
+
+
+def _simulated(terms: Terms, rng: np.random.Generator, n_sets: int) -> Floats:
+    """Residuals with an effect whose size is drawn from its prior: (n_sets, n_modes) array, ln f."""
+    table = terms.table
+    cells = rng.choice(table.n_cells, n_sets, p=table.weights / table.weights.sum())
+    along = rng.standard_normal((n_sets, table.slopes.shape[2]))
+    effect = table.shift[cells] + np.einsum("nip,np->ni", table.slopes[cells], along)
+    return effect + noise_of_board(terms.baseline, rng, n_sets)
+
+
+def noise_of_board(baseline: Baseline, rng: np.random.Generator, n_sets: int) -> Floats:
+    """Residuals of readings without any effect: (n_sets, n_modes) array, ln f.
+
+    Noise levels and inputs are drawn from their priors; the constants need no drawing, for the search does not see
+    them.
+    """
+    noise = [setup.noise.value(rng.standard_normal(n_sets)) for setup in baseline.board.setups]
+    sd = np.sqrt(np.stack(noise, axis=1)[:, baseline.setup_index] ** 2 + baseline.own_variance)
+    inputs = rng.standard_normal((n_sets, baseline.input_slopes.shape[1]))
+    return np.asarray(sd * rng.standard_normal(sd.shape) + inputs @ baseline.input_slopes.T)

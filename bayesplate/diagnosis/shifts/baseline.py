@@ -19,17 +19,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.shifts.spectrum import Spectrum
-from bayesplate.estimates.least_squares import Estimate, log_measured, reading_scales
+from bayesplate.estimates.least_squares import log_measured, reading_scales
 from bayesplate.estimates.refit import Predict, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel
+from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import Board
 from bayesplate.plate.readings import ReadingErrors
 from bayesplate.plate.sessions import same_modes, under_prior_scales
 from bayesplate.posterior.laplace import every_predictor
-from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem
 
 Floats = NDArray[np.float64]
@@ -37,8 +36,59 @@ Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
+class Spectrum:
+    """All modes that the readings of a board may be, linear in constants and inputs around the estimate.
+
+    One setup after the other: the labelled modes first, then those of peaks.
+
+    Attributes
+    ----------
+    log_frequency : (n_every,) array
+        ln f (Hz) at the estimate.
+    slopes : (n_every, n_constants) array
+        d ln f / d ln D.
+    input_slopes : (n_every, n_inputs) array
+        d ln f / d z.
+    places : tuple of tuple of Place
+        One tuple per setup.
+    inputs : (n_inputs,) array
+        z at the estimate.
+    peaks : tuple of PeakLikelihood or None
+        For each setup what its peaks say of its modes; None where all labels are certain.
+    predict : callable
+        ln f (Hz) of all of them as a function of x, without an effect.
+    discrepancy : (n_every,) array or 0
+        ln f of the board less that of its plate, at the estimate: `bayesplate.plate.sessions`.
+    """
+
+    log_frequency: Floats
+    slopes: Floats
+    input_slopes: Floats
+    places: tuple[tuple[Place, ...], ...]
+    inputs: Floats
+    peaks: tuple[PeakLikelihood | None, ...]
+    predict: Predict
+    discrepancy: Floats | float = 0.0
+
+    @cached_property
+    def starts(self) -> Rows:
+        """Where each setup begins: (n_setups,) array."""
+        return np.cumsum([0, *(len(part) for part in self.places)])[:-1]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a reading may be another mode than its label says."""
+        return any(peaks is not None for peaks in self.peaks)
+
+    @property
+    def middle(self) -> Floats:
+        """ln f (Hz) at the middle of the priors of the inputs: (n_every,) array."""
+        return np.asarray(self.log_frequency - self.input_slopes @ self.inputs)
+
+
+@dataclass(frozen=True, eq=False)
 class Baseline:
-    """A fit without the effect that is looked for, linear in constants and inputs.
+    """A fit without the effect that is looked for, and the modes that its readings are taken for.
 
     Attributes
     ----------
@@ -47,48 +97,38 @@ class Baseline:
         Rigidities and inputs at the estimate, SI.
     log_rigidities : (n_constants,) array
         x_hat.
-    log_frequency : (n_modes,) array
-        g, ln f (Hz) at the estimate.
-    residual : (n_modes,) array
-        ln measured less g, corrected to inputs at the middle of their priors.
-    slopes : (n_modes, n_constants) array
-        X, d ln f / d ln D.
-    input_slopes : (n_modes, n_inputs) array
-        Z, d ln f / d z.
-    places : tuple of Place
-        Of the labelled modes, setup after setup.
+    log_readings : (n_modes,) array
+        ln measured (Hz).
+    every : Spectrum
+        All modes that the readings may be.
+    rows : (n_modes,) array of int
+        Which of them each reading is; -1: none, and then what the arrays below say of the reading means nothing.
     symmetry : tuple of (bool, bool)
         Whether each setup's two halves are alike along x and along y.
-    predict : callable, optional
-        ln f (Hz) of the readings as a function of x, without the effect; by default linear.
-    spectrum : Spectrum, optional
-        All modes that the readings may be, where labels are not certain; by default those of the readings.
-    modes : (n_modes,) array of int, optional
-        Which mode of the spectrum each reading is; -1: none. By default the first one is the first.
     """
 
     board: Board
     values: Mapping[str, Floats]
     log_rigidities: Floats
-    log_frequency: Floats
-    residual: Floats
-    slopes: Floats
-    input_slopes: Floats
-    places: tuple[Place, ...]
+    log_readings: Floats
+    every: Spectrum
+    rows: Rows
     symmetry: tuple[tuple[bool, bool], ...]
-    predict: Predict | None = None
-    spectrum: Spectrum | None = None
-    modes: Rows | None = None
+
+    def labelled(self, rows: Rows) -> Baseline:
+        """The same readings taken for other modes: itself where they are the same ones.
+
+        Parameters
+        ----------
+        rows : (n_modes,) array of int
+            Of `every`; -1: none.
+        """
+        return self if np.array_equal(rows, self.rows) else replace(self, rows=rows)
 
     @property
     def n_modes(self) -> int:
         """Number of readings."""
-        return int(self.residual.size)
-
-    @cached_property
-    def rows(self) -> Rows:
-        """Which mode of `every` each reading is: (n_modes,) array, -1 for none."""
-        return np.arange(self.n_modes) if self.modes is None else self.modes
+        return int(self.log_readings.size)
 
     @cached_property
     def is_mode(self) -> NDArray[np.bool_]:
@@ -96,56 +136,43 @@ class Baseline:
         return np.asarray(self.rows >= 0)
 
     @cached_property
-    def every(self) -> Spectrum:
-        """All modes that the readings may be."""
-        if self.spectrum is not None:
-            return self.spectrum
-        ends = np.cumsum([len(setup.readings) for setup in self.board.setups])[:-1]
-        parts = np.split(np.arange(self.n_modes), ends)
-        places = tuple(tuple(self.places[i] for i in part) for part in parts)
-        none = np.zeros(self.input_slopes.shape[1])
-        return Spectrum(
-            self.log_frequency, self.slopes, self.input_slopes, places, none, (None,) * len(places), self.predict
-        )
-
-    def labelled(self, rows: Rows) -> Baseline:
-        """The same readings taken for other modes.
-
-        Parameters
-        ----------
-        rows : (n_modes,) array of int
-            Of `every`; -1: none, and then what the arrays say of the reading means nothing.
-
-        Returns
-        -------
-        Baseline
-        """
-        every = self.every
-        changed = replace(
-            self,
-            log_frequency=every.log_frequency[rows],
-            slopes=every.slopes[rows],
-            input_slopes=every.input_slopes[rows],
-            places=tuple(every.flat_places[row] for row in rows),
-            predict=_of_rows(every.predict, rows),
-            modes=rows,
-        )
-        return replace(changed, residual=self.residual + self.middle - changed.middle)
-
-    def log_alone(self, reading: int) -> float:
-        """ln of the probability density, in ln f, of a reading that is no mode; 0 of one whose label is certain."""
-        setup = int(self.setup_index[reading])
-        peaks = self.every.peaks[setup]
-        at = reading - int(np.flatnonzero(self.setup_index == setup)[0])
-        return 0.0 if peaks is None or at not in peaks.readings else peaks.log_density_alone(at)
-
-    @property
-    def middle(self) -> Floats:
-        """ln f (Hz) at the middle of the priors of the inputs, from which residuals count: (n_modes,) array."""
-        return np.asarray(self.log_frequency - self.input_slopes @ self.every.inputs)
+    def used(self) -> Rows:
+        """Indices of the readings that are a mode."""
+        return np.flatnonzero(self.is_mode)
 
     @cached_property
-    def setup_index(self) -> NDArray[np.intp]:
+    def log_frequency(self) -> Floats:
+        """g, ln f (Hz) at the estimate: (n_modes,) array."""
+        return self.every.log_frequency[self.rows]
+
+    @cached_property
+    def slopes(self) -> Floats:
+        """X, d ln f / d ln D: (n_modes, n_constants) array."""
+        return self.every.slopes[self.rows]
+
+    @cached_property
+    def input_slopes(self) -> Floats:
+        """Z, d ln f / d z: (n_modes, n_inputs) array."""
+        return self.every.input_slopes[self.rows]
+
+    @cached_property
+    def middle(self) -> Floats:
+        """ln f (Hz) at the middle of the priors of the inputs, from which residuals count: (n_modes,) array."""
+        return self.every.middle[self.rows]
+
+    @cached_property
+    def residual(self) -> Floats:
+        """ln measured less ln f at the middle of the priors of the inputs: (n_modes,) array."""
+        return np.asarray(self.log_readings - self.middle)
+
+    @cached_property
+    def places(self) -> tuple[Place, ...]:
+        """Places of the modes."""
+        flat = [place for part in self.every.places for place in part]
+        return tuple(flat[row] for row in self.rows)
+
+    @cached_property
+    def setup_index(self) -> Rows:
         """Which setup each reading belongs to: (n_modes,) array."""
         return np.repeat(np.arange(len(self.board.setups)), [len(s.readings) for s in self.board.setups])
 
@@ -153,6 +180,14 @@ class Baseline:
     def same_modes(self) -> tuple[tuple[int, ...], ...]:
         """Readings that are of one mode, in sessions of one setup; most are alone."""
         return same_modes(self.board)
+
+    @cached_property
+    def mode_index(self) -> Rows:
+        """Which of these each reading belongs to: (n_modes,) array."""
+        index = np.empty(self.n_modes, dtype=np.intp)
+        for i, mode in enumerate(self.same_modes):
+            index[list(mode)] = i
+        return index
 
     @cached_property
     def own_variance(self) -> Floats:
@@ -169,9 +204,27 @@ class Baseline:
         """The matrix that takes a shift of the frequencies to the constants that absorb it best: (n, n_modes) array."""
         return np.asarray(np.linalg.pinv(self.slopes / self.scales[:, None]) / self.scales)
 
-    def whitened(self, shift: Floats) -> Floats:
-        """What constants leave of a shift, in units of each reading's uncertainty: (n_modes,) arrays."""
-        return np.asarray((shift - self.slopes @ (self.absorbing @ shift)) / self.scales)
+    @cached_property
+    def blind(self) -> Floats:
+        """Orthonormal directions that the constants cannot reach: (n_left, n_modes) array, zero where no mode is."""
+        slopes = self.slopes[self.used]
+        left = np.linalg.svd(slopes, full_matrices=True)[0][:, slopes.shape[1] :]
+        full = np.zeros((left.shape[1], self.n_modes))
+        full[:, self.used] = left.T
+        return full
+
+    @cached_property
+    def half_log_det(self) -> float:
+        """Half the logarithm of the determinant of X'X: the restricted density's change of volume."""
+        slopes = self.slopes[self.used]
+        return 0.5 * float(np.linalg.slogdet(slopes.T @ slopes)[1])
+
+    def log_alone(self, reading: int) -> float:
+        """ln of the probability density, in ln f, of a reading that is no mode; 0 of one whose label is certain."""
+        setup = int(self.setup_index[reading])
+        peaks = self.every.peaks[setup]
+        at = reading - int(np.flatnonzero(self.setup_index == setup)[0])
+        return 0.0 if peaks is None or at not in peaks.readings else peaks.log_density_alone(at)
 
     def refitted_to(self, shift: Floats) -> tuple[Floats, Floats]:
         """The constants fitted again, by weighted least squares, to frequencies that have shifted.
@@ -187,21 +240,15 @@ class Baseline:
         step : (n_constants,) array
             Change of ln D.
         """
-        if self.predict is None or not np.isfinite(shift).all():
-            step = self.absorbing @ shift
-            return shift - self.slopes @ step, step
-        fitted = refit(self.predict, self.log_frequency + shift, self.scales, self.log_rigidities)
-        return self.log_frequency + shift - self.predict(fitted[None, :])[0], fitted - self.log_rigidities
-
-    def weighted_rms(self, shift: Floats) -> float:
-        """Rms over the modes, each with the weight that it has in the fit, in the unit of a (n_modes,) array."""
-        return weighted_rms(shift, self.scales)
+        if not np.isfinite(shift).all():
+            return np.full(shift.size, np.nan), np.full(self.log_rigidities.size, np.nan)
+        predict = _of_rows(self.every.predict, self.rows)
+        fitted = refit(predict, self.log_frequency + shift, self.scales, self.log_rigidities)
+        return self.log_frequency + shift - predict(fitted[None, :])[0], fitted - self.log_rigidities
 
 
-def _of_rows(predict: Predict | None, rows: NDArray[np.intp]) -> Predict | None:
-    if predict is None or isinstance(predict, Predictor):
-        return predict and predict.of(rows)
-    return lambda x: predict(x)[:, rows]
+def _of_rows(predict: Predict, rows: Rows) -> Predict:
+    return predict.of(rows) if isinstance(predict, Predictor) else lambda x: predict(x)[:, rows]
 
 
 def baseline_of(problem: PosedProblem) -> Baseline:
@@ -214,7 +261,7 @@ def baseline_of(problem: PosedProblem) -> Baseline:
     values = parameters.values_at(problem.centre)
     input_slopes, inputs = under_prior_scales(board, values, slopes[:, n:], at[n:])
     discrepancies = [np.broadcast_to(one.discrepancies(values)[0], len(one.every_place)) for one in models]
-    spectrum = Spectrum(
+    every = Spectrum(
         log_frequency=predict(at[None, :])[0],
         slopes=slopes[:, :n],
         input_slopes=input_slopes,
@@ -224,56 +271,16 @@ def baseline_of(problem: PosedProblem) -> Baseline:
         predict=predict.with_fixed(at[n:]),
         discrepancy=np.concatenate(discrepancies),
     )
-    rows = spectrum.first_of_each([len(setup.readings) for setup in board.setups])
-    bare = Baseline(
+    labelled = [start + np.arange(len(one.readings)) for start, one in zip(every.starts, board.setups, strict=True)]
+    return Baseline(
         board=board,
         values=values,
         log_rigidities=at[:n],
-        log_frequency=np.zeros(rows.size),
-        residual=log_measured(board),
-        slopes=np.zeros((rows.size, n)),
-        input_slopes=np.zeros((rows.size, inputs.size)),
-        places=(),
+        log_readings=log_measured(board),
+        every=every,
+        rows=np.concatenate(labelled),
         symmetry=symmetry_of(models),
-        spectrum=spectrum,
     )
-    return bare.labelled(rows)
-
-
-def weighted_rms(shift: Floats, scales: Floats) -> float:
-    """Root of the mean square of (n_modes,) shifts, weighted by the inverse squares of the readings' uncertainties."""
-    return float(np.sqrt(np.average(shift**2, weights=1.0 / scales**2)))
-
-
-def baseline_at(board: Board, estimate: Estimate, predict: Predict | None = None) -> Baseline:
-    """The baseline of a board whose inputs are exact, at its least-squares estimate.
-
-    Parameters
-    ----------
-    board : Board
-    estimate : Estimate
-    predict : callable, optional
-        The exact law without effects: (n, n_modes) ln f (Hz) from (n, n_constants) ln D; by default it is linear.
-    """
-    if Parameters(board).inputs:
-        raise ValueError("wanted a board of exact inputs, got uncertain ones: pose the problem instead")
-    return Baseline(
-        board=board,
-        values=estimate.values,
-        log_rigidities=np.log(board.symmetry.free_of(estimate.values)),
-        log_frequency=log_measured(board) - estimate.residuals,
-        residual=estimate.residuals,
-        slopes=board.symmetry.along(estimate.sensitivities),
-        input_slopes=np.zeros((estimate.residuals.size, 0)),
-        places=places_of(estimate.models),
-        symmetry=symmetry_of(estimate.models),
-        predict=predict,
-    )
-
-
-def places_of(models: Sequence[SetupModel]) -> tuple[Place, ...]:
-    """Places of all labelled modes, setup after setup."""
-    return tuple(place for model in models for place in model.places)
 
 
 def symmetry_of(models: Sequence[SetupModel]) -> tuple[tuple[bool, bool], ...]:

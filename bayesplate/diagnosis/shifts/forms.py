@@ -79,15 +79,6 @@ def with_labels_exchanged(board: Board, first: int, second: int) -> Board:
     first, second : int
         Indices among the readings of all setups.
     """
-    return _exchanged(board, first, second, ("label", "beams"))
-
-
-def with_readings_exchanged(board: Board, first: int, second: int) -> Board:
-    """The same board, its labels in the order that they had: what was read as the one stands where the other did."""
-    return _exchanged(board, first, second, ("frequency",))
-
-
-def _exchanged(board: Board, first: int, second: int, names: Sequence[str]) -> Board:
     start = 0
     setups = []
     for setup in board.setups:
@@ -95,8 +86,8 @@ def _exchanged(board: Board, first: int, second: int, names: Sequence[str]) -> B
         i, j = first - start, second - start
         if 0 <= i < len(readings) and 0 <= j < len(readings):
             one, other = readings[i], readings[j]
-            readings[i] = replace(one, **{name: getattr(other, name) for name in names})
-            readings[j] = replace(other, **{name: getattr(one, name) for name in names})
+            readings[i] = replace(one, label=other.label, beams=other.beams)
+            readings[j] = replace(other, label=one.label, beams=one.beams)
         start += len(readings)
         setups.append(replace(setup, readings=tuple(readings)))
     return replace(board, setups=tuple(setups))

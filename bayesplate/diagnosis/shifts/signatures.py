@@ -13,17 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.shifts.baseline import weighted_rms
+from bayesplate.diagnosis.shifts.baseline import Baseline, baseline_of
 from bayesplate.effects import EFFECTS, declare, effects_of
-from bayesplate.estimates.refit import refit
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
-from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, Moduli, moduli
+from bayesplate.plate.material import MODULI, moduli
 from bayesplate.plate.parameter import Parameter
-from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.quantities import Quantity
 
@@ -55,13 +52,11 @@ class Signature:
     size : dict of float
         Value of each parameter, SI.
     raw : (n_modes,) array, cents
-        Shift of every frequency, constants unchanged.
+        Shift of every frequency, constants unchanged; not a number where there is no frequency.
     visible : (n_modes,) array, cents
         What remains after the constants have been fitted again without the effect.
     bias_percent : dict of float
         What ignoring the effect does to E_x, E_y, G_xy.
-    detection_limit_cents : float
-        Rms below which a visible part drowns in the noise: 2 noise / sqrt(n).
     scales : (n_modes,) array
         Relative uncertainty of each reading: its weight in the fit, in every rms and in the likeness of two effects.
     acts_both_ways : bool
@@ -73,122 +68,108 @@ class Signature:
     raw: Floats
     visible: Floats
     bias_percent: Mapping[str, float]
-    detection_limit_cents: float
     scales: Floats
     acts_both_ways: bool = False
 
     @property
     def raw_rms(self) -> float:
         """Weighted rms shift over the modes, cents."""
-        return weighted_rms(self.raw, self.scales)
+        return self._rms(self.raw)
 
     @property
     def visible_rms(self) -> float:
         """Weighted rms over the modes of the visible part, cents: never more than the raw one."""
-        return weighted_rms(self.visible, self.scales)
+        return self._rms(self.visible)
+
+    @property
+    def detection_limit_cents(self) -> float:
+        """Rms below which a visible part drowns in the noise: 2 noise / sqrt(n)."""
+        return 2.0 / float(np.sqrt(np.sum(1.0 / cents(self.scales) ** 2)))
 
     @property
     def is_below_detection_limit(self) -> bool:
         """Whether this experiment could not see the effect even if it were there."""
-        return bool(self.visible_rms < self.detection_limit_cents)
+        return self.visible_rms < self.detection_limit_cents
+
+    def _rms(self, shift: Floats) -> float:
+        return float(np.sqrt(np.average(shift**2, weights=1.0 / self.scales**2)))
 
 
-def candidates(board: Board) -> tuple[str, ...]:
-    """Effects that are not declared and can act in at least one setup of the board."""
-    return tuple(
-        name
-        for name, effect in EFFECTS.items()
-        if name not in board.effects and any(not effect.refusal(board, setup) for setup in board.setups)
+def signature(baseline: Baseline, effect: str, sizes: Sequence[Parameter], log_frequency: Floats) -> Signature:
+    """The signature of an effect that takes a baseline's modes to other frequencies.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    effect : str
+    sizes : sequence of Parameter
+        What has its nominal size there.
+    log_frequency : (n_modes,) array
+        ln f (Hz) with the effect, constants unchanged.
+    """
+    raw = log_frequency - baseline.log_frequency
+    visible, step = baseline.refitted_to(raw)
+    return Signature(
+        effect=effect,
+        size={one.name: one.nominal for one in sizes},
+        raw=cents(raw),
+        visible=cents(visible),
+        bias_percent=_bias(baseline, step),
+        scales=baseline.scales,
+        acts_both_ways=acts_both_ways(sizes),
     )
 
 
 def signatures(problem: PosedProblem, names: Sequence[str] | None = None) -> tuple[Signature, ...]:
-    """Signatures of effects around the estimate of a problem.
+    """Signatures of effects around the estimate of a problem, by full solves.
 
     Parameters
     ----------
     problem : PosedProblem
     names : sequence of str, optional
-        By default all candidates.
+        By default all that are not declared and can act in at least one setup of the board.
 
     Returns
     -------
     tuple of Signature
         Without an effect that at its nominal size leaves no plate with these modes, or none to fit them.
     """
-    predict = constants_predictor(problem)
-    start = problem.centre[: problem.parameters.n_constants]
-    base = predict(start[None, :])[0]
-    scales = problem.estimate.scales
-    noise = float(1.0 / np.sqrt(np.mean(1.0 / cents(scales) ** 2)))
-    result = []
-    for name in candidates(problem.board) if names is None else names:
-        shifted, sizes = frequencies_with(problem, name)
-        if not np.isfinite(shifted).all():
-            continue
-        fitted = refit(predict, shifted, scales, start)
-        bias = _bias(problem, start, fitted)
-        if not np.isfinite([*bias.values()]).all():
-            continue
-        result.append(
-            Signature(
-                effect=name,
-                size={one.name: one.nominal for one in sizes},
-                raw=cents(shifted - base),
-                visible=cents(shifted - predict(fitted[None, :])[0]),
-                bias_percent=bias,
-                detection_limit_cents=2.0 * noise / np.sqrt(base.size),
-                scales=scales,
-                acts_both_ways=acts_both_ways(sizes),
-            )
-        )
-    return tuple(result)
+    baseline = baseline_of(problem)
+    found = (_solved(baseline, problem, name) for name in _acting(problem.board) if names is None or name in names)
+    return tuple(one for one in found if np.isfinite([*one.raw, *one.bias_percent.values()]).all())
 
 
-def constants_predictor(problem: PosedProblem) -> Predictor:
-    """ln f of all modes as a function of the logarithms of the free rigidities alone, inputs as at the estimate."""
-    predict = predictor(problem.board, problem.posterior.models, "exact", problem.centre)
-    return predict.with_fixed(problem.centre[problem.parameters.fitted_columns][predict.n_constants :])
+def _acting(board: Board) -> Iterable[str]:
+    for name, effect in EFFECTS.items():
+        if name not in board.effects and any(not effect.refusal(board, setup) for setup in board.setups):
+            yield name
 
 
-def frequencies_with(problem: PosedProblem, name: str) -> tuple[Floats, tuple[Parameter, ...]]:
-    """ln f of all modes with one more effect at its nominal size, by full solves; and what has that size."""
-    board = declare(replace(problem.board, effects=(*problem.board.effects, name)))
-    values = problem.parameters.values_at(problem.centre)
+def _solved(baseline: Baseline, problem: PosedProblem, name: str) -> Signature:
+    """The signature of one more effect at its nominal size."""
+    board = declare(replace(baseline.board, effects=(*baseline.board.effects, name)))
     acting = (one for setup in board.setups for one in effects_of(board, setup) if one.name == name)
     sizes = {one.name: one for effect in acting for one in effect.parameters()}
-    for key, quantity in board.inputs.items():
-        values.setdefault(key, np.asarray(quantity.mean))
+    values = {key: np.asarray(quantity.mean) for key, quantity in board.inputs.items()} | dict(baseline.values)
     values |= {key: np.asarray(one.nominal) for key, one in sizes.items()}
     parts = []
     for setup, fitted in zip(board.setups, problem.posterior.models, strict=True):
         plate = setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0]
         parts.append(plate + fitted.discrepancies(values)[0, : plate.size])
-    return np.concatenate(parts), tuple(sizes.values())
+    return signature(baseline, name, tuple(sizes.values()), np.concatenate(parts))
 
 
 def look_alikes(found: Sequence[Signature]) -> dict[str, tuple[str, ...]]:
-    """For each effect, the others that look like it."""
+    """For each effect, the others of which the visible part is like its own, or opposite if one acts either way."""
+
+    def are_alike(one: Signature, other: Signature) -> bool:
+        likeness = cosine(one, other)
+        return (abs(likeness) if one.acts_both_ways or other.acts_both_ways else likeness) > LOOK_ALIKE
+
     return {
-        one.effect: tuple(
-            other.effect
-            for other in found
-            if other is not one and are_alike(cosine(one, other), one.acts_both_ways or other.acts_both_ways)
-        )
+        one.effect: tuple(other.effect for other in found if other is not one and are_alike(one, other))
         for one in found
     }
-
-
-def are_alike(likeness: float, either_way: bool) -> bool:
-    """Whether two effects look alike, from the cosine of their visible parts.
-
-    Parameters
-    ----------
-    likeness : float
-    either_way : bool
-        Whether one of them may act the other way round.
-    """
-    return (abs(likeness) if either_way else likeness) > LOOK_ALIKE
 
 
 def acts_both_ways(sizes: Iterable[Parameter]) -> bool:
@@ -210,13 +191,13 @@ def cosine(one: Signature, other: Signature) -> float:
     return float(first @ second / (np.linalg.norm(first) * np.linalg.norm(second)))
 
 
-def _bias(problem: PosedProblem, true: Floats, fitted: Floats) -> dict[str, float]:
-    values = problem.parameters.values(problem.centre[None, :])
+def _bias(baseline: Baseline, step: Floats) -> dict[str, float]:
+    """What the moduli of a fit are off by, percent, whose ln D have moved by a step that hides an effect."""
+    values, symmetry = baseline.values, baseline.board.symmetry
     thickness, nu_xy = values["thickness"], values["poisson_xy"]
-
-    def constants(x: Floats) -> Moduli:
-        found = problem.board.symmetry.rigidities(np.exp(x), nu_xy)
-        return moduli(found["D_x"], found["D_y"], found["D_s"], thickness, nu_xy)
-
-    before, after = constants(true), constants(fitted)
-    return {name: 100.0 * float(np.ravel(b / a)[0] - 1.0) for name, a, b in zip(MODULI, before, after, strict=True)}
+    free = symmetry.free_of(values)
+    ignoring, knowing = (
+        moduli(np.asarray(D["D_x"]), np.asarray(D["D_y"]), np.asarray(D["D_s"]), thickness, nu_xy)
+        for D in (symmetry.rigidities(free, nu_xy), symmetry.rigidities(free * np.exp(-step), nu_xy))
+    )
+    return {name: 100.0 * float(a / b - 1.0) for name, a, b in zip(MODULI, ignoring, knowing, strict=True)}

@@ -2,24 +2,35 @@
 
 The prior of an effect's parameters, pushed through the exact frequencies and the refit of the constants, is a cloud of
 shifts. It is kept as a mixture of normal cells: a regular grid in the standard coordinates of the parameters, the exact
-shift at each point, and the slope there, so that neighbouring cells join without a gap. Evidence, prediction and the
-posterior of a size are then sums over cells.
+shift at each point, and its change up to the sides of the cell, so that neighbouring cells join without a gap.
+Evidence, prediction and the posterior of a size are then sums over cells.
+
+The shifts of two effects are added; a mass that slows a mode makes the tension that speeds it up count the less, so
+that plausible pairs are solved together, at every pair of their cells.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.laws import FormLaw
+from bayesplate.diagnosis.shifts.forms import Form, with_forms
+from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+Solve = Callable[[Baseline, Form], FormLaw]
+"""Makes the law of a form around a baseline."""
+JointLaws = Mapping[tuple[int, int], FormLaw]
+"""Laws of two effects at once, by the indices of their forms; the free parameters are those of the first, then those
+of the second."""
 
 FINE, COARSE = (33, 11, 256), (9, 5, 27)
 """Cells along one parameter, along each of two, and at most in all of more; the second where effects are combined."""
@@ -37,8 +48,6 @@ class Table:
 
     Attributes
     ----------
-    members : tuple of str
-        Names of the effects.
     weights : (n_cells,) array
         Prior probability, summing to 1.
     shift : (n_cells, n_modes) array
@@ -55,41 +64,69 @@ class Table:
         Standard coordinates of the first effect's parameters.
     z_slopes : (n_cells, n_parameters) array
         Their change over one standard deviation of the cell.
+    parts : tuple of Table
+        Of two effects together: the tables of both, the cells of the second running fastest.
     """
 
-    members: tuple[str, ...]
     weights: Floats
     shift: Floats
     slopes: Floats
     moved: Floats
     moved_slopes: Floats
-    form: NDArray[np.intp]
+    form: Rows
     z: Floats
     z_slopes: Floats
+    parts: tuple[Table, ...] = ()
 
     @property
     def n_cells(self) -> int:
         """Number of cells."""
         return int(self.weights.size)
 
-    def some(self, cells: slice) -> Table:
+    def some(self, cells: slice | Rows) -> Table:
         """Some of the cells, with the weights that they have among all."""
         return replace(self, **{key: getattr(self, key)[cells] for key in _PER_CELL})
 
-    def of(self, rows: NDArray[np.intp]) -> Table:
+    def of(self, rows: Rows) -> Table:
         """The same cells for some of the modes, by their indices."""
         if np.array_equal(rows, np.arange(self.shift.shape[1])):
             return self
         return replace(self, shift=self.shift[:, rows], slopes=self.slopes[:, rows])
 
+    def member(self, which: int, cells: Rows | None = None) -> tuple[Table, Rows]:
+        """The table of one of its effects, and which cell there each cell of this one has; by default of all."""
+        cells = np.arange(self.n_cells) if cells is None else cells
+        return (self.parts[which], np.divmod(cells, self.parts[1].n_cells)[which]) if self.parts else (self, cells)
 
-def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
+    def tangents(self, which: int) -> slice:
+        """Which tangents are of one of its effects."""
+        ends = np.cumsum([0, *(part.slopes.shape[2] for part in self.parts or (self,))])
+        return slice(int(ends[which]), int(ends[which + 1]))
+
+
+_PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
+
+
+def nothing(n_modes: int, n_constants: int = 3) -> Table:
+    """No effect: one cell without shift."""
+    return Table(
+        weights=np.ones(1),
+        shift=np.zeros((1, n_modes)),
+        slopes=np.zeros((1, n_modes, 0)),
+        moved=np.zeros((1, n_constants)),
+        moved_slopes=np.zeros((1, n_constants, 0)),
+        form=np.zeros(1, dtype=np.intp),
+        z=np.zeros((1, 0)),
+        z_slopes=np.zeros((1, 0)),
+    )
+
+
+def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
     """Tabulate an effect over all its forms.
 
     Parameters
     ----------
     baseline : Baseline
-    name : str
     laws : sequence of FormLaw
         Of the effect's forms, equally probable.
     cells : tuple of int
@@ -100,20 +137,10 @@ def tabulate(baseline: Baseline, name: str, laws: Sequence[FormLaw], cells: tupl
     Table
         Without any cells where no size of the effect leaves a plate.
     """
-    parts = [_of_form(baseline, name, i, law, cells) for i, law in enumerate(laws)]
-    n_tangents = max(part.slopes.shape[2] for part in parts)
-    padded = [_padded(part, n_tangents) for part in parts]
-    return Table(
-        members=(name,),
-        weights=np.concatenate([part.weights for part in padded]) / len(parts),
-        shift=np.concatenate([part.shift for part in padded]),
-        slopes=np.concatenate([part.slopes for part in padded]),
-        moved=np.concatenate([part.moved for part in padded]),
-        moved_slopes=np.concatenate([part.moved_slopes for part in padded]),
-        form=np.concatenate([part.form for part in padded]),
-        z=np.concatenate([part.z for part in padded]),
-        z_slopes=np.concatenate([part.z_slopes for part in padded]),
-    )
+    n_tangents = max(len(law.form.free) for law in laws)
+    parts = [_of_form(baseline, i, law, cells, n_tangents) for i, law in enumerate(laws)]
+    joined: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _PER_CELL}
+    return replace(parts[0], **joined | {"weights": joined["weights"] / len(laws)})
 
 
 def together(one: Table, other: Table) -> Table:
@@ -124,12 +151,10 @@ def together(one: Table, other: Table) -> Table:
         return total.reshape(-1, *total.shape[2:])
 
     def joined(first: Floats, second: Floats) -> Floats:
-        n, m = len(first), len(second)
-        parts = (np.repeat(first, m, axis=0), np.tile(second, (n, 1, 1)))
+        parts = (np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1, 1)))
         return np.concatenate(parts, axis=2)
 
     return Table(
-        members=one.members + other.members,
         weights=np.outer(one.weights, other.weights).ravel(),
         shift=added(one.shift, other.shift),
         slopes=joined(one.slopes, other.slopes),
@@ -138,22 +163,50 @@ def together(one: Table, other: Table) -> Table:
         form=np.repeat(one.form, other.n_cells),
         z=np.repeat(one.z, other.n_cells, axis=0),
         z_slopes=np.repeat(one.z_slopes, other.n_cells, axis=0),
+        parts=(one, other),
     )
 
 
-def nothing(n_modes: int, n_constants: int = 3) -> Table:
-    """No effect: one cell without shift."""
-    return Table(
-        members=(),
-        weights=np.ones(1),
-        shift=np.zeros((1, n_modes)),
-        slopes=np.zeros((1, n_modes, 0)),
-        moved=np.zeros((1, n_constants)),
-        moved_slopes=np.zeros((1, n_constants, 0)),
-        form=np.zeros(1, dtype=np.intp),
-        z=np.zeros((1, 0)),
-        z_slopes=np.zeros((1, 0)),
-    )
+def joint_law(baseline: Baseline, one: Form, other: Form, solve: Solve = form_law) -> FormLaw:
+    """Solve a board with two effects around a baseline and over the priors of both."""
+    detail = ", ".join(part for part in (one.detail, other.detail) if part)
+    board = with_forms(baseline.board, (one, other))
+    both = Form(f"{one.effect} and {other.effect}", detail, board, (*one.free, *other.free))
+    return solve(baseline, both).placed(baseline)
+
+
+def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
+    """Two effects at once, exactly where there are laws of both.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    added : Table
+        Of both, their shifts added.
+    laws : JointLaws
+
+    Returns
+    -------
+    Table
+        With the same cells in the same order.
+    """
+    (one, first), (other, second) = added.member(0), added.member(1)
+    found = {key: getattr(added, key).copy() for key in ("shift", "moved", "slopes", "moved_slopes")}
+    for (i, j), law in laws.items():
+        cells = np.flatnonzero((one.form[first] == i) & (other.form[second] == j))
+        used = np.flatnonzero(np.r_[one.z_slopes[first[cells[0]]], other.z_slopes[second[cells[0]]]] > 0.0)
+        z, step = (
+            np.hstack([of_one[first[cells]], of_other[second[cells]]])[:, used]
+            for of_one, of_other in ((one.z, other.z), (one.z_slopes, other.z_slopes))
+        )
+        solved = _cells(baseline, law, z, step)
+        good = _finite(*solved)
+        for key, values in zip(found, solved, strict=True):
+            if key.endswith("slopes"):
+                found[key][np.ix_(cells[good], np.arange(values.shape[1]), used)] = values[good]
+            else:
+                found[key][cells[good]] = values[good]
+    return replace(added, **found)
 
 
 def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
@@ -189,47 +242,45 @@ def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Float
     return shift, moved
 
 
-def nominal_shift(baseline: Baseline, law: FormLaw) -> tuple[Floats, Floats, Floats]:
-    """Raw and visible shift at the nominal size, (n_modes,) arrays, ln f, and what the refit hides of ln D, (n,)."""
-    values = {free.name: np.array([free.nominal]) for free in law.form.free}
-    raw = law.log_frequencies(baseline, baseline.log_rigidities[None, :], values)[0] - baseline.log_frequency
-    visible, step = baseline.refitted_to(raw)
-    return raw, visible, -step
-
-
-def traced_shift(baseline: Baseline, law: FormLaw) -> Floats:
-    """Visible shift at the form's nominal size where the search finds the constants: (n_modes,) array, ln f."""
-    z = np.array([[float(free.prior.standard(free.nominal)) for free in law.form.free]])
-    return np.asarray(refitted(baseline, law, z)[0][0, baseline.rows])
-
-
-def _of_form(baseline: Baseline, name: str, index: int, law: FormLaw, cells: tuple[int, int, int]) -> Table:
-    axes = [_axis(free.prior, cells_along(len(law.form.free), cells)) for free in law.form.free]
-    sides = [axis[0].size for axis in axes]
-    z = np.array(list(product(*(axis[0] for axis in axes)))).reshape(int(np.prod(sides)), len(axes))
-    log_weights = np.zeros(len(z))
-    for i, free in enumerate(law.form.free):
-        log_weights = log_weights + free.prior.log_prior(z[:, i])
+def _cells(baseline: Baseline, law: FormLaw, z: Floats, step: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Shift and refit of cells, and their changes over one standard deviation of each along every parameter."""
     shift, moved = refitted(baseline, law, z)
-    slopes = _slopes(shift, sides, axes)
-    moved_slopes = _slopes(moved, sides, axes)
-    finite = np.isfinite(shift).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(log_weights)
-    weights = np.where(finite, np.exp(np.where(finite, log_weights, -np.inf)), 0.0)
-    table = Table(
-        members=(name,),
+    sides = []
+    for k in range(z.shape[1]):
+        along = step * (np.arange(z.shape[1]) == k)
+        above, below = (refitted(baseline, law, z + sign * along) for sign in (1.0, -1.0))
+        sides.append([0.5 * (after - before) for after, before in zip(above, below, strict=True)])
+    if not sides:
+        return shift, moved, np.zeros((*shift.shape, 0)), np.zeros((*moved.shape, 0))
+    slopes, moved_slopes = (np.stack(each, axis=2) for each in zip(*sides, strict=True))
+    return shift, moved, slopes, moved_slopes
+
+
+def _finite(*values: Floats) -> NDArray[np.bool_]:
+    return np.all([np.isfinite(one).reshape(len(one), -1).all(axis=1) for one in values], axis=0)
+
+
+def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Table:
+    free = law.form.free
+    axes = [_axis(one.prior, cells_along(len(free), cells)) for one in free]
+    points = list(product(*(points for points, _ in axes)))
+    z = np.reshape(points, (len(points), len(axes)))
+    step = np.tile([_OVERLAP * width for _, width in axes], (len(z), 1))
+    log_weights = np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(free)], axis=0) + np.zeros(len(z))
+    shift, moved, slopes, moved_slopes = _cells(baseline, law, z, step)
+    good = _finite(shift, slopes, log_weights)
+    weights = np.exp(np.where(good, log_weights, -np.inf))
+    none = n_tangents - len(free)
+    return Table(
         weights=weights / max(weights.sum(), np.finfo(float).tiny),
         shift=shift,
-        slopes=slopes,
+        slopes=np.pad(slopes, ((0, 0), (0, 0), (0, none))),
         moved=moved,
-        moved_slopes=moved_slopes,
+        moved_slopes=np.pad(moved_slopes, ((0, 0), (0, 0), (0, none))),
         form=np.full(len(z), index),
-        z=z,
-        z_slopes=np.tile([_OVERLAP * width for _, width in axes], (len(z), 1)),
-    )
-    return replace(table, **{key: getattr(table, key)[finite] for key in _PER_CELL})
-
-
-_PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
+        z=np.pad(z, ((0, 0), (0, none))),
+        z_slopes=np.pad(step, ((0, 0), (0, none))),
+    ).some(np.flatnonzero(good))
 
 
 def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
@@ -244,30 +295,3 @@ def _axis(prior: Quantity, n: int) -> tuple[Floats, float]:
     high = min(float(prior.standard(prior.upper)), _REACH) if np.isfinite(prior.upper) else _REACH
     width = (high - low) / n
     return np.asarray(low + width * (np.arange(n) + 0.5)), width
-
-
-def _slopes(values: Floats, sides: list[int], axes: list[tuple[Floats, float]]) -> Floats:
-    """Change over the standard deviation of a cell along each parameter: (n_cells, n_values, n_parameters) array."""
-    if not sides:
-        return np.zeros((*values.shape, 0))
-    gridded = values.reshape(*sides, values.shape[1])
-    columns = []
-    for i, (points, width) in enumerate(axes):
-        slope = np.gradient(gridded, points, axis=i) if len(points) > 1 else np.zeros_like(gridded)
-        columns.append((_OVERLAP * width * slope).reshape(values.shape))
-    return np.stack(columns, axis=-1)
-
-
-def _padded(table: Table, n_tangents: int) -> Table:
-    more = n_tangents - table.slopes.shape[2]
-    if not more:
-        return table
-    pad = ((0, 0), (0, 0), (0, more))
-    flat = ((0, 0), (0, n_tangents - table.z.shape[1]))
-    return replace(
-        table,
-        slopes=np.pad(table.slopes, pad),
-        moved_slopes=np.pad(table.moved_slopes, pad),
-        z=np.pad(table.z, flat),
-        z_slopes=np.pad(table.z_slopes, flat),
-    )

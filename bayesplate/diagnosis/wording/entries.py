@@ -1,4 +1,4 @@
-"""Each candidate of a diagnosis: what it would do, how probable it is, and what became of it."""
+"""Each candidate of a diagnosis: what it would do, how probable it is, what became of it and why."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.refits import likely_form
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
-from bayesplate.diagnosis.evidence.search import Candidate, Found
-from bayesplate.diagnosis.shifts.signatures import acts_both_ways, are_alike
-from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
-from bayesplate.diagnosis.wording.fates import fate_of, fate_of_exchange
+from bayesplate.diagnosis.decision.sizes import likely_form, size_posterior
+from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, p_words
+from bayesplate.diagnosis.evidence.search import PASSES, Candidate, Found
+from bayesplate.diagnosis.shifts.signatures import look_alikes
+from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry, Fate
 from bayesplate.effects import EFFECTS, effects_of
-from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI, moduli
+from bayesplate.posterior.doubts import times
 from bayesplate.results.contract import finite
 
 Floats = NDArray[np.float64]
+Told = tuple[Fate, str | None]
+"""What became of a candidate, and the reason; None for what was not rejected."""
+
+_LIKELY = 0.1
+"""Probability from which on an effect that is hardly visible by itself is told as any other."""
 
 
 def effect_entry(
@@ -41,15 +44,15 @@ def effect_entry(
     gained = float(found.log_evidence[index] - found.log_evidence[0])
     best_fit = _best_fit(found, index) - _best_fit(found, 0)
     fate, because = fate_of(found, verdict, ranked, one.name, index)
-    visible = cents(one.visible) if ground.n_directions else np.full(one.visible.size, np.nan)
+    shown, is_seen = one.signature, ground.n_directions > 0
     return EffectEntry(
         name=one.name,
         setup=_where(one),
-        raw_rms_cents=finite(ground.baseline.weighted_rms(cents(one.raw))),
-        visible_rms_cents=finite(ground.baseline.weighted_rms(visible)),
-        visible_cents=tuple(finite(float(value)) for value in visible),
-        below_detection_limit=ground.is_below_detection_limit(one.name),
-        bias_percent=_bias(found, one),
+        raw_rms_cents=finite(shown.raw_rms),
+        visible_rms_cents=finite(shown.visible_rms) if is_seen else None,
+        visible_cents=tuple(finite(float(value)) if is_seen else None for value in shown.visible),
+        below_detection_limit=shown.is_below_detection_limit,
+        bias_percent=shown.bias_percent,
         inclusion_probability=found.inclusion(one.name),
         inclusion_probability_with_doubled_priors=doubled,
         log_bayes_factor=gained,
@@ -57,11 +60,7 @@ def effect_entry(
         p_value=p_value_of(found, index),
         amplitude=_amplitude(found, index, one),
         learnt_bits=_learnt(found, index, one),
-        look_alikes=tuple(
-            other
-            for other, its in ground.candidates.items()
-            if other != one.name and are_alike(ground.cosine(one.name, other), _acts_both_ways(one, its))
-        ),
+        look_alikes=look_alikes([each.signature for each in ground.candidates.values()])[one.name] if is_seen else (),
         rejected_because=because,
         fate=fate,
     )
@@ -96,11 +95,6 @@ def p_value_of(found: Found, index: int) -> float | None:
     return found.p_value(index) if found.ground.n_directions else None
 
 
-def _acts_both_ways(*every: Candidate) -> bool:
-    """Whether one of some effects may also be the opposite of what is shown of it."""
-    return any(acts_both_ways(one.laws[one.shown].form.free) for one in every)
-
-
 def _where(one: Candidate) -> str:
     form = one.laws[0].form
     if EFFECTS[one.name].scope == "board":
@@ -109,31 +103,15 @@ def _where(one: Candidate) -> str:
     return ", ".join(there)
 
 
-def _bias(found: Found, one: Candidate) -> dict[str, float]:
-    """What ignoring the effect at its nominal size does to the moduli, percent."""
-    values = found.ground.baseline.values
-    thickness, nu_xy = values["thickness"], values["poisson_xy"]
-    symmetry = found.ground.baseline.board.symmetry
-    free = symmetry.free_of(values)
-    fitted, true = (symmetry.rigidities(each, nu_xy) for each in (free, free * np.exp(one.moved)))
-    ignoring, knowing = (
-        moduli(np.asarray(D["D_x"]), np.asarray(D["D_y"]), np.asarray(D["D_s"]), thickness, nu_xy)
-        for D in (fitted, true)
-    )
-    return {n: 100.0 * float(a / b - 1.0) for n, a, b in zip(MODULI, ignoring, knowing, strict=True)}
-
-
 def _best_fit(found: Found, index: int) -> float:
     """Log density at the best size, noise averaged: what the evidence would be without the width of the prior."""
     hypothesis = found.ground.hypotheses[index]
-    seen = hypothesis.seen(found.ground.baseline, found.residual[None, :])
-    terms = hypothesis.terms(found.ground.whole)
-    log_density = terms.log_densities(seen)[:, 0]
+    log_density = hypothesis.terms.log_densities(found.seen(index))[:, 0]
     by_cell = log_density.reshape(hypothesis.noise.weights.size, -1)
     top = by_cell.max(axis=0)
     with np.errstate(divide="ignore"):
         summed = top + np.log(np.exp(by_cell - top).sum(axis=0)) - np.log(hypothesis.table.weights)
-    return float(summed[hypothesis.table.weights > 0].max()) - terms.fold.half_log_det + hypothesis.log_labels
+    return float(summed[hypothesis.table.weights > 0].max()) - hypothesis.own.half_log_det + hypothesis.log_labels
 
 
 def _amplitude(found: Found, index: int, one: Candidate) -> Amplitude | None:
@@ -180,3 +158,73 @@ def _fixed(one: Candidate) -> Amplitude | None:
                 parameter=parameter.key, form=form.detail, q05=size, q50=size, q95=size, unit=parameter.unit
             )
     return None
+
+
+def fate_of(found: Found, verdict: Verdict, ranked: Sequence[Answer], name: str, index: int) -> Told:
+    """What became of a candidate effect.
+
+    Parameters
+    ----------
+    found : Found
+    verdict : Verdict
+    ranked : sequence of Answer
+        Best first.
+    name : str
+    index : int
+        Of the hypothesis that it acts alone.
+    """
+    if name in verdict.effects:
+        return "in the verdict", None
+    if (
+        verdict.is_needed
+        and verdict.word == "unexplained"
+        and verdict.best is not None
+        and name in verdict.best.members
+    ):
+        return "does not fit", verdict.reason
+    if found.ground.candidates[name].signature.is_below_detection_limit and not (
+        verdict.is_needed and found.inclusion(name) >= _LIKELY
+    ):
+        return "not detectable", "its visible part is below what these readings could show"
+    return _without_need(found, verdict) or _misfit(found, index) or _less_probable(found, ranked, name, index)
+
+
+def fate_of_exchange(
+    found: Found, verdict: Verdict, ranked: Sequence[Answer], index: int, *, is_accepted: bool
+) -> Told:
+    """What became of two labels that may have been exchanged, with the likelihood ratio of the exchange."""
+    if is_accepted:
+        return "in the verdict", None
+    fate, because = _without_need(found, verdict) or _misfit(found, index) or _less_probable(found, ranked, None, index)
+    return fate, f"{because}; {ratio_words(found, index)}"
+
+
+def _without_need(found: Found, verdict: Verdict) -> Told | None:
+    if verdict.is_needed:
+        return None
+    fate: Fate = "not established" if verdict.word == "unexplained" else "not needed"
+    return fate, f"{fate}: nothing lacking has a probability of {found.none:.2f}"
+
+
+def _misfit(found: Found, index: int) -> Told | None:
+    """Too large a misfit with the candidate alone."""
+    p_value = found.p_value(index)
+    if p_value >= PASSES:
+        return None
+    return "does not fit", f"with it alone the misfit is still too large ({p_words(p_value)})"
+
+
+def _less_probable(found: Found, ranked: Sequence[Answer], name: str | None, index: int) -> Told:
+    """Its best answer beside the best of all."""
+    best = ranked[0]
+    own = max((one.support for one in ranked if one.index == index or name in one.members), default=0.0)
+    mine, others = f"{own:.3f}", f"{best.support:.3f}"
+    word = "less probable" if mine != others else "no more probable"
+    return "less probable", f"{word} ({mine}) than {answer_words(found, best)} ({others})"
+
+
+def ratio_words(found: Found, index: int) -> str:
+    """How much likelier the readings are under a hypothesis that exchanges two labels than as they are called."""
+    gained = float(found.log_evidence[index] - found.log_evidence[0])
+    likelier = "likelier" if gained > 0 else "less likely"
+    return f"with these labels exchanged the readings are {times(abs(gained))} {likelier}"

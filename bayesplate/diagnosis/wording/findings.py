@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,12 @@ from bayesplate.diagnosis.decision.claim import Claim
 from bayesplate.diagnosis.decision.constants import draw_constants
 from bayesplate.diagnosis.decision.stated import StatedClaim
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, alternatives_words, answer_words, answers, p_words
-from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.folds import Nested, log_score
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, are_stated
 from bayesplate.diagnosis.evidence.known import KnownFit
 from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, inclusion_with_width
+from bayesplate.diagnosis.evidence.search import PASSES, Found
+from bayesplate.diagnosis.evidence.sensitivity import WIDTHS, varied
 from bayesplate.diagnosis.wording.diagnosis import (
     Diagnosis,
     ElasticShift,
@@ -30,8 +28,7 @@ from bayesplate.diagnosis.wording.diagnosis import (
     NullControlSummary,
     PValues,
 )
-from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of
-from bayesplate.diagnosis.wording.fates import ratio_words
+from bayesplate.diagnosis.wording.entries import effect_entry, exchange_entries, p_value_of, ratio_words
 from bayesplate.diagnosis.wording.known import known_models
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
@@ -78,11 +75,8 @@ class Case:
     known : sequence of KnownFit
         The board as it stands first.
     stated_claims : sequence of StatedClaim
-    finalists : sequence of (Answer, Summary)
-        Explanations that were fitted again, best first, or the one that comes nearest where none is enough; each with
-        the summary of its fit.
-    drawn : dict of Draws
-        Of these fits, by the index of the hypothesis.
+    finalists : sequence of (Answer, Side)
+        Explanations that were fitted again, best first, or the one that comes nearest where none is enough.
     has_slip : bool
         Whether the fit without an effect names a reading or two that a slip explains.
     notes : tuple of str
@@ -102,8 +96,7 @@ class Case:
     recommendation: str
     known: Sequence[KnownFit] = ()
     stated_claims: Sequence[StatedClaim] = ()
-    finalists: Sequence[tuple[Answer, Summary]] = ()
-    drawn: Mapping[int, Draws] = field(default_factory=dict)
+    finalists: Sequence[tuple[Answer, Side]] = ()
     has_slip: bool = False
     notes: tuple[str, ...] = ()
     in_part: tuple[str, ...] = ()
@@ -128,7 +121,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
     """
     found, verdict, control = case.found, case.verdict, case.control
     ranked = answers(found)
-    halved, doubled = (inclusion_with_width(found, WIDTHS[word]) for word in ("halved", "doubled"))
+    halved, doubled = (varied(found, width=WIDTHS[word]) for word in ("halved", "doubled"))
     effects = found.ground.candidates.values()
     averaged = _averaged(case)
     taken = verdict.stands_for
@@ -150,15 +143,15 @@ def diagnosis_of(case: Case) -> Diagnosis:
         known=known_models(case.known, case.carried),
         stated_claims=tuple(case.stated_claims),
         probability_of_none=found.none,
-        probability_of_none_with_halved_priors=halved[""],
-        probability_of_none_with_doubled_priors=doubled[""],
+        probability_of_none_with_halved_priors=halved.none,
+        probability_of_none_with_doubled_priors=doubled.none,
         p_value=PValues(before=p_value_of(found, 0), after=p_value_of(found, case.after.index)),
         before=_errors(case, case.before),
         after=_errors(case, case.after),
         gain_null_percentile=None if (odds := _log_odds(found)) is None else control.percentile_of(odds),
         null_control=_null_control(case),
         elastic_shift=_elastic_shift(case),
-        finalists=tuple(_finalist(case, answer, figures) for answer, figures in case.finalists),
+        finalists=tuple(_finalist(case, answer, side.summary) for answer, side in case.finalists),
         elastic_averaged={name: averaged[name] for name in MODULI},
         rigidity_averaged={name: averaged[name] for name in RIGIDITIES},
         answers=tuple(
@@ -171,7 +164,7 @@ def diagnosis_of(case: Case) -> Diagnosis:
             for one in ranked
         ),
         candidates=(
-            *(effect_entry(found, verdict, ranked, one, doubled[one.name]) for one in effects),
+            *(effect_entry(found, verdict, ranked, one, doubled.inclusion(one.name)) for one in effects),
             *exchange_entries(found, verdict, ranked),
         ),
         recommendation=case.recommendation,
@@ -257,25 +250,15 @@ def _averaged(case: Case) -> dict[str, Spread]:
     readings there is nothing to average over: they are those of the fit with what explains them in part, else of the
     first.
     """
-    summary, found = case.after.summary if case.in_part else case.before.summary, case.found
     if case.verdict.word == "unexplained":
+        summary = case.after.summary if case.in_part else case.before.summary
         return dict((*summary.elastic.items(), *summary.rigidity.items()))
-    sampled = {0: case.before.draws, **case.drawn}
-    rng = np.random.default_rng([summary.seed, _AVERAGE_LINE])
-    shares = (under_exact_law(found) or found).probability
-    counts = rng.multinomial(_N_AVERAGED, shares / shares.sum())
-    parts = [_constants(found, sampled.get(i), i, rng, int(n)) for i, n in enumerate(counts) if n]
+    sides = (case.before, *(side for _, side in case.finalists))
+    sampled = {one.index: {**one.draws.moduli, **one.draws.rigidities} for one in sides}
+    rng = np.random.default_rng([case.before.summary.seed, _AVERAGE_LINE])
+    drawn = draw_constants(case.found, rng, _N_AVERAGED, sampled=sampled)
     units = dict.fromkeys(MODULI, "Pa") | dict.fromkeys(RIGIDITIES, "N m")
-    return {name: Spread.of(np.concatenate([part[name] for part in parts]), unit) for name, unit in units.items()}
-
-
-def _constants(found: Found, draws: Draws | None, index: int, rng: np.random.Generator, n: int) -> dict[str, Floats]:
-    """So many draws of every constant under one hypothesis."""
-    if draws is None:
-        return draw_constants(found, rng, n, among=[index]).values
-    every = {name: np.ravel(values) for name, values in (*draws.moduli.items(), *draws.rigidities.items())}
-    picked = rng.integers(next(iter(every.values())).size, size=n)
-    return {name: values[picked] for name, values in every.items()}
+    return {name: Spread.of(drawn[name], unit) for name, unit in units.items()}
 
 
 def _words(case: Case, taken: Sequence[Answer]) -> str:
@@ -294,7 +277,9 @@ def _sentences(case: Case, taken: Sequence[Answer]) -> tuple[str, ...]:
         for one in taken
         if (swap := case.found.ground.hypotheses[one.index].swap) is not None
     ]
-    nearest = [_nearest_sentence(case, *one) for one in case.finalists if one[0] == case.verdict.nearest]
+    nearest = [
+        _nearest_sentence(case, one, side.summary) for one, side in case.finalists if one == case.verdict.nearest
+    ]
     return (*effects, *exchanged, *nearest, *_stated_sentences(case, taken))
 
 

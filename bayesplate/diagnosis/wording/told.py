@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from bayesplate.diagnosis.decision.stated import LEAST_FALL, StatedClaim
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.diagnosis.wording.candidates import EffectEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import known_sentence
-from bayesplate.diagnosis.wording.stated import stated_sentences
 from bayesplate.diagnosis.wording.words import claim_sentence, meaning
-from bayesplate.effects.words import effect_names
+from bayesplate.effects.words import effect_names, joined
 from bayesplate.estimates.leave_one_out import carrying_sentence
+from bayesplate.labels import Label
+from bayesplate.plate.board import Board
+from bayesplate.quantities import Quantity
 
 
 def carrying_words(diagnosis: Diagnosis) -> str:
@@ -105,3 +110,52 @@ def warnings(diagnosis: Diagnosis) -> list[str]:
 def remarks(diagnosis: Diagnosis) -> list[str]:
     """What else there is to know: the reason of the verdict, notes of the run."""
     return [f"The reason: {diagnosis.reason}.", *diagnosis.notes]
+
+
+def stated_sentences(claims: Sequence[StatedClaim]) -> list[str]:
+    """A sentence on each: what is predicted, the error without and with the effects, and whether it is reduced."""
+    return [_stated_sentence(one) for one in claims]
+
+
+def _stated_sentence(one: StatedClaim) -> str:
+    who = f"{effect_names(one.effects)}, as stated and not chosen by the readings,"
+    verb = "takes" if len(one.effects) == 1 else "take"
+    if one.predicts:
+        what = f"the error of setup '{one.predicts}', predicted by the constants of the first setup alone,"
+    else:
+        what = "the left-out error"
+    told = (
+        f"{who[0].upper()}{who[1:]} {verb} {what} from {one.before_rms_cents:.1f} to {one.after_rms_cents:.1f} cents; "
+        f"the log score changes by {one.log_score_gain:+.1f} ± {one.standard_error:.1f} over {one.n_modes} modes"
+    )
+    if one.holds:
+        return f"{told}: error reduced."
+    needs = f"that asks for a fall by {LEAST_FALL:.0%} and a score that rises by more than two standard errors"
+    return f"{told}. That an error is reduced is not claimed: {needs}."
+
+
+def relabelled_sentence(before: Board, after: Board, words: str) -> str:
+    """Which peaks have another label in the model after than in the one before; empty where none has.
+
+    Parameters
+    ----------
+    before, after : Board
+        With the labels that their draws make likely.
+    words : str
+        What was added.
+    """
+    first, second = _labels(before), _labels(after)
+    changed = []
+    for key in sorted(first.keys() | second.keys(), key=lambda each: (each[0], each[1].mean)):
+        one, other = first.get(key), second.get(key)
+        if one != other:
+            where = f" in setup {key[0]}" if len(before.setups) > 1 else ""
+            instead = "no likely mode" if other is None else str(other)
+            was = "had no likely mode" if one is None else f"was {one}"
+            changed.append(f"{key[1].mean:.5g} Hz{where} is {instead} (it {was})")
+    return f"With {words} some peaks are other modes: {joined(changed)}." if changed else ""
+
+
+def _labels(board: Board) -> dict[tuple[str, Quantity], Label]:
+    """Labels by setup and frequency of the peak."""
+    return {(setup.name, reading.frequency): reading.label for setup in board.setups for reading in setup.readings}

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from bayesplate.diagnosis.evidence.predictive import PASSES
 
 import bayesplate
 from bayesplate import errors
@@ -18,11 +19,11 @@ from bayesplate.campaigns.search import OF_TWO
 from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
 from bayesplate.cards.shelf import card_names
 from bayesplate.diagnosis.decision.claim import IMPROBABLE, STANDARD_ERRORS
-from bayesplate.diagnosis.decision.verdict import AT_LIMIT, CLEARLY, WITHIN
+from bayesplate.diagnosis.decision.sizes import AT_LIMIT
+from bayesplate.diagnosis.decision.verdict import CLEARLY, WITHIN
 from bayesplate.diagnosis.evidence.folds import NEEDED
 from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, TWO
 from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS
-from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.sensitivity import NOISES, WIDTHS
 from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects import EFFECTS

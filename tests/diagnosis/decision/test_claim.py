@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, decided, ground_of
+from made_searches import bare, baseline, candidate, decided, ground_of, visible_of
 
 from bayesplate.diagnosis.decision.claim import (
     Claim,
@@ -35,10 +35,10 @@ def searched(size: float, direction: np.ndarray = DIRECTION, n_modes: int = 9, o
     levels = noise_grid(base.board)
     rivals = {name: candidate(base, name, each) for name, each in zip("bcd", others, strict=False)}
     effects = {"a": one} | rivals
-    hypotheses = [Hypothesis((name,), 0.5 / len(effects), each.fine, levels) for name, each in effects.items()]
+    hypotheses = [Hypothesis((name,), 0.5 / len(effects), each.fine, levels, base) for name, each in effects.items()]
     ground = ground_of(base, bare(base, levels), *hypotheses, candidates=effects)
     noise = 0.004 * np.random.default_rng(3).standard_normal(n_modes)
-    return search(ground, size * one.visible + noise)
+    return search(ground, size * visible_of(one) + noise)
 
 
 @pytest.fixture(scope="module")

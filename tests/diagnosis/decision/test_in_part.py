@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 from made_searches import CERTAIN, bare, baseline, candidate, decided, ground_of
 
-from bayesplate.diagnosis.decision import in_part
-from bayesplate.diagnosis.decision.claim import nested_of
-from bayesplate.diagnosis.decision.in_part import named_in_part
+from bayesplate.diagnosis.decision import claim
+from bayesplate.diagnosis.decision.claim import named_in_part, nested_of
 from bayesplate.diagnosis.evidence.folds import Nested
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.sensitivity import Variant
+from bayesplate.diagnosis.evidence.search import PASSES, Found
 from bayesplate.quantities import Quantity
 
 N_MODES = 8
@@ -30,7 +27,7 @@ def made(none=1e-6, rival=0.0, rest=0.1, prior=SIZE, planted=1.0) -> Found:
     directions = 0.1 * np.linalg.qr(np.random.default_rng(2).standard_normal((N_MODES, N_MODES)))[0][:3]
     effects = {n: candidate(base, n, d, prior) for n, d in zip("ab", directions[:2], strict=True)}
     levels = noise_grid(base.board)
-    every = [bare(base, levels), *(Hypothesis((name,), 0.2, one.fine, levels) for name, one in effects.items())]
+    every = [bare(base, levels), *(Hypothesis((name,), 0.2, one.fine, levels, base) for name, one in effects.items())]
     shares = np.array([none, (1.0 - none) * (1.0 - rival), (1.0 - none) * rival])
     other = rest / 0.1 * directions[2]
     residual = planted * directions[0] + other
@@ -81,13 +78,13 @@ def test_it_stands_out_by_three_to_one(rival, names):
 
 @pytest.mark.parametrize(("rival", "names"), [(0.24, ("a",)), (0.26, ())])
 def test_its_name_survives_every_other_assumption(rival, names):
-    assert told(made(), others=[Variant("if the noise is 1.5 times larger", made(rival=rival))]) == names
+    assert told(made(), others=[("if the noise is 1.5 times larger", made(rival=rival))]) == names
 
 
 def test_the_usual_variants_are_asked_where_none_are_given(monkeypatch):
     found = made()
     assert named_in_part(found, decided(found), CERTAIN, folded(0.5), None) == ("a",)
-    monkeypatch.setattr(in_part, "variants", lambda found: iter([Variant("with other priors", made(rival=0.26))]))
+    monkeypatch.setattr(claim, "variants", lambda found: iter([("with other priors", made(rival=0.26))]))
     assert named_in_part(found, decided(found), CERTAIN, folded(0.5), None) == ()
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from made_searches import NOISE, bare, baseline, ground_of
+from made_searches import NOISE, bare, baseline, ground_of, with_modes, with_residual
 
 from bayesplate.diagnosis.decision.readings import suspects, wrong_reading
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
@@ -15,7 +13,7 @@ from bayesplate.diagnosis.evidence.search import Found, search
 
 def found_of(residual, n_modes=8, noise=(NOISE,)) -> Found:
     base = baseline(np.random.default_rng(1), n_modes, noise=noise)
-    base = replace(base, residual=np.asarray(residual))
+    base = with_residual(base, residual)
     return search(ground_of(base, bare(base, noise_grid(base.board))))
 
 
@@ -45,7 +43,7 @@ def test_where_several_readings_may_be_the_wrong_one_none_is_named():
     base = baseline(np.random.default_rng(1), 6)
     slopes = base.slopes.copy()
     slopes[:2], slopes[2:] = np.eye(3)[0], np.eye(3)[[1, 1, 2, 2]]
-    base = replace(base, slopes=0.5 * slopes, residual=0.2 * np.eye(6)[0])
+    base = with_residual(with_modes(base, slopes=0.5 * slopes), 0.2 * np.eye(6)[0])
     found = search(ground_of(base, bare(base, noise_grid(base.board))))
     told = suspects(found)
     assert {one.index for one in told} == {0, 1}

@@ -12,11 +12,11 @@ from scipy import stats
 
 from bayesplate import Board, Setup
 from bayesplate.cards import load_prior
-from bayesplate.diagnosis.decision.stated import judge_stated, stated_claims
-from bayesplate.diagnosis.evidence.combinations import stated_effects
-from bayesplate.diagnosis.evidence.known import known_fit
-from bayesplate.diagnosis.evidence.scores import scores_given
-from bayesplate.diagnosis.wording.stated import stated_sentences
+from bayesplate.diagnosis.decision.stated import judge_stated, scores_given, stated_claims
+from bayesplate.diagnosis.evidence.known import known_fit, stated_effects
+from bayesplate.diagnosis.shifts.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.wording.told import stated_sentences
+from bayesplate.estimates.least_squares import log_measured
 from bayesplate.plate.setup import DeclaredFluid
 from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
@@ -183,7 +183,10 @@ def test_scores_are_those_of_a_bayesian_who_averages_over_the_noise(weighed):
     rng = np.random.default_rng(1)
     n = sum(len(setup.readings) for setup in board.setups)
     slopes, errors = rng.uniform(0.0, 0.5, (n, 3)), 0.004 * rng.normal(size=n)
-    found = scores_given(board, errors, slopes, [[2], [5]])
+    log_readings = log_measured(board)
+    every = Spectrum(log_readings - errors, slopes, np.zeros((n, 0)), (), np.zeros(0), (None,), lambda x: x @ slopes.T)
+    fit = Baseline(board, {}, np.zeros(3), log_readings, every, np.arange(n), ())
+    found = scores_given(fit, [[2], [5]])
     noise = board.setups[0].noise
     z = np.linspace(-5.0, 9.0, 400)
     own = board.setups[0].resolution / np.sqrt(12.0) / board.setups[0].measured

@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, decided, ground_of
+from made_searches import bare, baseline, candidate, decided, exchanged, ground_of, visible_of
 
-from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, alternatives, answers, at_limit, size_posterior
+from bayesplate.diagnosis.decision.sizes import at_limit, size_posterior
+from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, alternatives, answers
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.sensitivity import Variant
+from bayesplate.diagnosis.evidence.search import PASSES, Found
 from bayesplate.diagnosis.shifts.tables import nothing, together
 from bayesplate.quantities import Quantity
 
@@ -37,11 +36,11 @@ def found_with(base, probability, size=0.05, residual=None, prior=None):
     candidates = {n: candidate(base, n, d, **chosen) for n, d in zip(NAMES, directions, strict=True)}
     levels = noise_grid(base.board)
     every = [bare(base, levels)]
-    every += [Hypothesis((name,), 0.1, one.fine, levels) for name, one in candidates.items()]
-    every += [Hypothesis(SWAPPED, 0.1, nothing(6), levels, Swap(1, 2))]
-    every += [Hypothesis(PAIR, 0.1, together(candidates["a"].coarse, candidates["b"].coarse), levels)]
+    every += [Hypothesis((name,), 0.1, one.fine, levels, base) for name, one in candidates.items()]
+    every += [Hypothesis(SWAPPED, 0.1, nothing(6), levels, Swap(1, 2).applied(base), Swap(1, 2))]
+    every += [Hypothesis(PAIR, 0.1, together(candidates["a"].coarse, candidates["b"].coarse), levels, base)]
     shares = np.array([probability.get(one.members, 0.0) for one in every])
-    residual = candidates["a"].visible if residual is None else residual
+    residual = visible_of(candidates["a"]) if residual is None else residual
     return Found(ground_of(base, *every, candidates=candidates), residual, np.log(shares + 1e-300), shares)
 
 
@@ -71,10 +70,11 @@ def test_one_effect_that_could_be_seen_is_enough_for_none_needed(base):
 def test_an_effect_is_seen_from_twice_the_noise_over_root_n_on(base, times, is_seen):
     """Its visible rms, for the verdict; its trace in units of the noise, for being one of two."""
     one = candidate(base, "a", np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0])
-    rms = float(np.sqrt(np.mean((one.visible / base.scales) ** 2)))
-    seen = replace(one, visible=one.visible * times * 2.0 / np.sqrt(6.0) / rms)
-    ground = ground_of(base, candidates={"a": seen})
-    assert ground.is_below_detection_limit("a") is not is_seen
+    rms = float(np.sqrt(np.mean((visible_of(one) / base.scales) ** 2)))
+    factor = times * 2.0 / np.sqrt(6.0) / rms
+    seen = replace(one.signature, visible=factor * one.signature.visible)
+    ground = ground_of(base, candidates={"a": replace(one, signature=seen, trace=factor * one.trace)})
+    assert seen.is_below_detection_limit is not is_seen
     assert ground.paired == (("a",) if is_seen else ())
 
 
@@ -82,7 +82,7 @@ def test_undetectable_where_three_modes_leave_nothing_to_judge_by():
     few = baseline(np.random.default_rng(1), 3)
     levels = noise_grid(few.board)
     one = candidate(few, "a", np.zeros(3))
-    ground = ground_of(few, bare(few, levels), Hypothesis(("a",), 0.5, one.fine, levels), candidates={"a": one})
+    ground = ground_of(few, bare(few, levels), Hypothesis(("a",), 0.5, one.fine, levels, few), candidates={"a": one})
     verdict = decided(Found(ground, np.zeros(3), np.zeros(2), np.array([0.01, 0.99])))
     assert (verdict.word, verdict.reason) == ("undetectable", NOTHING_LEFT)
 
@@ -161,7 +161,7 @@ def test_a_pair_that_the_card_states_stands_for_itself_however_improbable(base, 
 
 def test_exchanged_labels_can_win(base):
     swap = Swap(1, 2)
-    mixed = swap.applied(base, np.zeros((1, 6)))[0]
+    mixed = exchanged(base, swap, np.zeros((1, 6)))[0]
     verdict = decided(found_with(base, {SWAPPED: 0.9, ("a",): 0.1}, residual=mixed))
     assert (verdict.word, verdict.effects, verdict.index) == ("named", SWAPPED, 4)
 
@@ -200,8 +200,8 @@ def test_a_cell_may_be_wider_than_what_counts_as_the_limit(base, members, index,
     """
     prior = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0, upper=2.0)
     found = found_with(base, {members: 1.0}, size=1.0, prior=prior)
-    other = 0.0 if len(members) == 1 else found.ground.candidates["b"].visible
-    found = replace(found, residual=size * found.ground.candidates["a"].visible + other)
+    other = 0.0 if len(members) == 1 else visible_of(found.ground.candidates["b"])
+    found = replace(found, residual=size * visible_of(found.ground.candidates["a"]) + other)
     assert bool(at_limit(found, index)) is limited
 
 
@@ -222,9 +222,9 @@ def test_a_form_that_is_not_the_likelier_one_may_be_at_its_limit(base, share):
     def found_by(weights):
         changed = replace(table, weights=weights)
         whole = replace(one, laws=(*one.laws, *other.laws), fine=changed)
-        every = bare(base, levels), Hypothesis(("a",), 0.5, changed, levels)
+        every = bare(base, levels), Hypothesis(("a",), 0.5, changed, levels, base)
         ground = ground_of(base, *every, candidates={"a": whole})
-        return Found(ground, 1.005 * one.visible, np.zeros(2), np.ones(2))
+        return Found(ground, 1.005 * visible_of(one), np.zeros(2), np.ones(2))
 
     even = found_by(table.weights / 2.0)
     first, second = (size_posterior(even, 1, 0, form, 0)[0].sum() for form in (0, 1))
@@ -254,7 +254,7 @@ def test_needed_is_what_the_null_simulations_do_not_reach(base):
 
 
 def turned(base, probability, words="if the noise is larger"):
-    return Variant(words, found_with(base, probability))
+    return words, found_with(base, probability)
 
 
 def test_a_name_that_another_assumption_changes_is_a_group_with_what_it_turned_into(base):
@@ -277,10 +277,10 @@ def test_a_name_that_has_no_support_at_all_there_is_turned_by_the_three_best(bas
     found = found_with(base, {("a",): 0.9, ("b",): 0.04, ("c",): 0.06})
     told = decided(found, others=[turned(base, {("b",): 0.06, ("c",): 0.30, SWAPPED: 0.33, PAIR: 0.31})])
     assert [one.members for one in told.stands_for] == [("a",), SWAPPED, PAIR, ("c",)]
-    missing = Variant("as it is", found_with(base, {}))  # which does not know of it at all
-    alone = replace(missing.found.ground, hypotheses=missing.found.ground.hypotheses[2:4])
-    other = replace(missing, found=replace(missing.found, ground=alone, probability=np.array([0.2, 0.1])))
-    assert decided(found, others=[other]).word == "indistinguishable group"
+    missing = found_with(base, {})  # which does not know of it at all
+    alone = replace(missing.ground, hypotheses=missing.ground.hypotheses[2:4])
+    other = replace(missing, ground=alone, probability=np.array([0.2, 0.1]))
+    assert decided(found, others=[("as it is", other)]).word == "indistinguishable group"
 
 
 def test_the_searches_that_a_name_has_to_survive_are_made_only_for_a_name(base):

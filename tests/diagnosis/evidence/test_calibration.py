@@ -50,7 +50,7 @@ def misses(found, drawn):
 
 
 def found_in(ground, readings):
-    return probabilities(ground.hypotheses, log_evidences(ground.hypotheses, ground.whole, readings))
+    return probabilities(ground.hypotheses, log_evidences(ground.hypotheses, ground.baseline, readings))
 
 
 slow = pytest.mark.slow

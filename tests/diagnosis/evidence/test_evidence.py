@@ -8,13 +8,13 @@ from itertools import product
 import numpy as np
 import pytest
 from made_boards import setup_of
-from made_searches import FREE, NOISE, bare, baseline, ground_of, one_level, table
+from made_searches import FREE, NOISE, bare, baseline, ground_of, left_out, one_level, table, with_modes
 from scipy.stats import multivariate_normal
 
-from bayesplate.diagnosis.evidence.folds import left_out, log_score, log_score_gains, nested
+from bayesplate.diagnosis.evidence.folds import log_score, log_score_gains, nested
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
-from bayesplate.diagnosis.evidence.terms import Fold, Terms
+from bayesplate.diagnosis.evidence.terms import Terms
 from bayesplate.plate.board import made_board
 from bayesplate.plate.parameter import Owner
 from bayesplate.quantities import Quantity
@@ -63,18 +63,24 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("left_out", [None, 2])
+@pytest.mark.parametrize("without", [None, 2])
 @pytest.mark.parametrize("case", CASES)
-def test_evidence_is_the_integral_over_constants_sizes_inputs_and_noise(case, left_out):
+def test_evidence_is_the_integral_over_constants_sizes_inputs_and_noise(case, without):
     rng = np.random.default_rng(1)
     base = baseline(rng, **CASES[case])
     cells = table(rng, n_cells=2)
     grid = NoiseGrid(np.array([[0.6], [1.7]]) * [s.noise.median for s in base.board.setups], np.array([0.3, 0.7]))
     residual = 0.01 * rng.standard_normal(6)
-    fold = Fold(base, left_out)
+    terms = Terms(cells, base, grid)
+    used = np.arange(6) if without is None else np.delete(np.arange(6), without)
 
-    found = Terms(cells, fold, grid).log_evidence(residual[None, :])[0]
-    assert found == pytest.approx(by_grid(base, cells, grid, residual, fold.used), abs=EXACT)
+    found = [terms.log_evidence(residual[None, :])[0]]
+    if without is not None:  # as a reading that is left out, and as one that is no mode
+        fewer = base.labelled(np.where(np.isin(np.arange(6), used), base.rows, -1))
+        found = [terms.left_out(residual[None, :])[0][without, 0]]
+        found += [Terms(cells, fewer, grid).log_evidence(residual[None, :])[0]]
+    expected = by_grid(base, cells, grid, residual, used)
+    assert found == pytest.approx([expected] * len(found), abs=EXACT)
 
 
 @pytest.mark.parametrize("forgotten", ["input", "rounding", "tangent", "cell", "reading"])
@@ -85,7 +91,7 @@ def test_an_integral_that_forgets_something_is_not_the_evidence(forgotten):
     cells = table(rng, n_cells=2)
     grid = one_level(base)
     residual = 0.01 * rng.standard_normal(6)
-    found = Terms(cells, Fold(base), grid).log_evidence(residual[None, :])[0]
+    found = Terms(cells, base, grid).log_evidence(residual[None, :])[0]
 
     used = np.arange(5 if forgotten == "reading" else 6)
     if forgotten in ("input", "rounding"):
@@ -101,7 +107,7 @@ def test_an_integral_that_forgets_something_is_not_the_evidence(forgotten):
 def test_many_sets_at_once_are_each_alone():
     rng = np.random.default_rng(2)
     base = baseline(rng)
-    terms = Terms(table(rng, n_cells=4, n_tangents=2), Fold(base), noise_grid(base.board))
+    terms = Terms(table(rng, n_cells=4, n_tangents=2), base, noise_grid(base.board))
     residuals = 0.01 * rng.standard_normal((5, 6))
     alone = [terms.log_evidence(one[None, :])[0] for one in residuals]
     assert terms.log_evidence(residuals) == pytest.approx(alone, abs=1e-12)
@@ -115,12 +121,12 @@ def test_few_cells_at_a_time_give_what_all_together_do(n_tangents, monkeypatch):
     residuals = 0.01 * rng.standard_normal((5, base.n_modes))
 
     def found():
-        terms = Terms(cells, Fold(base, 2), noise_grid(base.board))
-        return terms.log_evidence(residuals), terms.left_out_errors(residuals)
+        terms = Terms(cells, base, noise_grid(base.board))
+        return terms.log_evidence(residuals), *terms.left_out(residuals)
 
     together = found()
     monkeypatch.setattr("bayesplate.diagnosis.evidence.terms._MOST_NUMBERS", 300)
-    assert len(list(Terms(cells, Fold(base), noise_grid(base.board))._in_parts(5))) > 2
+    assert len(list(Terms(cells, base, noise_grid(base.board))._in_parts(5))) > 2
     for apart, whole in zip(found(), together, strict=True):
         np.testing.assert_allclose(apart, whole, rtol=1e-12)
 
@@ -128,7 +134,7 @@ def test_few_cells_at_a_time_give_what_all_together_do(n_tangents, monkeypatch):
 def test_constants_are_not_seen():
     rng = np.random.default_rng(3)
     base = baseline(rng, resolution=1.0)
-    terms = Terms(table(rng), Fold(base), noise_grid(base.board))
+    terms = Terms(table(rng), base, noise_grid(base.board))
     residual = 0.01 * rng.standard_normal((1, 6))
     moved = residual + 0.3 * rng.standard_normal((1, 3)) @ base.slopes.T
     assert terms.log_evidence(moved) == pytest.approx(terms.log_evidence(residual), abs=1e-9)
@@ -175,7 +181,7 @@ def test_a_reading_that_was_left_out_is_predicted_as_by_a_refit(n_tangents, n_in
     rng = np.random.default_rng(4)
     base = baseline(rng, n_inputs=n_inputs)
     cells = table(rng, n_cells=1, n_tangents=n_tangents)
-    ground = ground_of(base, Hypothesis(("first",), 1.0, cells, one_level(base)))
+    ground = ground_of(base, Hypothesis(("first",), 1.0, cells, one_level(base), base))
     residual = 0.01 * rng.standard_normal(6)
     refits = [refitted_without(base, i, residual, (cells.shift[0], cells.slopes[0]), NOISE) for i in range(6)]
     assert left_out(ground, 0, residual) == pytest.approx(refits, abs=1e-12)
@@ -209,7 +215,7 @@ def test_cells_and_levels_predict_with_their_share(case):
             share *= level * cells.weights[k]
             total += share
             predicted += share * refitted_without(base, 1, residual, (cells.shift[k], cells.slopes[k]), sd)
-    found = Terms(cells, Fold(base, 1), grid).left_out_errors(residual[None, :])[0]
+    found = Terms(cells, base, grid).left_out(residual[None, :])[1][1, 0]
     assert found == pytest.approx(predicted / total, abs=1e-7)  # the constants' sd of 100 stands for a flat prior
 
 
@@ -242,7 +248,7 @@ def test_the_log_score_is_the_sum_of_the_conditional_densities(n_inputs):
     rng = np.random.default_rng(7)
     base = baseline(rng, resolution=1.0, n_inputs=n_inputs)
     cells = table(rng, n_cells=1)
-    ground = ground_of(base, Hypothesis(("first",), 1.0, cells, one_level(base)))
+    ground = ground_of(base, Hypothesis(("first",), 1.0, cells, one_level(base), base))
     residual = 0.01 * rng.standard_normal(6)
     wide = 1e2  # sd of the constants; the flat prior is its limit
     known = cells.slopes[0] @ cells.slopes[0].T + base.input_slopes @ base.input_slopes.T
@@ -265,7 +271,7 @@ def days():
     first = base.board.setups[0]
     setups = tuple(replace(first, name=day, group=Owner("group", "days")) for day in ("monday", "friday"))
     slopes, frequency = np.tile(base.slopes[:6], (2, 1)), np.tile(base.log_frequency[:6], 2)
-    base = replace(base, board=replace(base.board, setups=setups), slopes=slopes, log_frequency=frequency)
+    base = with_modes(replace(base, board=replace(base.board, setups=setups)), slopes=slopes, log_frequency=frequency)
     return base, 0.02 * np.tile(np.eye(6)[2], 2) + 0.001 * rng.standard_normal(12)
 
 
@@ -289,7 +295,7 @@ def test_the_log_score_of_several_sessions_is_one_term_per_mode(days):
     """What both days say of a mode is one piece of evidence: as two, it would halve the variance of a gain."""
     base, residual = days
     cells = table(np.random.default_rng(9), 12, n_cells=1, n_tangents=1)
-    ground = ground_of(base, bare(base, one_level(base)), Hypothesis(("first",), 0.5, cells, one_level(base)))
+    ground = ground_of(base, bare(base, one_level(base)), Hypothesis(("first",), 0.5, cells, one_level(base), base))
     scores, wide = np.zeros((2, 6)), 10.0  # sd of the constants; the flat prior is its limit
     for k, (shift, slopes) in enumerate([(np.zeros(12), np.zeros((12, 1))), (cells.shift[0], cells.slopes[0])]):
         precision = np.linalg.inv(NOISE**2 * np.eye(12) + slopes @ slopes.T + wide**2 * base.slopes @ base.slopes.T)

@@ -7,14 +7,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, ground_of, one_level
+from made_searches import bare, baseline, candidate, ground_of, one_level, with_modes
 
 from bayesplate.diagnosis.decision import constants
 from bayesplate.diagnosis.decision.constants import draw_constants
 from bayesplate.diagnosis.evidence.draws import draw_terms
-from bayesplate.diagnosis.evidence.exact import draw_exact, exact_log_frequencies, log_weights_of, under_exact_law
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import search
+from bayesplate.diagnosis.evidence.sensitivity import draw_exact, exact_log_frequencies, log_weights_of, under_exact_law
 from bayesplate.diagnosis.shifts.tables import together
 from bayesplate.plate.material import RIGIDITIES
 
@@ -51,14 +51,14 @@ def found():
     """Two effects that act along directions of their own, and readings of the first."""
     rng = np.random.default_rng(1)
     base = baseline(rng, 6)
-    base = replace(base, predict=bent(base))
+    base = with_modes(base, predict=bent(base))
     levels = one_level(base, NOISE)
     candidates = {}
     for name in ("a", "b"):
         direction = 0.02 * rng.standard_normal(6)
         one = candidate(base, name, direction)
         candidates[name] = replace(one, laws=(BentLaw(one.laws[0].form, base, direction),))
-    every = [bare(base, levels), *(Hypothesis((n,), 0.2, one.fine, levels) for n, one in candidates.items())]
+    every = [bare(base, levels), *(Hypothesis((n,), 0.2, one.fine, levels, base) for n, one in candidates.items())]
     return search(ground_of(base, *every, candidates=candidates), 0.015 * rng.standard_normal(6))
 
 
@@ -79,7 +79,9 @@ def quadrature(found, law):
         weights = weights / weights.sum()
     density = np.zeros(len(x))
     for size, weight in zip(sizes, weights, strict=True):
-        there = base.predict(x) if law is None else law.every_log_frequency(base, x, {"size": np.full(len(x), size)})
+        there = (
+            base.every.predict(x) if law is None else law.every_log_frequency(base, x, {"size": np.full(len(x), size)})
+        )
         density += weight * np.exp(-0.5 * np.sum((readings - there) ** 2, axis=1) / NOISE**2)
     mean = density @ x / density.sum()
     return mean, np.sqrt(density @ (x - mean) ** 2 / density.sum()), np.log(density.sum())
@@ -102,7 +104,7 @@ def test_odds_are_those_of_the_bent_law(found):
     none, effect = (quadrature(found, law)[2] for law in (None, found.ground.candidates["a"].laws[0]))
     wanted = effect - none
     told = exact.log_evidence[1] - exact.log_evidence[0]
-    spread = [log_weights_of(found, draw_terms(found, i, np.random.default_rng(3), 4000)).std() for i in (0, 1)]
+    spread = [log_weights_of(found, i, draw_terms(found, i, np.random.default_rng(3), 4000)).std() for i in (0, 1)]
     assert abs(told - wanted) < 4.0 * np.hypot(*spread) / np.sqrt(128) + 0.05
     assert exact.probability.sum() == pytest.approx(1.0)
     assert np.exp(exact.log_evidence[1] - exact.log_evidence[0]) == pytest.approx(
@@ -122,7 +124,7 @@ def test_draws_that_are_no_plate_by_the_exact_law_count_for_nothing(found, off):
         return there
 
     def under(predict):
-        ground = replace(found.ground, baseline=replace(base, predict=predict), candidates={})
+        ground = replace(found.ground, baseline=with_modes(base, predict=predict), candidates={})
         ground = replace(ground, hypotheses=found.ground.hypotheses[:1])
         return replace(found, ground=ground, log_evidence=found.log_evidence[:1], probability=np.ones(1))
 
@@ -130,7 +132,7 @@ def test_draws_that_are_no_plate_by_the_exact_law_count_for_nothing(found, off):
     drawn = draw_terms(half, 0, np.random.default_rng(2), 400)
     is_lacking = drawn.log_rigidities[:, 0] > limit
     assert 0 < is_lacking.sum() < 400
-    np.testing.assert_array_equal(log_weights_of(half, drawn) == -np.inf, is_lacking)
+    np.testing.assert_array_equal(log_weights_of(half, 0, drawn) == -np.inf, is_lacking)
     assert (draw_exact(half, 0, np.random.default_rng(2), 400).log_rigidities[:, 0] <= limit).all()
 
     none = under(lambda x: np.full((len(x), base.n_modes), off))
@@ -142,37 +144,32 @@ def test_draws_that_are_no_plate_by_the_exact_law_count_for_nothing(found, off):
 
 def test_where_the_law_is_straight_nothing_changes(found):
     base = found.ground.baseline
-    base = replace(base, predict=lambda x: base.log_frequency + (x - base.log_rigidities) @ base.slopes.T)
+    base = with_modes(base, predict=lambda x: base.log_frequency + (x - base.log_rigidities) @ base.slopes.T)
     ground = replace(found.ground, baseline=base, candidates={}, hypotheses=found.ground.hypotheses[:1])
     same = replace(found, ground=ground, log_evidence=found.log_evidence[:1], probability=np.ones(1))
     drawn = draw_terms(same, 0, np.random.default_rng(2), 100)
-    np.testing.assert_allclose(exact_log_frequencies(same, drawn), drawn.predicted, atol=1e-12)
-    np.testing.assert_allclose(log_weights_of(same, drawn), 0.0, atol=1e-8)
+    np.testing.assert_allclose(exact_log_frequencies(same, 0, drawn), drawn.predicted, atol=1e-12)
+    np.testing.assert_allclose(log_weights_of(same, 0, drawn), 0.0, atol=1e-8)
 
 
 def test_two_effects_add_at_the_constants_of_a_draw(found):
     """The shift of one beside the shift of the other, both by their own law."""
     one, other = (found.ground.candidates[name] for name in ("a", "b"))
-    pair = Hypothesis(("a", "b"), 0.1, together(one.coarse, other.coarse), found.ground.hypotheses[0].noise)
+    pair = Hypothesis(
+        ("a", "b"), 0.1, together(one.coarse, other.coarse), found.ground.hypotheses[0].noise, found.ground.baseline
+    )
     ground = replace(found.ground, hypotheses=(*found.ground.hypotheses, pair))
     both = search(ground, found.residual)
     drawn = draw_terms(both, 3, np.random.default_rng(4), 200)
-    exact = exact_log_frequencies(both, drawn)
+    exact = exact_log_frequencies(both, 3, drawn)
     sizes = []
     for member, each in enumerate((one, other)):
-        z = each.coarse.z[drawn.cells[:, member], 0] + each.coarse.z_slopes[0, 0] * drawn.within[:, member]
+        cells = both.ground.hypotheses[3].table.member(member, drawn.cells)[1]
+        z = each.coarse.z[cells, 0] + each.coarse.z_slopes[0, 0] * drawn.within[:, member]
         sizes.append(np.maximum(z, 0.0))
     expected = bent(ground.baseline)(drawn.log_rigidities)
     expected = expected + sizes[0][:, None] * one.laws[0].direction + sizes[1][:, None] * other.laws[0].direction
     np.testing.assert_allclose(exact, expected, atol=1e-12)
-
-
-def test_without_an_exact_law_the_search_stays_linear(found):
-    base = replace(found.ground.baseline, predict=None)
-    linear = replace(found, ground=replace(found.ground, baseline=base))
-    assert under_exact_law(linear) is None
-    drawn = draw_exact(linear, 0, np.random.default_rng(2), 500)
-    assert np.array_equal(drawn.predicted, draw_terms(linear, 0, np.random.default_rng(2), 500).predicted)
 
 
 def test_averages_are_by_the_probabilities_of_the_exact_law(found, monkeypatch):
@@ -182,7 +179,7 @@ def test_averages_are_by_the_probabilities_of_the_exact_law(found, monkeypatch):
     means = np.array(
         [np.exp(draw_exact(found, i, np.random.default_rng(5), N_DRAWS).log_rigidities).mean(axis=0) for i in range(3)]
     )
-    drawn = draw_constants(found, np.random.default_rng(6), N_DRAWS).values
+    drawn = draw_constants(found, np.random.default_rng(6), N_DRAWS)
     told = np.array([drawn[name].mean() for name in RIGIDITIES])
     errors = np.array([drawn[name].std() for name in RIGIDITIES]) * np.sqrt(4.0 / N_DRAWS)
     assert np.abs((told - shares @ means) / errors).max() < 4.0

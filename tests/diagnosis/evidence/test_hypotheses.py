@@ -6,9 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import NOISE, bare, baseline, ground_of, one_level, table, with_readings
+from made_searches import (
+    NOISE,
+    bare,
+    baseline,
+    exchanged,
+    ground_of,
+    left_out,
+    one_level,
+    table,
+    with_readings,
+    with_residual,
+)
 
-from bayesplate.diagnosis.evidence.folds import left_out, nested
+from bayesplate.diagnosis.evidence.folds import nested
 from bayesplate.diagnosis.evidence.hypotheses import (
     RELABELLING,
     Hypothesis,
@@ -20,8 +31,7 @@ from bayesplate.diagnosis.evidence.hypotheses import (
     probabilities,
 )
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.terms import Fold
-from bayesplate.diagnosis.shifts.forms import with_labels_exchanged, with_readings_exchanged
+from bayesplate.diagnosis.shifts.forms import with_labels_exchanged
 from bayesplate.diagnosis.shifts.tables import nothing, together
 from bayesplate.plate.setup import AttachedItem
 from bayesplate.quantities import Quantity
@@ -36,12 +46,13 @@ def base():
 
 
 def swap_of(base, first, second, prior=0.5):
-    return Hypothesis((RELABELLING,), prior, nothing(base.n_modes), one_level(base), Swap(first, second))
+    swap = Swap(first, second)
+    return Hypothesis((RELABELLING,), prior, nothing(base.n_modes), one_level(base), swap.applied(base), swap)
 
 
 def test_prior_shares(base):
     rng = np.random.default_rng(2)
-    fine = {name: table(rng, name=name) for name in "abc"}
+    fine = {name: table(rng) for name in "abc"}
     found = hypotheses(base, fine, fine, ["a", "c"])
     shares = {}
     for one in found:
@@ -76,7 +87,7 @@ def test_a_stated_pair_has_the_prior_of_a_single_effect(base):
     (setup,) = base.board.setups
     item = AttachedItem("exciter", (), Quantity.exact(0.048))
     board = replace(base.board, setups=(replace(setup, attached=(item,)),))
-    fine = {name: table(rng, name=name) for name in (AIR, EXCITER, TENSION)}
+    fine = {name: table(rng) for name in (AIR, EXCITER, TENSION)}
     priors = {one.members: one.prior for one in hypotheses(replace(base, board=board), fine, fine, list(fine))}
     assert priors[AIR, EXCITER] == priors[AIR,]
     assert priors[AIR, TENSION] == priors[EXCITER, TENSION] == pytest.approx(0.1 / 3)
@@ -84,9 +95,9 @@ def test_a_stated_pair_has_the_prior_of_a_single_effect(base):
 
 def test_two_effects_add(base):
     rng = np.random.default_rng(3)
-    one, other = table(rng, n_cells=2, name="a"), table(rng, n_cells=3, n_tangents=2, name="b")
+    one, other = table(rng, n_cells=2), table(rng, n_cells=3, n_tangents=2)
     both = together(one, other)
-    assert both.members == ("a", "b")
+    assert both.parts == (one, other)
     assert both.weights.sum() == pytest.approx(1.0)
     for i in range(2):
         for j in range(3):
@@ -109,17 +120,17 @@ def test_neighbours_of_one_class_that_stand_in_the_other_order_may_be_confused(b
     """The third and fourth readings are of one class: only where they have crossed is there something to exchange."""
     crossed = base.log_frequency[[0, 1, 3, 2, 4, 5]] - base.log_frequency
     assert (2, 3) not in {(one.first, one.second) for one in confusable(base)}
-    found = {(one.first, one.second) for one in confusable(replace(base, residual=crossed))}
+    found = {(one.first, one.second) for one in confusable(with_residual(base, crossed))}
     assert (3, 2) in found
 
 
-def test_exchanging_twice_changes_nothing_and_once_moves_the_readings(base):
-    residuals = 0.01 * np.random.default_rng(4).standard_normal((3, 6))
+def test_exchanging_twice_changes_nothing_and_once_takes_each_reading_for_the_other_mode(base):
     swap = Swap(3, 4)
-    once = swap.applied(base, residuals.copy())
-    assert once + base.log_frequency == pytest.approx((residuals + base.log_frequency)[:, [0, 1, 2, 4, 3, 5]])
-    assert swap.applied(base, once.copy()) == pytest.approx(residuals, abs=1e-14)
-    assert np.abs(once - residuals).max() > 0.05
+    once = swap.applied(base)
+    assert once.middle == pytest.approx(base.middle[[0, 1, 2, 4, 3, 5]])
+    assert once.log_readings is base.log_readings
+    assert np.array_equal(swap.applied(once).rows, base.rows)
+    assert np.abs(once.residual - base.residual).max() > 0.05
 
 
 def test_a_board_with_labels_exchanged_holds_the_same_readings_under_the_other_label(base):
@@ -143,13 +154,13 @@ def test_labels_are_exchanged_in_their_own_setup():
 def test_a_fold_knows_nothing_of_the_reading_that_is_left_out(base, mode):
     """Also where labels are exchanged: the reading is then left out under its other label."""
     rng = np.random.default_rng(5)
-    found = (bare(base, one_level(base)), Hypothesis(("a",), 0.1, table(rng), one_level(base)), swap_of(base, 3, 4))
+    one = Hypothesis(("a",), 0.1, table(rng), one_level(base), base)
     residuals = 0.01 * rng.standard_normal((1, 6))
     changed = residuals + 0.1 * np.eye(6)[mode]
-    fold = Fold(base, mode)
-    assert log_evidences(found, fold, changed) == pytest.approx(log_evidences(found, fold, residuals), abs=1e-9)
-    other = Fold(base, (mode + 1) % 6)
-    assert np.abs(log_evidences(found, other, changed) - log_evidences(found, other, residuals)).min() > 1e-6
+    for each in (bare(base, one_level(base)), one, swap_of(base, 3, 4)):
+        before, after = (each.terms.left_out(each.seen(base, seen))[0][:, 0] for seen in (residuals, changed))
+        assert after[mode] == pytest.approx(before[mode], abs=1e-9)
+        assert np.abs(np.delete(after - before, mode)).min() > 1e-6
 
 
 def test_readings_with_exchanged_labels_are_predicted_once_the_exchange_is_seen(base):
@@ -157,7 +168,7 @@ def test_readings_with_exchanged_labels_are_predicted_once_the_exchange_is_seen(
     rng = np.random.default_rng(6)
     straight = 1e-4 * rng.standard_normal((1, 6))
     swap = swap_of(base, 3, 4)
-    mixed = swap.swap.applied(base, straight.copy())
+    mixed = exchanged(base, swap.swap, straight.copy())
     ground = ground_of(base, bare(base, noise_grid(base.board)), swap)
     as_it_is = left_out(ground_of(base, bare(base, one_level(base))), 0, straight[0])
     put_right = left_out(ground, 1, mixed[0])
@@ -168,23 +179,21 @@ def test_readings_with_exchanged_labels_are_predicted_once_the_exchange_is_seen(
     assert (nested(ground, straight).chosen == 0).all()
 
 
-@pytest.mark.parametrize("left_out", [None, 1, 3, 4])
-def test_a_reading_takes_its_own_error_along_to_the_other_label(base, left_out):
+def test_a_reading_takes_its_own_error_along_to_the_other_label(base):
     """A doubtful reading and a sharp one exchanged are those of a board on which they stand so from the start."""
     (setup,) = base.board.setups
     readings = list(setup.readings)
     readings[3] = replace(readings[3], frequency=Quantity.from_mean(readings[3].frequency.mean, 4.0, "normal"))
     base = replace(base, board=replace(base.board, setups=(replace(setup, readings=tuple(readings)),)))
-    put_right = replace(base, board=with_readings_exchanged(base.board, 3, 4))
-    swap, none = swap_of(base, 3, 4), bare(base, one_level(base))
+    order = [0, 1, 2, 4, 3, 5]
+    swapped = [replace(readings[i], frequency=readings[j].frequency) for i, j in enumerate(order)]
+    put_right = replace(base, board=replace(base.board, setups=(replace(setup, readings=tuple(swapped)),)))
+    swap, none = swap_of(base, 3, 4), bare(put_right, one_level(base))
     mixed = 0.01 * np.random.default_rng(7).standard_normal((2, 6))
-    straight = swap.swap.applied(base, mixed.copy())
-    fold, there = Fold(base, left_out), Fold(put_right, {3: 4, 4: 3}.get(left_out, left_out))
+    straight = exchanged(base, swap.swap, mixed.copy())
     assert base.own_variance[3] > 10.0 * NOISE**2
     assert put_right.own_variance[[3, 4]] == pytest.approx([0.0, (4.0 / readings[3].frequency.mean) ** 2])
-    assert log_evidences((swap,), fold, mixed) == pytest.approx(log_evidences((none,), there, straight))
-    if left_out is not None:
-        errors = [one.terms(each).left_out_errors(seen) for one, each, seen in (
-            (swap, fold, swap.seen(base, mixed)), (none, there, straight),
-        )]  # fmt: skip
-        assert errors[0] == pytest.approx(errors[1])
+    assert log_evidences((swap,), base, mixed) == pytest.approx(log_evidences((none,), put_right, straight))
+    (evidence, errors), (there, expected) = swap.terms.left_out(swap.seen(base, mixed)), none.terms.left_out(straight)
+    assert evidence == pytest.approx(there[order])
+    assert errors == pytest.approx(expected[order])

@@ -10,16 +10,15 @@ from generator.boards import plant
 from generator.card import SHEAR_MEANS
 from scipy.stats import chi2
 
-from bayesplate.diagnosis.evidence import combinations, known
-from bayesplate.diagnosis.evidence.combinations import (
+from bayesplate.diagnosis.evidence import known
+from bayesplate.diagnosis.evidence.known import (
     every_combination,
     known_effects,
+    known_fit,
+    known_fits,
     stated_effects,
     with_combination,
 )
-from bayesplate.diagnosis.evidence.known import known_fit, known_fits
-from bayesplate.diagnosis.evidence.search import prepare_search
-from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.wording.known import known_models, known_sentence
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.frequencies.laws import cents
@@ -79,7 +78,7 @@ def fiemme(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fits(fiemme):
     """All of them, every model solved anew, by what is computed."""
-    return {one.effects: one for one in known_fits(fiemme, {})}
+    return {one.effects: one for one in known_fits(fiemme)}
 
 
 @pytest.mark.parametrize("effects", [(), (SHEAR,), (AIR,), (SHEAR, AIR)])
@@ -111,24 +110,6 @@ def test_the_left_out_errors_are_those_of_full_refits(fiemme, fits):
         predicted = setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0]
         errors.append(log_measured(board)[i] - predicted[i])
     assert cents(fits[AIR,].errors.left_out[some]) == pytest.approx(cents(errors), abs=0.2, rel=2e-3)
-
-
-def test_laws_of_the_search_are_used_and_give_the_same(fiemme, fits, monkeypatch):
-    told, solved_anew = [], []
-
-    def spy(problem, board, at):
-        solved_anew.append(board.effects)
-        return solve(problem, board, at)
-
-    solve = known._solved
-    monkeypatch.setattr(known, "_solved", spy)
-    solved = prepare_search(baseline_of(fiemme), tried=(SHEAR, AIR))
-    again = known_fits(fiemme, {name: one.laws[0] for name, one in solved.candidates.items()}, told.append)
-    assert solved_anew == [(AIR,), (SHEAR, AIR)]  # air moves these constants far from where its law was made
-    assert [(one.effects, one.without) for one in again] == [((), ()), ((SHEAR,), ()), ((AIR,), ()), ((SHEAR, AIR), ())]
-    assert told == [0.25, 0.5, 0.75, 1.0]
-    for one in again:
-        assert rms(one.errors.in_sample) == pytest.approx(rms(fits[one.effects].errors.in_sample), abs=WITHIN)
 
 
 def test_nothing_is_fitted_but_the_constants(tmp_path, monkeypatch):
@@ -187,12 +168,12 @@ def test_an_exciter_of_stated_mass_is_known_and_stated_though_an_empty_list_decl
 
 def test_four_known_effects_are_combined_by_up_to_three_and_all_where_the_card_states_them(fiemme, monkeypatch):
     names = (MASS, "exciter", SHEAR, AIR)
-    monkeypatch.setattr(combinations, "known_effects", lambda _: names)
-    monkeypatch.setattr(combinations, "stated_effects", lambda _: names[:2])
+    monkeypatch.setattr(known, "known_effects", lambda _: names)
+    monkeypatch.setattr(known, "stated_effects", lambda _: names[:2])
     found = every_combination(fiemme.board)
     assert [len(one) for one in found] == [0] + 4 * [1] + 6 * [2] + 4 * [3]
     assert len(set(found)) == len(found)
-    monkeypatch.setattr(combinations, "stated_effects", lambda _: names)
+    monkeypatch.setattr(known, "stated_effects", lambda _: names)
     assert every_combination(fiemme.board) == [*found, names]
 
 
@@ -200,7 +181,7 @@ def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path):
     problem = Problem.from_card(card_of(tmp_path, after=ATTACHED.format(mass=5))).posed
     assert problem.board.effects == (MASS,)
     told: list[float] = []
-    found = known_fits(problem, {}, told.append)
+    found = known_fits(problem, told.append)
     assert told == pytest.approx(np.arange(1.0, 9.0) / 8.0)
     assert [one.combination for one in found] == [
         (MASS,), (), (SHEAR,), (AIR,), (SHEAR, AIR), (SHEAR, MASS), (AIR, MASS), (SHEAR, AIR, MASS),
@@ -225,7 +206,7 @@ def test_a_declared_size_of_the_library_is_fixed_in_combinations_and_learnt_as_t
     card = card_of(tmp_path, without=SHEAR_LINES)
     problem = Problem.from_card(card, effects=(SHEAR,)).posed
     bare = Problem.from_card(card).posed
-    found = {one.combination: one for one in known_fits(problem, {})[1:]}
+    found = {one.combination: one for one in known_fits(problem)[1:]}
     assert set(found) == {(), (SHEAR,), (AIR,), (SHEAR, AIR)}
     wanted = known_fit(bare, (SHEAR,))
     assert rms(found[SHEAR,].errors.in_sample) == pytest.approx(rms(wanted.errors.in_sample), abs=WITHIN)
@@ -322,7 +303,7 @@ def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
     """On this board air brings two modes so close that their shapes would exchange names."""
     problem = Problem.from_card("spruce-free-3L").posed
     board = with_combination(problem.board, (AIR,))
-    (solved,) = known._solved(problem, board, np.log(problem.estimate.rigidities) + MOVED)
+    (solved,) = known._solved(problem, board, board.nominal(), np.log(problem.estimate.rigidities) + MOVED)
     (before,) = problem.posterior.models
     assert [(one.parity, one.rank) for one in solved.places] == [(one.parity, one.rank) for one in before.places]
     constants = dict(zip(RIGIDITIES, problem.estimate.rigidities * np.exp(MOVED), strict=True))
@@ -333,8 +314,8 @@ def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
 def test_of_an_isotropic_plate_every_combination_fits_one_modulus():
     """And, of two effects together, the one that full solves of a card with both declared give."""
     posed = Problem.from_card("steel-air-water").posed
-    found = {one.combination: one for one in known_fits(posed, {})}
+    found = {one.combination: one for one in known_fits(posed)}
 
-    assert {one.log_rigidities.shape for one in found.values()} == {(1,)}
-    assert {one.slopes.shape for one in found.values()} == {(10, 1)}
+    assert {one.baseline.log_rigidities.shape for one in found.values()} == {(1,)}
+    assert {one.baseline.slopes.shape for one in found.values()} == {(10, 1)}
     assert are_alike(found[SHEAR, AIR], *by_hand("steel-air-water", (SHEAR, AIR)))

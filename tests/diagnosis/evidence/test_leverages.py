@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of
 
+from bayesplate.diagnosis.evidence.folds import carrying
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.leverages import carrying
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.tables import together
@@ -23,8 +23,8 @@ def found():
     base = baseline(np.random.default_rng(1), N_MODES, n_inputs=0)
     levels = noise_grid(base.board)
     effects = {name: candidate(base, name, 0.2 * np.eye(N_MODES)[mode], WIDE) for name, mode in (("a", 4), ("b", 6))}
-    every = [bare(base, levels), *(Hypothesis((name,), 0.1, one.fine, levels) for name, one in effects.items())]
-    every.append(Hypothesis(("a", "b"), 0.1, together(effects["a"].coarse, effects["b"].coarse), levels))
+    every = [bare(base, levels), *(Hypothesis((name,), 0.1, one.fine, levels, base) for name, one in effects.items())]
+    every.append(Hypothesis(("a", "b"), 0.1, together(effects["a"].coarse, effects["b"].coarse), levels, base))
     shares = np.full(len(every), 1.0 / len(every))
     return Found(ground_of(base, *every, candidates=effects), np.zeros(N_MODES), np.log(shares), shares)
 

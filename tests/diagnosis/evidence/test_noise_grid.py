@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
-from made_searches import baseline, table
+from made_searches import baseline, table, with_residual
 
 from bayesplate.diagnosis.evidence.hypotheses import hypotheses
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid
-from bayesplate.diagnosis.evidence.terms import Fold, Terms
+from bayesplate.diagnosis.evidence.terms import Terms
 from bayesplate.diagnosis.shifts.tables import nothing
 
 N_SETS = 40
@@ -20,7 +19,7 @@ N_SETS = 40
 def log_odds(base, grid, residuals):
     """Of an effect of a few cells against none."""
     some = table(np.random.default_rng(5), base.n_modes)
-    one, none = (Terms(each, Fold(base), grid).log_evidence(residuals) for each in (some, nothing(base.n_modes)))
+    one, none = (Terms(each, base, grid).log_evidence(residuals) for each in (some, nothing(base.n_modes)))
     return one - none
 
 
@@ -77,15 +76,15 @@ def test_a_large_misfit_is_a_large_noise(n_setups, times):
     """
     rng = np.random.default_rng(3)
     base = baseline(rng, 6 * n_setups, noise=(0.005,) * n_setups)
-    base = replace(base, residual=times * 0.005 * rng.standard_normal(base.n_modes))
+    base = with_residual(base, times * 0.005 * rng.standard_normal(base.n_modes))
     t = np.array(list(product(np.linspace(-4.0, 10.0, 71), repeat=n_setups)))
     weights = np.exp(-0.5 * (t**2).sum(axis=1))
     fine = NoiseGrid(0.005 * np.exp(0.5 * t), weights / weights.sum())
-    some = {name: table(rng, base.n_modes, name=name) for name in "ab"}
+    some = {name: table(rng, base.n_modes) for name in "ab"}
     found = hypotheses(base, some, some, "ab")
 
     def off(one, grid):
-        both = (Terms(one.table, Fold(base), each).log_evidence(base.residual[None, :])[0] for each in (grid, fine))
+        both = (Terms(one.table, base, each).log_evidence(base.residual[None, :])[0] for each in (grid, fine))
         return abs(next(both) - next(both))
 
     assert off(found[0], found[0].noise) < 0.7

@@ -11,8 +11,7 @@ from scipy.stats import chi2, kstest, kstwobign
 
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.predictive import PASSES, predictive_p_value
-from bayesplate.diagnosis.evidence.terms import Fold
+from bayesplate.diagnosis.evidence.search import PASSES, predictive_p_value
 from bayesplate.quantities import Quantity
 
 N_SETS = 4000
@@ -51,8 +50,8 @@ def test_the_p_value_is_uniform_under_noise_of_the_prior_and_not_under_three_tim
     base = baseline(rng, 3 + 3 * len(noise), n_inputs=n_inputs, noise=noise, resolution=0.2)
     nothing_lacks = bare(base, noise_grid(base.board))
 
-    assert uniformity(predictive_p_value(nothing_lacks, Fold(base), noisy(base, rng))) > CERTAIN
-    too_large = predictive_p_value(nothing_lacks, Fold(base), noisy(base, rng, 3.0))
+    assert uniformity(predictive_p_value(nothing_lacks, base, noisy(base, rng))) > CERTAIN
+    too_large = predictive_p_value(nothing_lacks, base, noisy(base, rng, 3.0))
     assert uniformity(too_large) < CERTAIN
     assert np.mean(too_large < PASSES) > 0.3
 
@@ -61,10 +60,11 @@ def test_a_noise_that_is_fitted_to_each_set_of_readings_would_not_be_uniform():
     """What the test above has to catch: of two setups the misfit at each level of the noise, averaged over them."""
     rng = np.random.default_rng(2)
     base = baseline(rng, 12, noise=(NOISE, NOISE))
-    terms = bare(base, noise_grid(base.board)).terms(Fold(base))
-    seen = noisy(base, rng) @ terms.fold.blind.T
-    squares = np.einsum("nd,lde,ne->ln", seen, np.linalg.inv(terms.noise_covariance), seen)
-    averaged = terms.noise.weights @ chi2.sf(squares, seen.shape[1])
+    levels, blind = noise_grid(base.board), base.blind
+    seen = noisy(base, rng) @ blind.T
+    variances = levels.sd[:, base.setup_index] ** 2 + base.own_variance
+    squares = np.stack([np.einsum("nd,de,ne->n", seen, np.linalg.inv(blind * v @ blind.T), seen) for v in variances])
+    averaged = levels.weights @ chi2.sf(squares, seen.shape[1])
     assert uniformity(averaged) < CERTAIN
     assert np.mean(averaged < PASSES) > 1.3 * PASSES
 
@@ -79,7 +79,7 @@ def test_the_p_value_of_a_known_noise_is_that_of_chi_squared():
     white = base.slopes / base.scales[:, None]
     left = residuals / base.scales - (residuals / base.scales) @ np.linalg.pinv(white).T @ white.T
     expected = chi2.sf((left**2).sum(axis=1), 3)
-    found = predictive_p_value(bare(base, one_level(base)), Fold(base), residuals)
+    found = predictive_p_value(bare(base, one_level(base)), base, residuals)
     bound = 4.0 * np.sqrt(expected * (1.0 - expected) / N_SIMULATED["bare"]) + 2.0 / N_SIMULATED["bare"]
     assert np.all(np.abs(found - expected) < bound)
     assert np.any(np.abs(found - chi2.sf((left**2).sum(axis=1), 4)) > bound)
@@ -89,15 +89,15 @@ def test_an_effect_that_is_there_passes_as_often_as_it_should_and_its_absence_do
     rng = np.random.default_rng(3)
     base = baseline(rng)
     direction = 0.02 * rng.standard_normal(6)
-    there = Hypothesis(("first",), 0.5, candidate(base, "first", direction).fine, noise_grid(base.board))
+    there = Hypothesis(("first",), 0.5, candidate(base, "first", direction).fine, noise_grid(base.board), base)
     shift = np.abs(rng.standard_normal((N_SETS, 1))) * direction
     readings = noisy(base, rng) + shift
     n_simulated = N_SIMULATED["with an effect"]
     bound = PASSES + 4.0 * np.sqrt(PASSES / N_SETS + PASSES / n_simulated)
 
-    assert uniformity(predictive_p_value(there, Fold(base), readings), n_simulated) > CERTAIN
-    assert np.mean(predictive_p_value(bare(base, noise_grid(base.board)), Fold(base), readings) < PASSES) > bound
-    assert np.mean(predictive_p_value(there, Fold(base), readings - 2.0 * shift) < PASSES) > bound
+    assert uniformity(predictive_p_value(there, base, readings), n_simulated) > CERTAIN
+    assert np.mean(predictive_p_value(bare(base, noise_grid(base.board)), base, readings) < PASSES) > bound
+    assert np.mean(predictive_p_value(there, base, readings - 2.0 * shift) < PASSES) > bound
 
 
 def test_sizes_that_the_prior_hardly_allows_count_as_misfit():
@@ -105,13 +105,13 @@ def test_sizes_that_the_prior_hardly_allows_count_as_misfit():
     base = baseline(rng)
     cells = table(rng, n_cells=2, n_tangents=0, size=0.05)
     residual = cells.shift[1][None, :]
-    likely = Hypothesis(("first",), 0.5, cells, noise_grid(base.board))
-    assert predictive_p_value(likely, Fold(base), residual)[0] > 0.5
-    cells.weights[...] = [1.0 - 1e-9, 1e-9]
-    assert predictive_p_value(likely, Fold(base), residual)[0] < PASSES
+    likely = Hypothesis(("first",), 0.5, cells, noise_grid(base.board), base)
+    assert predictive_p_value(likely, base, residual)[0] > 0.5
+    hardly = replace(likely, table=replace(cells, weights=np.array([1.0 - 1e-9, 1e-9])))
+    assert predictive_p_value(hardly, base, residual)[0] < PASSES
 
 
 def test_readings_that_nothing_allows_have_the_smallest_p_value():
     base = baseline(np.random.default_rng(5))
-    found = predictive_p_value(bare(base, noise_grid(base.board)), Fold(base), np.eye(6)[:1])
+    found = predictive_p_value(bare(base, noise_grid(base.board)), base, np.eye(6)[:1])
     assert found[0] == 1.0 / (1.0 + N_SIMULATED["bare"])

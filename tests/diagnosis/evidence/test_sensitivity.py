@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_searches import bare, baseline, candidate, ground_of, one_level
+from made_searches import bare, baseline, candidate, ground_of, one_level, visible_of
 from scipy.stats import binom
 
 from bayesplate.diagnosis.decision.constants import draw_constants
@@ -20,10 +20,9 @@ from bayesplate.diagnosis.evidence.null_control import (
     made_to_choose,
     null_control,
 )
-from bayesplate.diagnosis.evidence.predictive import noise_of_board
-from bayesplate.diagnosis.evidence.search import Found, search
-from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width, variants, varied
-from bayesplate.diagnosis.evidence.terms import Fold, Terms
+from bayesplate.diagnosis.evidence.search import Found, noise_of_board, search
+from bayesplate.diagnosis.evidence.sensitivity import under_exact_law, variants, varied
+from bayesplate.diagnosis.evidence.terms import Terms
 from bayesplate.quantities import Quantity
 
 
@@ -34,28 +33,28 @@ def small():
     direction = 0.02 * np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0]
     one = candidate(base, "a", direction)
     levels = noise_grid(base.board)
-    ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels), candidates={"a": one})
+    ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels, base), candidates={"a": one})
     return ground, one
 
 
 def test_a_width_of_one_changes_nothing(finnish_few):
     found = search(finnish_few.ground)
-    same = inclusion_with_width(found, 1.0)
-    assert same.pop("") == pytest.approx(found.none, rel=1e-9)
-    assert same == pytest.approx({name: found.inclusion(name) for name in finnish_few.ground.candidates}, rel=1e-9)
+    same = varied(found, width=1.0)
+    assert same.none == pytest.approx(found.none, rel=1e-9)
+    for name in finnish_few.ground.candidates:
+        assert same.inclusion(name) == pytest.approx(found.inclusion(name), rel=1e-9)
 
 
 def test_twice_the_width_halves_the_density_at_zero(small):
     """A size that the readings put at zero loses log 2 of evidence; one far out gains what the wider prior gives it."""
     ground, one = small
     for z, wanted in ((0.0, -np.log(2.0)), (2.0, -np.log(2.0) + 0.5 * 2.0**2 * (1 - 1 / 4))):
-        sharp = Terms(one.fine, Fold(ground.baseline), one_level(ground.baseline, 1e-4))
+        sharp = Terms(one.fine, ground.baseline, one_level(ground.baseline, 1e-4))
         cell = int(np.argmin(np.abs(one.fine.z[:, 0] - z)))
         residual = one.fine.shift[cell]
         found = Found(ground, residual, np.zeros(2), np.array([0.5, 0.5]))
-        narrow = inclusion_with_width(found, 1.0)
-        wide = inclusion_with_width(found, 2.0)
-        odds = np.log(wide["a"] / wide[""]) - np.log(narrow["a"] / narrow[""])
+        narrow, wide = (varied(found, width=width) for width in (1.0, 2.0))
+        odds = np.log(wide.inclusion("a") / wide.none) - np.log(narrow.inclusion("a") / narrow.none)
         assert sharp.log_evidence(residual[None, :]).size == 1
         at = float(one.fine.z[cell, 0])
         assert odds == pytest.approx(wanted, abs=0.25 + 0.75 * abs(at - z))
@@ -64,9 +63,9 @@ def test_twice_the_width_halves_the_density_at_zero(small):
 @pytest.mark.slow
 def test_poisson_ratio_is_not_named_with_twice_its_width_either(finnish):
     """Among all candidates."""
-    doubled = inclusion_with_width(search(finnish.ground), 2.0)
-    assert doubled[""] > 0.1
-    assert doubled["poisson_ratio"] < 0.5
+    doubled = varied(search(finnish.ground), width=2.0)
+    assert doubled.none > 0.1
+    assert doubled.inclusion("poisson_ratio") < 0.5
 
 
 def test_constants_are_those_of_a_direct_regression():
@@ -75,11 +74,12 @@ def test_constants_are_those_of_a_direct_regression():
     base = baseline(rng, n_inputs=1, resolution=1.0)
     thickness = Quantity.from_mean(3e-3, 3e-5)
     base = replace(base, board=base.board.with_priors({"thickness": thickness}))
-    one = candidate(base, "a", 0.02 * rng.standard_normal(6), n_cells=1)
-    ground = ground_of(base, Hypothesis(("a",), 1.0, one.fine, one_level(base)), candidates={"a": one})
+    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    one = candidate(base, "a", 0.02 * rng.standard_normal(6), prior, n_cells=1)
+    ground = ground_of(base, Hypothesis(("a",), 1.0, one.fine, one_level(base), base), candidates={"a": one})
     residual = 0.01 * rng.standard_normal(6)
     n = 40_000
-    drawn = draw_constants(Found(ground, residual, np.zeros(1), np.ones(1)), rng, n).values
+    drawn = draw_constants(Found(ground, residual, np.zeros(1), np.ones(1)), rng, n)
 
     weights = 1.0 / (one_level(base).sd[0, 0] ** 2 + base.own_variance)
     columns = np.hstack([base.slopes, one.fine.slopes[0], base.input_slopes])
@@ -121,7 +121,7 @@ def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_ther
     assert calm.against.shape == (1000,)
     assert calm.ratio is None
     assert calm.flagged <= FALSE_ALARMS
-    there = search(ground, 1.5 * one.visible + 0.001 * rng.standard_normal(6))
+    there = search(ground, 1.5 * visible_of(one) + 0.001 * rng.standard_normal(6))
     assert there.against_none == pytest.approx(np.log(there.probability[1] / there.probability[0]))
     assert calm.percentile_of(there.against_none) > 95.0
     assert calm.percentile_of(-np.inf) == 0.0
@@ -202,7 +202,9 @@ def test_a_variant_is_the_search_with_that_prior(change, prior):
         one = candidate(base, "a", direction, Quantity.from_mean(0.0, sd, "normal"), n_cells=99)
         levels = noise_grid(base.board)
         levels = replace(levels, sd=noise * levels.sd)
-        ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels), candidates={"a": one})
+        ground = ground_of(
+            base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels, base), candidates={"a": one}
+        )
         return search(ground, residual)
 
     usual = searched(1.0, 1.0)
@@ -217,12 +219,13 @@ def test_a_name_has_to_survive_widths_and_noises(small):
     ground, _ = small
     found = search(ground, 0.01 * np.random.default_rng(3).standard_normal(6))
     told = list(variants(found))
-    assert [one.words for one in told] == [
+    assert [words for words, _ in told] == [
         "with the priors of the sizes halved", "with the priors of the sizes doubled",
-        "if the noise is 1.5 times smaller", "if the noise is 1.5 times larger",
+        "if the noise is 1.5 times smaller", "if the noise is 1.5 times larger", "under the exact law",
     ]  # fmt: skip
     usual = [
         varied(found, **change).none for change in ({"width": 0.5}, {"width": 2.0}, {"noise": 2 / 3}, {"noise": 1.5})
     ]
-    assert [one.found.none for one in told] == pytest.approx(usual)
-    assert len({round(one.found.none, 6) for one in told} | {round(found.none, 6)}) == 5
+    assert [other.none for _, other in told[:-1]] == pytest.approx(usual)
+    assert told[-1][1] is under_exact_law(found)
+    assert len({round(other.none, 6) for _, other in told[:-1]} | {round(found.none, 6)}) == 5

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesplate.diagnosis.shifts.following import Following
+from bayesplate.diagnosis.shifts.laws import Following
 from bayesplate.modes.reduced import ReducedClass
 from bayesplate.modes.terms import Parity, Weights
 

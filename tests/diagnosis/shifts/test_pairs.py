@@ -10,14 +10,12 @@ from full_refits import full_refit
 
 from bayesplate.diagnosis.evidence import joint
 from bayesplate.diagnosis.evidence.draws import draw_terms
-from bayesplate.diagnosis.evidence.exact import exact_log_frequencies
 from bayesplate.diagnosis.evidence.joint import with_joint_pairs
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import prepare_search, search
+from bayesplate.diagnosis.evidence.search import PASSES, prepare_search, search
+from bayesplate.diagnosis.evidence.sensitivity import exact_log_frequencies
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms
-from bayesplate.diagnosis.shifts.pairs import joint_law, joint_table
-from bayesplate.diagnosis.shifts.tables import together
+from bayesplate.diagnosis.shifts.tables import joint_law, joint_table, together
 from bayesplate.frequencies.full import full_log_frequencies
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
@@ -51,7 +49,8 @@ def test_both_at_once_are_a_full_solve_of_both(solved):
     place, law = next(iter(ground.joint[members].items()))
     base = ground.baseline
     one, other = (ground.candidates[name] for name in members)
-    table, added = joint_table(base, one.coarse, other.coarse, {place: law}), together(one.coarse, other.coarse)
+    added = together(one.coarse, other.coarse)
+    table = joint_table(base, added, {place: law})
     first, second = np.divmod(np.arange(table.n_cells), other.coarse.n_cells)
     at = np.hstack([one.coarse.z[first], other.coarse.z[second]])
     width = np.hstack([one.coarse.z_slopes[first], other.coarse.z_slopes[second]])
@@ -61,8 +60,8 @@ def test_both_at_once_are_a_full_solve_of_both(solved):
     cell = int(np.argmin(away))
     step = 0.5 * np.ones(at.shape[1])
     z = at[cell] + step * width[cell]
-    values = {free.name: float(free.prior.value(z[i])) for i, free in enumerate(law.law.form.free)}
-    exact, moved = full_refit(base, law.law.form.board, values, 1 / base.scales)
+    values = {free.name: float(free.prior.value(z[i])) for i, free in enumerate(law.form.free)}
+    exact, moved = full_refit(base, law.form.board, values, 1 / base.scales)
 
     assert np.abs(cents(table.shift[cell] + table.slopes[cell] @ step - exact)).max() < CENT
     assert np.abs(table.moved[cell] + table.moved_slopes[cell] @ step - moved).max() < 0.01
@@ -72,16 +71,17 @@ def test_both_at_once_are_a_full_solve_of_both(solved):
 def test_draws_of_a_pair_that_was_solved_have_its_law(solved):
     found, ground, index = solved
     drawn = draw_terms(search(ground), index, np.random.default_rng(1), 8)
-    exact = exact_log_frequencies(search(ground), drawn)
-    apart = exact_log_frequencies(found, drawn)
+    exact = exact_log_frequencies(search(ground), index, drawn)
+    apart = exact_log_frequencies(found, index, drawn)
     (laws,) = ground.joint.values()
-    law = next(iter(laws.values())).law
+    law = next(iter(laws.values()))
     base, one = ground.baseline, ground.candidates[ground.hypotheses[index].members[0]]
     first, other = one.coarse, ground.candidates[ground.hypotheses[index].members[1]].coarse
+    cells = np.divmod(drawn.cells, other.n_cells)
     z = np.hstack(
         [
-            first.z[drawn.cells[:, 0]] + first.z_slopes[drawn.cells[:, 0]] * drawn.within[:, : first.z.shape[1]],
-            other.z[drawn.cells[:, 1]] + other.z_slopes[drawn.cells[:, 1]] * drawn.within[:, first.z.shape[1] :],
+            first.z[cells[0]] + first.z_slopes[cells[0]] * drawn.within[:, : first.z.shape[1]],
+            other.z[cells[1]] + other.z_slopes[cells[1]] * drawn.within[:, first.z.shape[1] :],
         ]
     )
     values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
@@ -126,7 +126,7 @@ def test_air_and_exciter_keep_the_labels_of_the_board_without_either():
     base = baseline_of(Problem.from_card("fiemme-spruce-clamped").posed)
     tried = forms(base.board)
     (air,), (exciter,) = tried["fluid_loading"], tried["exciter"]
-    law = joint_law(base, air, exciter).law
+    law = joint_law(base, air, exciter)
     sizes = {"fluid_loading.baffle": 0.2, "exciter.suspension": 2700.0, "exciter.place_x": 0.3, "exciter.place_y": 0.2}
     sizes = {f"{name}[clamped]": np.array([value]) for name, value in sizes.items()}
     found = law.log_frequencies(base, base.log_rigidities[None], sizes)[0]

@@ -11,11 +11,11 @@ from full_refits import full_refit
 from made_searches import baseline
 
 from bayesplate.diagnosis.evidence.search import prepare_search, search
-from bayesplate.diagnosis.shifts.baseline import baseline_of, weighted_rms
+from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.diagnosis.shifts.forms import forms, with_forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts.signatures import signatures
-from bayesplate.diagnosis.shifts.tables import nominal_shift, refitted, tabulate
+from bayesplate.diagnosis.shifts.signatures import Signature, signature, signatures
+from bayesplate.diagnosis.shifts.tables import refitted, tabulate
 from bayesplate.frequencies.laws import cents
 from bayesplate.workflow.problem import Problem
 
@@ -156,9 +156,7 @@ def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish, 
     form = finnish.ground.candidates[name].laws[0].form
     placed = form_law(far, form, half_width=0.8).placed(base)
     own = finnish.ground.candidates[name].laws[0]
-    assert tabulate(base, name, [placed]).shift == pytest.approx(
-        tabulate(base, name, [own]).shift, abs=CENT * np.log(2) / 1200
-    )
+    assert tabulate(base, [placed]).shift == pytest.approx(tabulate(base, [own]).shift, abs=CENT * np.log(2) / 1200)
 
 
 def test_signatures_and_tables_tell_the_same_of_every_effect(finnish):
@@ -169,12 +167,11 @@ def test_signatures_and_tables_tell_the_same_of_every_effect(finnish):
             continue
         if name == "warp":  # the search tries curvatures and a twist apart, a signature is that of all together
             continue
-        law = one.laws[0]
-        raw, visible, _ = nominal_shift(ground.baseline, law)
         (here,) = signatures(problem, [name])
-        assert cents(raw) == pytest.approx(here.raw, abs=0.3), name
-        assert cents(visible) == pytest.approx(here.visible, abs=0.3), name
-        assert here.visible_rms / here.detection_limit_cents == pytest.approx(ground.visibility(name), rel=0.05), name
+        assert one.signature.raw == pytest.approx(here.raw, abs=0.3), name
+        assert one.signature.visible == pytest.approx(here.visible, abs=0.3), name
+        assert one.signature.bias_percent == pytest.approx(here.bias_percent, abs=0.1), name
+        assert one.signature.detection_limit_cents == pytest.approx(here.detection_limit_cents), name
 
 
 @pytest.mark.parametrize("weights", [(1.0,) * 6, (8.0, 4.0, 1.0, 1.0, 1.0, 0.5)])
@@ -186,10 +183,12 @@ def test_a_visible_part_is_never_larger_than_the_whole_shift(weights):
     shifts = 0.02 * np.random.default_rng(2).standard_normal((200, 6))
     parts = [base.refitted_to(shift)[0] for shift in shifts]
 
-    assert all(base.weighted_rms(b) <= base.weighted_rms(a) for a, b in zip(shifts, parts, strict=True))
+    seen = [Signature("", {}, a, b, {}, scales) for a, b in zip(shifts, parts, strict=True)]
+    assert all(one.visible_rms <= one.raw_rms for one in seen)
     plain = [np.linalg.norm(b) > np.linalg.norm(a) for a, b in zip(shifts, parts, strict=True)]
     assert any(plain) is (len(set(weights)) > 1)
-    assert weighted_rms(np.array([3.0, 1.0]), np.array([1.0, 2.0])) == pytest.approx(np.sqrt((9 + 0.25) / 1.25))
+    two = Signature("", {}, np.array([3.0, 1.0]), np.zeros(2), {}, np.array([1.0, 2.0]))
+    assert two.raw_rms == pytest.approx(np.sqrt((9 + 0.25) / 1.25))
 
 
 @pytest.fixture(scope="module")
@@ -207,10 +206,12 @@ def test_on_a_measured_board_of_uneven_thickness_an_effect_shows_less_than_it_sh
     """
     base = baseline_of(uneven)
     law = form_law(base, forms(base.board)[name][0]).placed(base)
-    raw, visible, _ = nominal_shift(base, law)
+    nominal = {one.name: np.array([one.nominal]) for one in law.form.free}
+    there = law.log_frequencies(base, base.log_rigidities[None, :], nominal)[0]
+    found = signature(base, name, law.form.free, there)
     (told,) = signatures(uneven, [name])
 
-    assert 0.5 < base.weighted_rms(visible) / base.weighted_rms(raw) < 1.0
+    assert 0.5 < found.visible_rms / found.raw_rms < 1.0
     assert told.visible_rms < told.raw_rms
-    assert cents(raw) == pytest.approx(told.raw, abs=0.3)
-    assert cents(visible) == pytest.approx(told.visible, abs=0.3)
+    assert found.raw == pytest.approx(told.raw, abs=0.3)
+    assert found.visible == pytest.approx(told.visible, abs=0.3)

@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnoses import DIAGNOSES, KNOWN, STATED, known_model
+from made_searches import baseline
 from payloads import PAYLOADS
 
 from bayesplate.diagnosis.evidence.known import KnownFit
 from bayesplate.diagnosis.wording.exports import known_csv, known_tex, write_known
 from bayesplate.diagnosis.wording.known import known_models, known_sentence, known_table
-from bayesplate.diagnosis.wording.stated import stated_sentences
+from bayesplate.diagnosis.wording.told import stated_sentences
 from bayesplate.estimates.leave_one_out import Errors, Leverages
 from bayesplate.report.verdict import diagnosis_section
 
@@ -28,7 +29,7 @@ def test_what_is_told_of_a_fit_by_hand():
     def fit(effects, moduli, in_sample, left_out):
         nobody = Leverages(np.zeros(2), np.full(2, -1))
         errors = Errors(*(CENTS * np.array(one) for one in (in_sample, left_out)), nobody)
-        return KnownFit(effects, effects, (), np.zeros(3), np.array(moduli), errors, np.zeros((2, 3)))
+        return KnownFit(effects, effects, (), baseline(np.random.default_rng(1), 2), np.array(moduli), errors)
 
     first = fit((), [10e9, 1e9, 0.5e9], [3.0, -4.0], [6.0, 8.0])
     second = fit(("fluid_loading",), [10.5e9, 0.9e9, 0.5e9], [1.0, 7.0], [np.nan, 5.0])

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from made_boards import setup_of
 
-from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
+from bayesplate.diagnosis.wording.told import relabelled_sentence
 from bayesplate.plate.board import made_board
 from bayesplate.quantities import Quantity
 
