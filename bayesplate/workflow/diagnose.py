@@ -192,7 +192,7 @@ def diagnose(
     control = null_control(ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
     folded = nested_of(found, control, verdict.tried)
-    in_part = named_in_part(found, verdict, control, folded)
+    in_part = named_in_part(found, verdict, folded)
     finals = verdict.fitted_again[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
     fits, failures = {0: before}, []

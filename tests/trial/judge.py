@@ -16,7 +16,7 @@ from trial.amplitudes import recovered
 from trial.cells import KINDS, SENSORS, Cell
 from trial.shared import control_of, ground_of, shared_law
 
-from bayesplate.diagnosis.decision.claim import judge_claim, named_in_part
+from bayesplate.diagnosis.decision.claim import judge_claim, named_in_part, nested_of
 from bayesplate.diagnosis.decision.constants import Constants, draw_constants
 from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answers, decide
 from bayesplate.diagnosis.evidence.null_control import NullControl
@@ -107,7 +107,8 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         For draws of the constants.
     """
     verdict = decide(found, control)
-    claim = judge_claim(found, verdict, control)
+    folded = nested_of(found, control, verdict.tried)
+    claim = judge_claim(found, verdict, control.without(folded.carried if folded else ()), folded)
     ranked = answers(found)
     near = verdict.stands_for or (alternatives(found, ranked) if ranked else ())
     best = verdict.best
@@ -116,7 +117,7 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         "needed": verdict.is_needed,
         "effects": list(verdict.effects),
         "reason": verdict.reason,
-        "in_part": list(named_in_part(found, verdict, control)),
+        "in_part": list(named_in_part(found, verdict, folded)),
         "claim": bool(claim.holds),
         "conditions": {condition.name: bool(condition.is_met) for condition in claim.conditions},
         "best": list(best.members) if best else [],

@@ -75,7 +75,7 @@ class Claim:
         return bool(self.conditions) and all(one.is_met for one in self.conditions)
 
 
-def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Nested | None = None) -> Claim:
+def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Nested | None) -> Claim:
     """Judge the five conditions.
 
     Parameters
@@ -83,9 +83,8 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
     found : Found
     verdict : Verdict
     control : NullControl
-    folded : Nested, optional
-        Of the board's own readings, where it is known already: it and the control without the readings whose modes
-        alone carry something.
+    folded : Nested or None
+        Of the board's own readings; it and the control without those whose modes alone carry something.
 
     Returns
     -------
@@ -93,9 +92,6 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
     """
     if not verdict.index:
         return Claim()
-    if folded is None:
-        folded = nested_of(found, control, verdict.index)
-        control = control.without(() if folded is None else folded.carried)
     searches = [found, *(varied(found, width=factor) for factor in WIDTHS.values())]
     told = {one.index for one in verdict.stands_for}
     return Claim(
@@ -112,8 +108,7 @@ def judge_claim(found: Found, verdict: Verdict, control: NullControl, folded: Ne
 def named_in_part(
     found: Found,
     verdict: Verdict,
-    control: NullControl,
-    folded: Nested | None = None,
+    folded: Nested | None,
     others: Iterable[tuple[str, Found]] | None = None,
 ) -> tuple[str, ...]:
     """Effects that explain readings in part though something else remains; none where that cannot be said.
@@ -124,10 +119,8 @@ def named_in_part(
     ----------
     found : Found
     verdict : Verdict
-    control : NullControl
-        What calls for an effect in a fold.
-    folded : Nested, optional
-        Of the board's own readings, where it is known already.
+    folded : Nested or None
+        Of the board's own readings.
     others : iterable of (str, Found), optional
         The searches that a name has to survive, as of `bayesplate.diagnosis.decision.verdict.decide`.
 
@@ -143,7 +136,6 @@ def named_in_part(
         return ()
     if found.p_value(nearest.index) >= PASSES or at_limit(found, nearest.index):
         return ()
-    folded = nested_of(found, control, nearest.index) if folded is None else folded
     if folded is None or not folded.ratio[0] <= FALLS_TO:  # not a number where no mode is left to judge by
         return ()
     if not stands_out(nearest, answers(found)) or turned(found, nearest, variants(found) if others is None else others):

@@ -106,19 +106,7 @@ def _columns(slopes: Floats, of_sizes: Floats, of_inputs: Floats) -> Floats:
 
 
 def _regressed(columns: Floats, variance: Floats, target: Floats, rng: np.random.Generator, n_constants: int) -> Floats:
-    """A draw of the coefficients for each target: flat on the constants, standard normal on all others.
-
-    Parameters
-    ----------
-    columns : (n, n_modes, n_coefficients) array
-    variance, target : (n, n_modes) arrays
-    rng : numpy.random.Generator
-    n_constants : int
-
-    Returns
-    -------
-    (n, n_coefficients) array
-    """
+    """(n, n_coefficients) draws, one for each target: flat on the constants, standard normal on all others."""
     weighted = np.swapaxes(columns / variance[:, :, None], 1, 2)
     prior = np.r_[np.zeros(n_constants), np.ones(columns.shape[2] - n_constants)]
     precision = weighted @ columns + np.diag(prior)
@@ -157,7 +145,7 @@ def sizes_of(
 
 def joint_sizes_of(found: Found, index: int, drawn: TermDraws) -> Iterator[tuple[FormLaw, Rows, dict[str, Floats]]]:
     """The same of both effects of a pair at once, of those of its draws for which there is a law of both."""
-    laws = found.ground.joint.get(found.ground.hypotheses[index].members, {})
+    laws = found.ground.hypotheses[index].joint
     if not laws:
         return
     for i, _, rows_first, values_first in sizes_of(found, index, drawn, 0):

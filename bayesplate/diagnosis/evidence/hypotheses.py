@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations, pairwise
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid, reach_of
 from bayesplate.diagnosis.evidence.terms import Terms, log_sum, normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.tables import Table, nothing, together
+from bayesplate.diagnosis.shifts.tables import JointLaws, Table, nothing, together
 from bayesplate.effects import EFFECTS
 from bayesplate.plate.board import Board
 
@@ -67,6 +67,8 @@ class Hypothesis:
         The two labels that it exchanges.
     log_labels : float
         ln of the likelihood summed over all ways to take the peaks for modes, over that of the labels at hand.
+    joint : JointLaws
+        Of a pair whose table is not that of shifts that add.
     """
 
     members: tuple[str, ...]
@@ -76,6 +78,7 @@ class Hypothesis:
     own: Baseline
     swap: Swap | None = None
     log_labels: float = 0.0
+    joint: JointLaws = field(default_factory=dict)
 
     @cached_property
     def terms(self) -> Terms:

@@ -21,8 +21,8 @@ from bayesplate.diagnosis.evidence.hypotheses import are_stated
 from bayesplate.diagnosis.evidence.peaks import with_own_labels
 from bayesplate.diagnosis.evidence.search import PASSES, Found, Ground, prepare_search, search
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
-from bayesplate.diagnosis.shifts.tables import JointLaws, Solve, joint_law, joint_table
+from bayesplate.diagnosis.shifts.laws import FormLaw
+from bayesplate.diagnosis.shifts.tables import JointLaws, joint_law, joint_table
 
 PLAUSIBLE = 0.05
 """Probability from which a pair is solved together where something explains the readings: each costs as much as a
@@ -57,7 +57,7 @@ def full_search(
     return (ground, found) if together is ground else (together, search(with_own_labels(together)))
 
 
-def with_joint_pairs(found: Found, ground: Ground, solve: Solve = form_law) -> Ground:
+def with_joint_pairs(found: Found, ground: Ground) -> Ground:
     """A ground on which the pairs that a search finds plausible are solved together.
 
     Parameters
@@ -65,27 +65,25 @@ def with_joint_pairs(found: Found, ground: Ground, solve: Solve = form_law) -> G
     found : Found
         Of a search on it, with or without labels of its own under each hypothesis.
     ground : Ground
-    solve : callable, optional
-        By default full solves around the baseline.
 
     Returns
     -------
     Ground
         The same one where no pair is plausible.
     """
-    pairs = [i for i in _plausible(found) if found.ground.hypotheses[i].members not in ground.joint]
+    pairs = [i for i in _plausible(found) if not ground.hypotheses[i].joint]
     if not pairs:
         return ground
-    every, joint = list(ground.hypotheses), dict(ground.joint)
+    every = list(ground.hypotheses)
     for index in pairs:
         one, other = ground.members(index)
         laws: JointLaws = {
-            (i, j): joint_law(ground.baseline, one.laws[i].form, other.laws[j].form, solve)
+            (i, j): joint_law(ground.baseline, one.laws[i].form, other.laws[j].form)
             for i, j in _forms_worth(found, index)
         }
-        every[index] = replace(every[index], table=joint_table(ground.baseline, every[index].table, laws))
-        joint[every[index].members] = laws
-    return replace(ground, hypotheses=tuple(every), joint=joint)
+        table = joint_table(ground.baseline, every[index].table, laws)
+        every[index] = replace(every[index], table=table, joint=laws)
+    return replace(ground, hypotheses=tuple(every))
 
 
 def _plausible(found: Found) -> list[int]:

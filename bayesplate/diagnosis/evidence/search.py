@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,10 +18,10 @@ from bayesplate.diagnosis.evidence.hypotheses import (
 )
 from bayesplate.diagnosis.evidence.terms import Terms
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.diagnosis.shifts.forms import Form, forms
 from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
 from bayesplate.diagnosis.shifts.signatures import Signature, signature
-from bayesplate.diagnosis.shifts.tables import COARSE, JointLaws, Solve, Table, refitted, tabulate
+from bayesplate.diagnosis.shifts.tables import COARSE, Table, refitted, tabulate
 
 Floats = NDArray[np.float64]
 
@@ -68,14 +68,11 @@ class Ground:
     baseline : Baseline
     candidates : dict of Candidate
     hypotheses : tuple of Hypothesis
-    joint : dict of JointLaws
-        By the members of a pair whose table is not that of shifts that add.
     """
 
     baseline: Baseline
     candidates: Mapping[str, Candidate]
     hypotheses: tuple[Hypothesis, ...]
-    joint: Mapping[tuple[str, ...], JointLaws] = field(default_factory=dict)
 
     @property
     def n_directions(self) -> int:
@@ -150,7 +147,7 @@ class Found:
 
 def prepare_search(
     baseline: Baseline,
-    solve: Solve | None = None,
+    solve: Callable[[Baseline, Form], FormLaw] = form_law,
     tried: Sequence[str] | None = None,
     tell: Callable[[float], None] | None = None,
 ) -> Ground:
@@ -160,7 +157,7 @@ def prepare_search(
     ----------
     baseline : Baseline
     solve : callable, optional
-        By default full solves around the baseline.
+        Makes the law of a form around the baseline; by default by full solves.
     tried : sequence of str, optional
         Effects to try; by default all that are not declared and can act.
     tell : callable, optional
@@ -171,7 +168,6 @@ def prepare_search(
     Ground
         Without effects that leave no plate, whatever their size.
     """
-    solve = form_law if solve is None else solve
     every = {name: each for name, each in forms(baseline.board).items() if tried is None or name in tried}
 
     def candidate(name: str) -> Candidate:

@@ -11,7 +11,7 @@ that plausible pairs are solved together, at every pair of their cells.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -26,8 +26,6 @@ from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
-Solve = Callable[[Baseline, Form], FormLaw]
-"""Makes the law of a form around a baseline."""
 JointLaws = Mapping[tuple[int, int], FormLaw]
 """Laws of two effects at once, by the indices of their forms; the free parameters are those of the first, then those
 of the second."""
@@ -167,12 +165,12 @@ def together(one: Table, other: Table) -> Table:
     )
 
 
-def joint_law(baseline: Baseline, one: Form, other: Form, solve: Solve = form_law) -> FormLaw:
+def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
     """Solve a board with two effects around a baseline and over the priors of both."""
     detail = ", ".join(part for part in (one.detail, other.detail) if part)
     board = with_forms(baseline.board, (one, other))
     both = Form(f"{one.effect} and {other.effect}", detail, board, (*one.free, *other.free))
-    return solve(baseline, both).placed(baseline)
+    return form_law(baseline, both).placed(baseline)
 
 
 def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:

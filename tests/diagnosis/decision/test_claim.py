@@ -46,6 +46,12 @@ def found():
     return searched(1.5)
 
 
+def judged(found, verdict, control):
+    """The claim on a board whose own readings are left out here, those that alone carry something not counted."""
+    folded = nested_of(found, control, verdict.index)
+    return judge_claim(found, verdict, control.without(() if folded is None else folded.carried), folded)
+
+
 def folds(found, ratio: float = 0.1) -> Nested:
     """Errors of a given ratio; every fold chose the effect."""
     told = nested_of(found, CONTROL)
@@ -57,7 +63,7 @@ def met(claim: Claim) -> dict[str, bool]:
 
 
 def test_an_effect_that_is_there_meets_all_of_them(found):
-    claim = judge_claim(found, decided(found), CONTROL)
+    claim = judged(found, decided(found), CONTROL)
     assert met(claim) == dict.fromkeys(
         ("chance selection", "log score", "probability of none", "probability of another", "prior predictive"), True
     )
@@ -109,7 +115,7 @@ def test_a_gain_that_rests_on_one_reading_is_within_its_standard_error():
 def test_no_effect_is_improbable_with_other_priors_too(size):
     found = searched(size)
     verdict = replace(decided(found), index=1)
-    told = judge_claim(found, verdict, CONTROL).conditions[2]
+    told = judged(found, verdict, CONTROL).conditions[2]
     assert told.value >= found.none
     assert told.is_met is (told.value < 0.05)
     assert told.is_met is (size > 0.2)
@@ -118,7 +124,7 @@ def test_no_effect_is_improbable_with_other_priors_too(size):
 def test_doubled_priors_alone_may_refuse_the_claim():
     """The probability of none is below one in twenty with the usual priors and above it with others."""
     one = searched(0.15)
-    told = judge_claim(one, replace(decided(one), index=1), CONTROL).conditions[2]
+    told = judged(one, replace(decided(one), index=1), CONTROL).conditions[2]
     assert one.none < 0.05 < told.value
     assert not told.is_met
 
@@ -129,7 +135,7 @@ def test_halved_priors_may_refuse_it_too(size, widest):
     one = searched(size)
     each = {factor: varied(one, width=factor).none for factor in (0.5, 1.0, 2.0)}
     assert max(each, key=each.get) == widest
-    told = judge_claim(one, replace(decided(one), index=1), CONTROL).conditions[2]
+    told = judged(one, replace(decided(one), index=1), CONTROL).conditions[2]
     assert told.value == pytest.approx(each[widest], rel=1e-9, abs=0.0)
 
 
@@ -145,23 +151,23 @@ def test_a_name_with_a_rival_is_no_claim_unless_the_rival_is_told_too(alike, is_
     found = with_a_rival(0.65, alike)
     verdict = decided(found)
     assert (verdict.word, verdict.effects) == ("named", ("a",))
-    told = judge_claim(found, verdict, CONTROL).conditions[3]
+    told = judged(found, verdict, CONTROL).conditions[3]
     assert (told.name, told.limit, told.is_met) == ("probability of another", 0.05, is_met)
     assert told.value >= found.probability[2]
     both = replace(verdict, stands_for=answers(found))
-    assert judge_claim(found, both, CONTROL).conditions[3].value == 0.0
+    assert judged(found, both, CONTROL).conditions[3].value == 0.0
 
 
 def test_another_effect_is_improbable_with_other_priors_too():
     """The probability of the rival is below one in twenty with the usual priors and above it with others."""
     found = with_a_rival(0.7, 0.95)
-    told = judge_claim(found, decided(found), CONTROL).conditions[3]
+    told = judged(found, decided(found), CONTROL).conditions[3]
     assert found.probability[2] < 0.05 < told.value
     assert not told.is_met
 
 
 def test_the_misfit_that_is_left_passes_its_gate(found):
-    assert judge_claim(found, decided(found), CONTROL).conditions[4].value == pytest.approx(found.p_value(1))
+    assert judged(found, decided(found), CONTROL).conditions[4].value == pytest.approx(found.p_value(1))
     off = replace(found, residual=found.residual + 0.05 * np.random.default_rng(8).standard_normal(9))
     told = judge_claim(off, replace(decided(found), index=1), CONTROL, folds(found)).conditions[4]
     assert told.value < 0.05
@@ -169,11 +175,11 @@ def test_the_misfit_that_is_left_passes_its_gate(found):
 
 
 def test_nothing_is_claimed_where_nothing_was_added_or_nothing_is_left_to_judge_by(found):
-    assert judge_claim(found, replace(decided(found), index=0), CONTROL) == Claim()
+    assert judged(found, replace(decided(found), index=0), CONTROL) == Claim()
     few = searched(1.5, n_modes=4)
-    told = judge_claim(few, replace(decided(few), index=1), CONTROL)
+    told = judged(few, replace(decided(few), index=1), CONTROL)
     assert [(one.value, one.is_met) for one in told.conditions[:2]] == [(None, False)] * 2
-    silent = judge_claim(found, decided(found), replace(CONTROL, ratio=None))
+    silent = judged(found, decided(found), replace(CONTROL, ratio=None))
     assert silent.conditions[0].value is None
     assert not silent.holds
 
@@ -193,8 +199,8 @@ def test_modes_that_alone_carry_something_count_in_no_condition(found):
     spoilt = replace(whole, before=whole.before.copy())
     spoilt.before[0, 3] = 1.0  # without the reading that nobody else foretells the error was hundreds of cents
     assert spoilt.ratio[0] < 0.2
-    judged = spoilt.without((3,))
-    assert judged.ratio[0] == pytest.approx(0.5)
+    folded = spoilt.without((3,))
+    assert folded.ratio[0] == pytest.approx(0.5)
     same = control.without((3,))
     kept = np.delete(np.arange(9), 3)
     after, before = (getattr(control.folded, name)[:, kept] for name in ("after", "before"))
@@ -202,7 +208,7 @@ def test_modes_that_alone_carry_something_count_in_no_condition(found):
     again = made_to_choose(found.ground, null_control(found.ground, np.random.default_rng(5), 100), carried=(3,))
     assert again.ratio == pytest.approx(same.ratio)
     gains = log_score_gains(found.ground, found.residual, np.ones(9, dtype=int))
-    told = judge_claim(found, decided(found), same, judged).conditions
+    told = judge_claim(found, decided(found), same, folded).conditions
     assert told[0].value == pytest.approx(0.5)
     assert told[1].value == pytest.approx(gains[kept].sum())
     assert told[1].value != pytest.approx(gains.sum())
@@ -228,6 +234,6 @@ def test_the_folds_of_the_board_do_not_count_what_carries_something(found):
     assert set(nested_of(alone, CONTROL).carried) < set(carried)
     assert not nested_of(alone, CONTROL, 1).counted[0, 4]
     assert base.n_modes == 9
-    claim = judge_claim(alone, replace(decided(alone), index=1), CONTROL)
+    claim = judged(alone, replace(decided(alone), index=1), CONTROL)
     gains = log_score_gains(alone.ground, alone.residual, nested_of(alone, CONTROL).chosen[0], carried)
     assert claim.conditions[1].value == pytest.approx(gains.sum())

@@ -41,7 +41,7 @@ def folded(ratio: float) -> Nested:
 
 
 def told(found: Found, ratio: float = 0.5, others=()) -> tuple[str, ...]:
-    return named_in_part(found, decided(found), CERTAIN, folded(ratio), others)
+    return named_in_part(found, decided(found), folded(ratio), others)
 
 
 def test_what_is_certainly_there_and_not_all_is_named_in_part():
@@ -58,7 +58,7 @@ def test_what_passes_the_gate_is_named_and_not_in_part():
     assert told(found) == ()
     gated = replace(decided(made()), best=decided(found).best)  # were the word unexplained for another reason
     assert found.p_value(1) >= PASSES
-    assert named_in_part(found, gated, CERTAIN, folded(0.5), ()) == ()
+    assert named_in_part(found, gated, folded(0.5), ()) == ()
 
 
 @pytest.mark.parametrize(("none", "names"), [(0.99e-4, ("a",)), (1.01e-4, ())])
@@ -83,9 +83,9 @@ def test_its_name_survives_every_other_assumption(rival, names):
 
 def test_the_usual_variants_are_asked_where_none_are_given(monkeypatch):
     found = made()
-    assert named_in_part(found, decided(found), CERTAIN, folded(0.5), None) == ("a",)
+    assert named_in_part(found, decided(found), folded(0.5), None) == ("a",)
     monkeypatch.setattr(claim, "variants", lambda found: iter([("with other priors", made(rival=0.26))]))
-    assert named_in_part(found, decided(found), CERTAIN, folded(0.5), None) == ()
+    assert named_in_part(found, decided(found), folded(0.5), None) == ()
 
 
 @pytest.mark.parametrize(("planted", "names"), [(1.0, ("a",)), (10.0, ())])
@@ -97,10 +97,10 @@ def test_the_folds_are_made_where_they_are_not_given():
     """The rest spoils the prediction of every mode left out, so that the error does not fall."""
     found = made()
     assert nested_of(found, CERTAIN, 1).ratio[0] > 2.0 / 3.0
-    assert named_in_part(found, decided(found), CERTAIN, None, ()) == ()
+    assert named_in_part(found, decided(found), nested_of(found, CERTAIN, 1), ()) == ()
 
 
 def test_a_verdict_that_is_not_unexplained_has_no_part():
     found = made()
     idle = replace(decided(found), is_needed=False)
-    assert named_in_part(found, idle, CERTAIN, folded(0.5), ()) == ()
+    assert named_in_part(found, idle, folded(0.5), ()) == ()

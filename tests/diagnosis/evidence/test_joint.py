@@ -35,7 +35,7 @@ def test_a_pair_is_found_of_which_neither_alone_lowers_the_misfit(ground):
     evidence = {one.members: value for one, value in zip(ground.hypotheses, found.log_evidence, strict=True)}
     assert all(evidence[(name,)] < evidence[()] for name in PAIR)
     joint = with_joint_pairs(found, ground)
-    assert [set(pair) for pair in joint.joint] == [PAIR]
+    assert [set(one.members) for one in joint.hypotheses if one.joint] == [PAIR]
     verdict = decided(search(joint))
     assert (verdict.word, set(verdict.effects)) == ("named", PAIR)
 

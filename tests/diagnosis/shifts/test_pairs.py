@@ -46,7 +46,7 @@ def test_both_at_once_are_a_full_solve_of_both(solved):
     """At a place that is in the middle of no cell: the tables' tangents have to hold as well."""
     _, ground, index = solved
     members = ground.hypotheses[index].members
-    place, law = next(iter(ground.joint[members].items()))
+    place, law = next(iter(ground.hypotheses[index].joint.items()))
     base = ground.baseline
     one, other = (ground.candidates[name] for name in members)
     added = together(one.coarse, other.coarse)
@@ -73,8 +73,7 @@ def test_draws_of_a_pair_that_was_solved_have_its_law(solved):
     drawn = draw_terms(search(ground), index, np.random.default_rng(1), 8)
     exact = exact_log_frequencies(search(ground), index, drawn)
     apart = exact_log_frequencies(found, index, drawn)
-    (laws,) = ground.joint.values()
-    law = next(iter(laws.values()))
+    law = next(iter(ground.hypotheses[index].joint.values()))
     base, one = ground.baseline, ground.candidates[ground.hypotheses[index].members[0]]
     first, other = one.coarse, ground.candidates[ground.hypotheses[index].members[1]].coarse
     cells = np.divmod(drawn.cells, other.n_cells)
@@ -107,7 +106,8 @@ def test_only_plausible_pairs_are_solved_together(solved):
     assert with_joint_pairs(quiet, found.ground) is found.ground
     loud = replace(found, residual=0.2 * np.sign(np.random.default_rng(1).standard_normal(found.residual.size)))
     assert loud.p_value(0) < PASSES  # nothing explains these: the sum of shifts may be why
-    assert [set(pair) for pair in with_joint_pairs(loud, found.ground).joint] == [set(PAIR)]
+    together = with_joint_pairs(loud, found.ground).hypotheses
+    assert [set(one.members) for one in together if one.joint] == [set(PAIR)]
 
 
 def test_pairs_with_shear_are_left_to_the_sampler(finnish_few):
