@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesplate.diagnosis.shifts.baseline import Baseline, Spectrum, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, Spectrum, symmetry_of
 from bayesplate.estimates.least_squares import Estimate, log_measured
 from bayesplate.estimates.refit import Predict
 from bayesplate.plate.board import Board

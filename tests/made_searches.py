@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from made_boards import setup_of
 
-from bayesplate.diagnosis.decision.verdict import Verdict, decide
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, Swap
-from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid
-from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.search import Candidate, Found, Ground
-from bayesplate.diagnosis.shifts.baseline import Baseline, Spectrum
-from bayesplate.diagnosis.shifts.forms import Form
-from bayesplate.diagnosis.shifts.laws import FormLaw
-from bayesplate.diagnosis.shifts.signatures import signature
-from bayesplate.diagnosis.shifts.tables import Table, nothing
+from bayesplate.diagnosis.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.forms import Form
+from bayesplate.diagnosis.hypotheses import Hypothesis, Swap
+from bayesplate.diagnosis.laws import FormLaw
+from bayesplate.diagnosis.noise_grid import NoiseGrid
+from bayesplate.diagnosis.null_control import NullControl
+from bayesplate.diagnosis.search import Candidate, Found, Ground
+from bayesplate.diagnosis.shifts import Table, nothing
+from bayesplate.diagnosis.signatures import signature
+from bayesplate.diagnosis.verdict import Verdict, decide
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
 from bayesplate.modes.naming import Place

@@ -11,7 +11,7 @@ from made_summaries import SUMMARY
 from rich.console import Console
 
 from bayesplate.columns import column_widths, laid_out
-from bayesplate.diagnosis.wording.tables import candidates_table
+from bayesplate.diagnosis.tables import candidates_table
 from bayesplate.results.tables import Table
 from bayesplate.workflow.shown import show_diagnosis, show_fit
 

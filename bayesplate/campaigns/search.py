@@ -22,11 +22,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, hypotheses
-from bayesplate.diagnosis.evidence.peaks import with_own_labels
-from bayesplate.diagnosis.evidence.search import LEAST_TRACE, Ground, prepare_search
-from bayesplate.diagnosis.evidence.terms import log_sum
-from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses
+from bayesplate.diagnosis.peaks import with_own_labels
+from bayesplate.diagnosis.search import LEAST_TRACE, Ground, prepare_search
+from bayesplate.diagnosis.terms import log_sum
 
 Floats = NDArray[np.float64]
 Way = Literal["none", "shared", "own", "one board", "shared and own"]

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.verdict import Answer, answer_words
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.terms import Terms, normalised
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.terms import Terms, normalised
+from bayesplate.diagnosis.verdict import Answer, answer_words
 from bayesplate.plate.board import Board
 from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.parameters import Parameters

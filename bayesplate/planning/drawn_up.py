@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.cards import PriorCard
-from bayesplate.diagnosis.decision.readings import wrong_reading
-from bayesplate.diagnosis.decision.verdict import Answer, answers
-from bayesplate.diagnosis.evidence.search import PASSES, Found
+from bayesplate.diagnosis.readings import wrong_reading
+from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.verdict import Answer, answers
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.beliefs import Beliefs, believed
 from bayesplate.planning.gains import Gain

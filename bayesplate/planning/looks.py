@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.shifts.tables import Table
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.shifts import Table
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.inputs_read import GRID, WEIGHED_TO

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.search import Found
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.looks import members_of

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from bayesplate.cards import PriorCard
-from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.search import Found
 from bayesplate.planning.before import prior_laws, prior_readings
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Gain, Readings, expected_gain, together

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.search import Candidate, Found
-from bayesplate.diagnosis.evidence.terms import normalised
-from bayesplate.diagnosis.shifts.forms import Form
-from bayesplate.diagnosis.shifts.tables import Table
+from bayesplate.diagnosis.forms import Form
+from bayesplate.diagnosis.search import Candidate, Found
+from bayesplate.diagnosis.shifts import Table
+from bayesplate.diagnosis.terms import normalised
 from bayesplate.planning.station_laws import BareLaw, SolvedStation
 
 Floats = NDArray[np.float64]

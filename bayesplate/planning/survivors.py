@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from bayesplate.diagnosis.decision.verdict import WITHIN, Answer, answers
-from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.verdict import WITHIN, Answer, answers
 
 MOST = 4
 """Explanations besides that of no effect; each takes a dozen plates to solve."""

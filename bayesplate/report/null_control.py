@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Histogram, NullControlSummary
+from bayesplate.diagnosis.result import Diagnosis, Histogram, NullControlSummary
 from bayesplate.report.colours import BLUE, DARK, LIGHT, VERMILLION
 from bayesplate.report.style import SMALL, Picture, legend_below, stacked
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from bayesplate.cards import BoardCard
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.exports import write_before_after, write_known
+from bayesplate.diagnosis.exports import write_before_after, write_known
+from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.files import make_folder, write_text
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.diagnosis.wording.candidates import EffectEntry
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.words import MERITS, names_of
+from bayesplate.diagnosis.candidates import EffectEntry
+from bayesplate.diagnosis.result import Diagnosis
+from bayesplate.diagnosis.words import MERITS, names_of
 from bayesplate.report.colours import BLUE, DARK, GREY, ORANGE, SKY, VERMILLION
 from bayesplate.report.style import SMALL, Picture, heading, in_rows, legend_below, name_rows, stacked
 from bayesplate.report.symbols import in_figure

@@ -13,20 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
-from bayesplate.diagnosis.decision.claim import Claim, judge_claim, named_in_part, nested_of
-from bayesplate.diagnosis.decision.readings import wrong_reading
-from bayesplate.diagnosis.decision.sizes import refit_board
-from bayesplate.diagnosis.decision.stated import stated_claims
-from bayesplate.diagnosis.decision.verdict import Verdict, answer_words, decide
-from bayesplate.diagnosis.evidence.folds import carrying
-from bayesplate.diagnosis.evidence.joint import full_search
-from bayesplate.diagnosis.evidence.known import known_fits
-from bayesplate.diagnosis.evidence.null_control import N_SETS, made_to_choose, null_control
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
-from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
-from bayesplate.diagnosis.wording.told import relabelled_sentence
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.claim import Claim, judge_claim, named_in_part, nested_of
+from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
+from bayesplate.diagnosis.folds import carrying
+from bayesplate.diagnosis.joint import full_search
+from bayesplate.diagnosis.known import known_fits
+from bayesplate.diagnosis.null_control import N_SETS, made_to_choose, null_control
+from bayesplate.diagnosis.readings import wrong_reading
+from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.sizes import refit_board
+from bayesplate.diagnosis.stated import stated_claims
+from bayesplate.diagnosis.told import relabelled_sentence
+from bayesplate.diagnosis.verdict import Verdict, answer_words, decide
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
 from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
 from bayesplate.files import make_folder, write_text

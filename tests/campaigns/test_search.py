@@ -20,7 +20,7 @@ from bayesplate.campaigns.search import (
     search_board,
     shown,
 )
-from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.workflow.campaign_diagnose import _sharing, shareable
 
 

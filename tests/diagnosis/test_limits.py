@@ -10,13 +10,13 @@ from made_searches import HALF_NORMAL, bare, baseline, candidate, decided, groun
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
-from bayesplate.diagnosis.decision.sizes import at_limit
-from bayesplate.diagnosis.decision.verdict import answers
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.search import Found, noise_of_board
-from bayesplate.diagnosis.shifts.signatures import Signature, acts_both_ways, look_alikes, signatures
-from bayesplate.diagnosis.wording.entries import effect_entry
+from bayesplate.diagnosis.entries import effect_entry
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.search import Found, noise_of_board
+from bayesplate.diagnosis.signatures import Signature, acts_both_ways, look_alikes, signatures
+from bayesplate.diagnosis.sizes import at_limit
+from bayesplate.diagnosis.verdict import answers
 from bayesplate.effects import declare, effects_of
 from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity

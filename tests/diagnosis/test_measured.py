@@ -9,12 +9,12 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from bayesplate.diagnosis.decision.constants import draw_constants
-from bayesplate.diagnosis.decision.verdict import at_limit, decide
-from bayesplate.diagnosis.evidence.null_control import null_control
-from bayesplate.diagnosis.evidence.search import prepare_search, search
-from bayesplate.diagnosis.evidence.sensitivity import varied
-from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.constants import draw_constants
+from bayesplate.diagnosis.null_control import null_control
+from bayesplate.diagnosis.search import prepare_search, search
+from bayesplate.diagnosis.sensitivity import varied
+from bayesplate.diagnosis.verdict import at_limit, decide
 from bayesplate.workflow.fit import fit
 
 slow = pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
-from bayesplate.diagnosis.evidence.hypotheses import Swap
+from bayesplate.diagnosis.hypotheses import Swap
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import REPEATED, _as_read, _given_first
 from bayesplate.plate.parameter import Owner

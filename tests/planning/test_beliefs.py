@@ -8,9 +8,9 @@ import made_searches as made
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.search import search
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.search import search
 from bayesplate.planning.beliefs import believed
 from bayesplate.planning.gains import Readings, probabilities_after
 from bayesplate.planning.survivors import asked, survivors

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.shifts.tables import cells_along
+from bayesplate.diagnosis.shifts import cells_along
 from bayesplate.planning.shifts import _along, _lagrange, _middle
 
 

@@ -12,12 +12,12 @@ from made_boards import CANTILEVER_LABELS, NARROW, board_of, models_at, peaks_of
 from normal_case import NormalCase, differences, draws_of
 
 from bayesplate.cards import load_prior
-from bayesplate.diagnosis.evidence.search import prepare_search, search
-from bayesplate.diagnosis.shifts import baseline as home
-from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.diagnosis.shifts.forms import forms
-from bayesplate.diagnosis.shifts.laws import form_law
-from bayesplate.diagnosis.shifts.signatures import signatures
+from bayesplate.diagnosis import baseline as home
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.forms import forms
+from bayesplate.diagnosis.laws import form_law
+from bayesplate.diagnosis.search import prepare_search, search
+from bayesplate.diagnosis.signatures import signatures
 from bayesplate.effects import declare
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import OtherMode

@@ -16,11 +16,11 @@ from trial.amplitudes import recovered
 from trial.cells import KINDS, SENSORS, Cell
 from trial.shared import control_of, ground_of, shared_law
 
-from bayesplate.diagnosis.decision.claim import judge_claim, named_in_part, nested_of
-from bayesplate.diagnosis.decision.constants import Constants, draw_constants
-from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answers, decide
-from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.search import Found, search
+from bayesplate.diagnosis.claim import judge_claim, named_in_part, nested_of
+from bayesplate.diagnosis.constants import Constants, draw_constants
+from bayesplate.diagnosis.null_control import NullControl
+from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.verdict import Verdict, alternatives, answers, decide
 from bayesplate.errors import BayesplateError
 from bayesplate.plate.material import MODULI
 

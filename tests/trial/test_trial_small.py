@@ -21,7 +21,7 @@ from trial.run import BASE_SEED, run
 from trial.shared import baseline_of_card, control_of
 from trial.summary import CONDITIONS
 
-from bayesplate.diagnosis.evidence.null_control import null_control
+from bayesplate.diagnosis.null_control import null_control
 
 FEW = (Cell("one", "cantilever-6", 2, size=2.0), Cell("null", "cantilever-6", 2))
 

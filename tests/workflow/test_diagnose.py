@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from runs import files_in, read_json
 
 from bayesplate.cli import main
-from bayesplate.diagnosis.evidence.joint import full_search
+from bayesplate.diagnosis.joint import full_search
 from bayesplate.errors import InputError
 from bayesplate.posterior.checkpoint import CHAINS
 from bayesplate.posterior.convergence import Gate
