@@ -271,16 +271,21 @@ def baseline_of(problem: PosedProblem) -> Baseline:
         predict=predict.with_fixed(at[n:]),
         discrepancy=np.concatenate(discrepancies),
     )
-    labelled = [start + np.arange(len(one.readings)) for start, one in zip(every.starts, board.setups, strict=True)]
     return Baseline(
         board=board,
         values=values,
         log_rigidities=at[:n],
         log_readings=log_measured(board),
         every=every,
-        rows=np.concatenate(labelled),
+        rows=labelled_rows(models),
         symmetry=symmetry_of(models),
     )
+
+
+def labelled_rows(models: Sequence[SetupModel]) -> Rows:
+    """Where the labelled modes of each setup stand among all that its model has: (n_modes,) array."""
+    starts = np.cumsum([0, *(len(model.every_place) for model in models)])[:-1]
+    return np.concatenate([start + np.arange(len(one.places)) for start, one in zip(starts, models, strict=True)])
 
 
 def symmetry_of(models: Sequence[SetupModel]) -> tuple[tuple[bool, bool], ...]:

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.baseline import Baseline, Spectrum, baseline_of, symmetry_of
+from bayesplate.diagnosis.baseline import Baseline, Spectrum, baseline_of, labelled_rows, symmetry_of
 from bayesplate.diagnosis.peaks import likely_labels
 from bayesplate.effects import EFFECTS, Effect
 from bayesplate.estimates.least_squares import log_measured, reading_scales
@@ -153,7 +153,7 @@ def fit_with(problem: PosedProblem, combination: Sequence[str] | None, n_first: 
     board = problem.board if combination is None else with_combination(problem.board, combination)
     inputs, fitted = _inputs_of(problem, board), _estimated(problem)
     models = problem.posterior.models if combination is None else _solved(problem, board, inputs, fitted)
-    rows = _labelled(models)
+    rows = labelled_rows(models)
     for _ in range(_MOST_PLACES):
         start = fitted
         law = Predictor(lambda x: _values(board, x, inputs), models, "exact", n_constants=board.symmetry.n)
@@ -206,12 +206,6 @@ def _likely(problem: PosedProblem, law: Predictor, rows: Rows, fitted: Floats) -
     medians = np.array([setup.noise.median for setup in problem.board.setups])
     noise = np.maximum(medians, float(np.sqrt(np.mean(off**2))))
     return likely_labels(baseline_of(problem), predicted, noise[None, :], rows)
-
-
-def _labelled(models: Models) -> Rows:
-    """Where the labelled modes of each setup stand among all that its model has: (n_modes,) array."""
-    starts = np.cumsum([0, *(len(model.every_place) for model in models)])[:-1]
-    return np.concatenate([start + np.arange(len(one.places)) for start, one in zip(starts, models, strict=True)])
 
 
 def _inputs_of(problem: PosedProblem, board: Board) -> Values:

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from bayesplate.diagnosis.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.forms import Form
-from bayesplate.frequencies.laws import ExactLaw, log_frequency, mean_log_frequency
+from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import Place
-from bayesplate.modes.reduced import ReducedClass
+from bayesplate.modes.reduced import ReducedClass, ReducedOrderModel
 from bayesplate.modes.terms import Parity, Weights
 from bayesplate.plate.board import Values
 from bayesplate.plate.material import RIGIDITIES
@@ -85,6 +85,21 @@ class Following:
 
 
 @dataclass(frozen=True, eq=False)
+class FollowedLaw(ExactLaw):
+    """The exact law of modes that are followed by their shapes, block by block."""
+
+    following: tuple[Following, ...] = ()
+
+    def squared(self, weights: Weights) -> Floats:
+        """omega^2 in s^-2: (n_draws, n_modes) array; not a number at a draw that is no plate."""
+        squared = np.empty((len(weights.stiffness), len(self.reduced.places)))
+        for each in self.following:
+            own = [place.parity == each.block.parity for place in self.reduced.places]
+            squared[:, own] = each.eigenvalues(weights)
+        return squared
+
+
+@dataclass(frozen=True, eq=False)
 class FormLaw:
     """Frequencies of a form as a function of the constants and of its free parameters.
 
@@ -93,14 +108,10 @@ class FormLaw:
     form : Form
     models : tuple of SetupModel
         With the exact law.
-    following : tuple of tuple of tuple of Following
-        For each setup and each station of its model, one per block where the effect breaks the symmetry; empty where it
-        does not.
     """
 
     form: Form
     models: tuple[SetupModel, ...]
-    following: tuple[tuple[tuple[Following, ...], ...], ...] = ()
 
     def log_frequencies(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
         """ln f (Hz) of all labelled modes: (n, n_modes) array.
@@ -118,13 +129,7 @@ class FormLaw:
     def every_log_frequency(self, baseline: Baseline, log_rigidities: Floats, values: Mapping[str, Floats]) -> Floats:
         """The same of all modes that the baseline's readings may be: (n, n_every) array."""
         there = _with_rigidities(baseline, _inputs(baseline, self.form) | dict(values), np.exp(log_rigidities).T)
-        followed = self.following or tuple(((),) * len(model.stations) for model in self.models)
-        parts = [
-            mean_log_frequency(
-                [_log_frequencies(one, each, there) for one, each in zip(model.stations, by_station, strict=True)]
-            )
-            for model, by_station in zip(self.models, followed, strict=True)
-        ]
+        parts = [model.every_log_frequency(there, "exact") for model in self.models]
         return np.concatenate(parts, axis=1) + baseline.every.discrepancy
 
     def placed(self, baseline: Baseline) -> FormLaw:
@@ -133,32 +138,31 @@ class FormLaw:
         Where the effect keeps the symmetry a mode keeps its class and its rank there. Elsewhere it is found by its
         frequency without the effect, and followed from there by its shape.
         """
-        models, following = [], []
-        for i, model in enumerate(self.models):
-            (first, *rest), followed = zip(*(self._placed(baseline, i, one) for one in model.stations), strict=True)
-            models.append(replace(first, roved=tuple(rest)))
-            following.append(followed)
-        return replace(self, models=tuple(models), following=tuple(following))
+        stations = [[self._placed(baseline, i, one) for one in model.stations] for i, model in enumerate(self.models)]
+        return replace(self, models=tuple(replace(first, roved=tuple(rest)) for first, *rest in stations))
 
-    def _placed(self, baseline: Baseline, setup: int, model: SetupModel) -> tuple[SetupModel, tuple[Following, ...]]:
-        """One station of a setup with the modes of a baseline, and the shapes that are followed."""
-        of_base = baseline.every.places[setup]
-        keeps = symmetry_of([model])[0] == baseline.symmetry[setup]
-        places = of_base if keeps else self._by_frequency(baseline, setup, model)
+    def _placed(self, baseline: Baseline, setup: int, model: SetupModel) -> SetupModel:
+        """One station of a setup with the modes of a baseline."""
         assert model.exact is not None
-        labelled = len(model.setup.readings)
-        others = tuple(OtherMode(place, None) for place in places[labelled:])
-        exact = ExactLaw(replace(model.exact.reduced, places=places))
-        placed = replace(model, places=places[:labelled], others=others, exact=exact)
-        return placed, () if keeps else self._followed(baseline, placed, of_base)
+        of_base, n_labelled = baseline.every.places[setup], len(model.setup.readings)
+        if symmetry_of([model])[0] == baseline.symmetry[setup]:
+            places = of_base
+            exact = ExactLaw(replace(model.exact.reduced, places=places))
+        else:
+            places = self._by_frequency(baseline, setup, model)
+            reduced = replace(model.exact.reduced, places=places)
+            exact = FollowedLaw(reduced, following=self._followed(baseline, model, reduced, of_base))
+        others = tuple(OtherMode(place, None) for place in places[n_labelled:])
+        return replace(model, places=places[:n_labelled], others=others, exact=exact)
 
-    def _followed(self, baseline: Baseline, model: SetupModel, of_base: Sequence[Place]) -> tuple[Following, ...]:
+    def _followed(
+        self, baseline: Baseline, model: SetupModel, reduced: ReducedOrderModel, of_base: Sequence[Place]
+    ) -> tuple[Following, ...]:
         """Shapes without the effect, block by block."""
-        assert model.exact is not None
         weights = model.system.weights(self._without(baseline))
         result = []
-        for block in model.exact.reduced.classes:
-            rows = np.flatnonzero([place.parity == block.parity for place in model.every_place])
+        for block in reduced.classes:
+            rows = np.flatnonzero([place.parity == block.parity for place in reduced.places])
             classes: dict[object, list[int]] = {}
             for position, row in enumerate(rows):
                 classes.setdefault(of_base[int(row)].parity, []).append(position)
@@ -166,7 +170,7 @@ class FormLaw:
                 np.array(sorted(members, key=lambda position: of_base[int(rows[position])].rank))
                 for members in classes.values()
             )
-            wanted = np.array([model.every_place[row].rank for row in rows])
+            wanted = np.array([reduced.places[row].rank for row in rows])
             result.append(Following.of(block, weights, wanted, groups))
         return tuple(result)
 
@@ -255,17 +259,6 @@ def _with_others(model: SetupModel, baseline: Baseline, setup: int) -> SetupMode
     if symmetry == baseline.symmetry[setup]:
         others = list(of_base[n_readings:])
     return replace(model, others=tuple(OtherMode(place, None) for place in others))
-
-
-def _log_frequencies(model: SetupModel, following: Sequence[Following], values: Values) -> Floats:
-    """ln f of all modes of a station: by rank, or followed by their shapes."""
-    if not following:
-        return model.every_log_frequency(values, "exact")
-    weights = model.system.weights(values)
-    squared = np.empty((len(weights.stiffness), len(model.every_place)))
-    for each in following:
-        squared[:, [place.parity == each.block.parity for place in model.every_place]] = each.eigenvalues(weights)
-    return log_frequency(squared)
 
 
 def _with_rigidities(baseline: Baseline, values: Values, free: Floats) -> Values:
