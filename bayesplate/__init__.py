@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from bayesplate.campaigns.diagnosis import CampaignDiagnosis
     from bayesplate.campaigns.summary import CampaignSummary
     from bayesplate.cards.prior import PriorCard
-    from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+    from bayesplate.diagnosis.result import Diagnosis
     from bayesplate.errors import (
         BatchError,
         BayesplateError,
@@ -154,7 +154,7 @@ _HOMES = {
     "Comparison": "bayesplate.results.comparison",
     "DeclaredFluid": "bayesplate.plate.setup",
     "DiagnoseResult": "bayesplate.workflow.diagnose",
-    "Diagnosis": "bayesplate.diagnosis.wording.diagnosis",
+    "Diagnosis": "bayesplate.diagnosis.result",
     "Fault": "bayesplate.errors",
     "FitRequest": "bayesplate.workflow.fit_board",
     "FitResult": "bayesplate.workflow.fit",

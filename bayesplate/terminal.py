@@ -17,7 +17,8 @@ import click
 from bayesplate.errors import BayesplateError, Fault, UnwritableError, plain
 
 if TYPE_CHECKING:
-    from bayesplate.workflow.shown import Progress, Shown
+    from bayesplate.posterior.sampling import Progress
+    from bayesplate.workflow.shown import Shown
 
 INTERRUPTED = 130
 INTERNAL = 70
@@ -37,7 +38,7 @@ def print_shown(shown: Shown) -> None:
 
 def print_json(content: Any) -> None:
     """What a command found, for other programs."""
-    from bayesplate.workflow.shown import json_text
+    from bayesplate.results.contract import json_text
 
     _write(json_text(content))
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bayesplate
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.words import MERITS
+from bayesplate.diagnosis.result import Diagnosis
+from bayesplate.diagnosis.words import MERITS
 from bayesplate.effects.words import effect_names
 from bayesplate.workflow.diagnose import diagnose
 

@@ -19,8 +19,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from bayesplate.cards import card_names
-from bayesplate.diagnosis.evidence.known import known_fits
-from bayesplate.diagnosis.wording.known import KnownModel, known_models, known_titles
+from bayesplate.diagnosis.known import known_fits
+from bayesplate.diagnosis.known_words import KnownModel, known_models, known_titles
 from bayesplate.plate.material import MODULI
 from bayesplate.workflow.problem import Problem
 
@@ -47,7 +47,7 @@ def known_effects(boards: Sequence[str]) -> dict[str, tuple[KnownModel, ...]]:
     dict of tuple of KnownModel
         By board; the board as it stands first.
     """
-    return {board: known_models(known_fits(Problem.from_card(board).posed, {})) for board in boards}
+    return {board: known_models(known_fits(Problem.from_card(board).posed)) for board in boards}
 
 
 def rows(found: Mapping[str, Sequence[KnownModel]]) -> list[tuple[str | float | None, ...]]:

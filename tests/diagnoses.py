@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from bayesplate.diagnosis.decision.claim import Condition
-from bayesplate.diagnosis.decision.stated import StatedClaim
-from bayesplate.diagnosis.decision.verdict import Word
-from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, ExchangeEntry
-from bayesplate.diagnosis.wording.diagnosis import (
+from bayesplate.diagnosis.candidates import Amplitude, EffectEntry, ExchangeEntry
+from bayesplate.diagnosis.claim import Condition
+from bayesplate.diagnosis.known_words import KnownModel
+from bayesplate.diagnosis.result import (
     Diagnosis,
     ElasticShift,
     Errors,
@@ -19,7 +18,8 @@ from bayesplate.diagnosis.wording.diagnosis import (
     NullControlSummary,
     PValues,
 )
-from bayesplate.diagnosis.wording.known import KnownModel
+from bayesplate.diagnosis.stated import StatedClaim
+from bayesplate.diagnosis.verdict import Word
 from bayesplate.effects import EFFECTS
 from bayesplate.results.contract import Spread
 

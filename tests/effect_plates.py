@@ -17,8 +17,9 @@ from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System
 from bayesplate.modes.naming import find
 from bayesplate.modes.solve import Modes, solve
+from bayesplate.plate.measured import Reading
 from bayesplate.plate.parameter import Owner, shown_name
-from bayesplate.plate.setup import AttachedItem, Reading, Setup
+from bayesplate.plate.setup import AttachedItem, Setup
 from bayesplate.posterior.posing import PosedProblem, pose
 from bayesplate.workflow.prepare import prepare
 

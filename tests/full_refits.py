@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.baseline import Baseline
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.plate.board import Board

@@ -30,7 +30,7 @@ SAMPLING = ("compare", "fitting", "campaign_fit")
 
 def quickly() -> None:
     """A sampler whose first judgement passes and that saves every chunk, and a search among two candidates."""
-    from bayesplate.diagnosis.evidence.joint import full_search
+    from bayesplate.diagnosis.joint import full_search
     from bayesplate.posterior import checkpoint
     from bayesplate.posterior.convergence import Gate
     from bayesplate.posterior.sampling import SamplerSettings

@@ -14,8 +14,9 @@ from bayesplate.frequencies.system import system_of
 from bayesplate.labels import Label
 from bayesplate.plate.board import INPUTS, Board, made_board
 from bayesplate.plate.material import RIGIDITIES
+from bayesplate.plate.measured import Peak, Reading
 from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.setup import Peak, Reading, Setup
+from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 NARROW = 1.0001

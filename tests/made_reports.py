@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bayesplate.cards import BoardCard
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference

@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from made_boards import setup_of
 
-from bayesplate.diagnosis.decision.verdict import Verdict, decide
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid
-from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.search import Candidate, Found, Ground
-from bayesplate.diagnosis.evidence.sensitivity import Variant
-from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.forms import Form
-from bayesplate.diagnosis.shifts.laws import FormLaw
-from bayesplate.diagnosis.shifts.tables import Table, nothing
+from bayesplate.diagnosis.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.forms import Form
+from bayesplate.diagnosis.hypotheses import Hypothesis, Swap
+from bayesplate.diagnosis.laws import FormLaw
+from bayesplate.diagnosis.noise_grid import NoiseGrid
+from bayesplate.diagnosis.null_control import NullControl
+from bayesplate.diagnosis.search import Candidate, Found, Ground
+from bayesplate.diagnosis.shifts import Table, nothing
+from bayesplate.diagnosis.signatures import signature
+from bayesplate.diagnosis.verdict import Verdict, decide
+from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
 from bayesplate.modes.naming import Place
 from bayesplate.plate.board import made_board
+from bayesplate.plate.measured import Reading
 from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.setup import Reading, Setup
+from bayesplate.plate.setup import Setup
 from bayesplate.quantities import Quantity
 
 FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
 NOISE = 0.005
+LOG_RIGIDITIES = np.log([30.0, 2.0, 5.0])
 
 
 def baseline(
@@ -54,18 +57,43 @@ def baseline(
     )
     shares = rng.dirichlet(np.full(3, 0.7), size=n_modes)
     inputs = {"thickness": Quantity.exact(3e-3), "poisson_xy": Quantity.exact(0.4)}
+    places = tuple(Place(parity, 0, 1.0) for parity in parities or [(0, 0)] * n_modes)
+    log_frequency, slopes = np.log(hertz), 0.5 * shares
     return Baseline(
         board=made_board("made", inputs, setups),
         values={name: np.asarray(v) for name, v in {"D_x": 30.0, "D_y": 2.0, "D_s": 5.0}.items()}
         | {name: np.asarray(q.mean) for name, q in inputs.items()},
-        log_rigidities=np.log([30.0, 2.0, 5.0]),
-        log_frequency=np.log(hertz),
-        residual=np.zeros(n_modes),
-        slopes=0.5 * shares,
-        input_slopes=0.01 * rng.standard_normal((n_modes, n_inputs)),
-        places=tuple(Place(parity, 0, 1.0) for parity in parities or [(0, 0)] * n_modes),
+        log_rigidities=LOG_RIGIDITIES,
+        log_readings=log_frequency,
+        every=Spectrum(
+            log_frequency=log_frequency,
+            slopes=slopes,
+            input_slopes=0.01 * rng.standard_normal((n_modes, n_inputs)),
+            places=tuple(tuple(places[i] for i in part) for part in parts),
+            inputs=np.zeros(n_inputs),
+            peaks=(None,) * len(noise),
+            predict=lambda x: log_frequency + (x - LOG_RIGIDITIES) @ slopes.T,
+        ),
+        rows=np.arange(n_modes),
         symmetry=tuple((True, True) for _ in noise),
     )
+
+
+def with_residual(base: Baseline, residual: np.ndarray) -> Baseline:
+    """The same baseline with other readings."""
+    return replace(base, log_readings=base.middle + np.asarray(residual))
+
+
+def with_modes(base: Baseline, **changed: object) -> Baseline:
+    """The same baseline with other slopes, frequencies or laws of its modes, and the readings that it had."""
+    return replace(base, every=replace(base.every, **changed))
+
+
+def exchanged(base: Baseline, swap: Swap, residuals: np.ndarray) -> np.ndarray:
+    """Residuals, (n_sets, n_modes) array, of readings of which two have each other's labels."""
+    readings = residuals + base.middle
+    readings[:, [swap.first, swap.second]] = readings[:, [swap.second, swap.first]]
+    return readings - base.middle
 
 
 def table(
@@ -75,12 +103,10 @@ def table(
     n_tangents: int = 1,
     *,
     size: float = 0.01,
-    name: str = "first",
 ) -> Table:
     """Cells with random shifts and tangents."""
     weights = rng.dirichlet(np.full(n_cells, 3.0))
     return Table(
-        members=(name,),
         weights=weights,
         shift=size * rng.standard_normal((n_cells, n_modes)),
         slopes=0.5 * size * rng.standard_normal((n_cells, n_modes, n_tangents)),
@@ -104,7 +130,18 @@ def ground_of(base: Baseline, *found: Hypothesis, candidates: Mapping[str, Candi
 
 def bare(base: Baseline, noise: NoiseGrid, prior: float = 0.5) -> Hypothesis:
     """The hypothesis that nothing is lacking."""
-    return Hypothesis((), prior, nothing(base.n_modes), noise)
+    return Hypothesis((), prior, nothing(base.n_modes), noise, base)
+
+
+def left_out(ground: Ground, index: int, residual: np.ndarray) -> np.ndarray:
+    """Errors of predicting each reading from the other modes under one hypothesis: (n_modes,) array, ln f."""
+    one = ground.hypotheses[index]
+    return one.terms.left_out(one.seen(ground.baseline, residual[None, :]))[1][:, 0]
+
+
+def visible_of(one: Candidate) -> np.ndarray:
+    """Visible shift of a candidate at its nominal size: (n_modes,) array, ln f."""
+    return one.signature.visible / float(cents(np.ones(1))[0])
 
 
 HALF_NORMAL = Quantity.from_mean(0.0, 1.0, "normal", lower=0.0)
@@ -120,14 +157,25 @@ def candidate(
 ) -> Candidate:
     """An effect whose shift is a direction times its size, one parameter with a given prior."""
     free = Parameter("size", BOARD, prior, "1", 0.0, effect=name)
-    law = FormLaw(Form(name, "", base.board, (free,)), ())
-    fine, coarse = (_along(base, name, direction, prior, n) for n in (n_cells, n_coarse))
+    law = MadeLaw(Form(name, "", base.board, (free,)), (), direction=direction)
+    fine, coarse = (_along(base, direction, prior, n) for n in (n_cells, n_coarse))
     shift = direction * float(prior.value(1.0))
-    visible = shift - base.slopes @ (base.absorbing @ shift)
-    return Candidate(name, (law,), fine, coarse, shift, visible, -base.absorbing @ shift)
+    seen = signature(base, name, (free,), base.log_frequency + shift)
+    return Candidate(name, (law,), fine, coarse, seen, float(np.linalg.norm(seen.visible / cents(base.scales))))
 
 
-def _along(base: Baseline, name: str, direction: np.ndarray, prior: Quantity, n: int) -> Table:
+@dataclass(frozen=True, eq=False)
+class MadeLaw(FormLaw):
+    """An effect that adds a direction times its size."""
+
+    direction: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def every_log_frequency(self, baseline, log_rigidities, values):
+        (size,) = values.values()
+        return baseline.every.predict(log_rigidities) + np.outer(size, self.direction)
+
+
+def _along(base: Baseline, direction: np.ndarray, prior: Quantity, n: int) -> Table:
     low, high = (float(np.clip(prior.standard(bound), -3.0, 3.0)) for bound in (prior.lower, prior.upper))
     width = (high - low) / n
     z = low + width * (np.arange(n) + 0.5)
@@ -135,7 +183,6 @@ def _along(base: Baseline, name: str, direction: np.ndarray, prior: Quantity, n:
     moved = -np.outer(prior.value(z), base.absorbing @ direction)
     slope = prior.value(z + 0.25 * width) - prior.value(z - 0.25 * width)
     return Table(
-        members=(name,),
         weights=weights / weights.sum(),
         shift=np.outer(prior.value(z), direction) + moved @ base.slopes.T,
         slopes=(slope[:, None] * (direction - base.slopes @ (base.absorbing @ direction)))[:, :, None],
@@ -161,6 +208,6 @@ CERTAIN = NullControl(against=np.full(100, 50.0), ratio=np.full(100, 0.9))
 """A null control that leaves so much to chance that only certainty calls for an effect, as a probability below 0.1."""
 
 
-def decided(found: Found, control: NullControl = CERTAIN, others: Sequence[Variant] = ()) -> Verdict:
+def decided(found: Found, control: NullControl = CERTAIN, others: Sequence[tuple[str, Found]] = ()) -> Verdict:
     """The verdict by the given probabilities alone, which need not be those of the readings."""
     return decide(found, control, others)

@@ -13,7 +13,7 @@ from bayesplate.campaigns.given import GivenShared
 from bayesplate.campaigns.likelihood import LogDensity, SharedLikelihood, moments
 from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.shared import Shared
-from bayesplate.diagnosis.evidence.terms import log_sum, normalised
+from bayesplate.diagnosis.terms import log_sum, normalised
 from bayesplate.posterior.draws import Draws, named_draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.reweighting import FEWEST_WEIGHTED_DRAWS

@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.terms import log_sum
+from bayesplate.diagnosis.terms import log_sum
 from bayesplate.posterior.mixture import Mixture
 
 Floats = NDArray[np.float64]

@@ -23,7 +23,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.terms import log_sum, normalised
+from bayesplate.diagnosis.terms import log_sum, normalised
 
 Floats = NDArray[np.float64]
 LogDensity = Callable[[Floats], Floats]

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from bayesplate.campaigns.likelihood import Likelihood
 from bayesplate.campaigns.pulls import Pull
 from bayesplate.campaigns.shared import Shared
-from bayesplate.diagnosis.evidence.terms import log_sum
+from bayesplate.diagnosis.terms import log_sum
 from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]

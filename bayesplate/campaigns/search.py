@@ -22,11 +22,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, hypotheses
-from bayesplate.diagnosis.evidence.peaks import with_own_labels
-from bayesplate.diagnosis.evidence.search import LEAST_TRACE, Ground, prepare_search
-from bayesplate.diagnosis.evidence.terms import log_sum
-from bayesplate.diagnosis.shifts.baseline import Baseline
+from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.hypotheses import Hypothesis, hypotheses
+from bayesplate.diagnosis.peaks import with_own_labels
+from bayesplate.diagnosis.search import LEAST_TRACE, Ground, prepare_search
+from bayesplate.diagnosis.terms import log_sum
 
 Floats = NDArray[np.float64]
 Way = Literal["none", "shared", "own", "one board", "shared and own"]
@@ -94,12 +94,10 @@ class BoardSearch:
         one = self.hypothesis(effects)
         if one is None:
             return {}
-        terms = one.terms(self.ground.whole)
+        terms = one.terms
         seen = one.seen(self.ground.baseline, self.ground.baseline.residual[None, :])
         n_cells = one.table.n_cells
-        by_cell = (
-            log_sum(terms.log_densities(seen)[:, 0].reshape(-1, n_cells)) - terms.fold.half_log_det + one.log_labels
-        )
+        by_cell = log_sum(terms.log_densities(seen)[:, 0].reshape(-1, n_cells)) - one.own.half_log_det + one.log_labels
         with np.errstate(divide="ignore"):
             log_prior = np.log(one.table.weights)
         possible = np.flatnonzero(np.isfinite(log_prior))
@@ -155,7 +153,11 @@ def shown(boards: Sequence[BoardSearch], effects: Sequence[tuple[str, ...]]) -> 
 
     A pair costs nothing for one that cannot be seen, so that every effect would seem to come with it.
     """
-    traces = {name: np.hypot.reduce([one.ground.trace(name) for one in boards]) for each in effects for name in each}
+    traces = {
+        name: np.hypot.reduce([one.ground.candidates[name].trace for one in boards])
+        for each in effects
+        for name in each
+    }
     return tuple(each for each in effects if len(each) == 1 or not min(traces[name] for name in each) < LEAST_TRACE)
 
 

@@ -13,7 +13,7 @@ from bayesplate.campaigns.likelihood import Likelihood, LogDensity, moments, spr
 from bayesplate.campaigns.pulls import Pull, moments_before, normal_posterior
 from bayesplate.campaigns.scatter import Scatter, ScatteredLikelihood, expected_width, scatters_of, widths
 from bayesplate.campaigns.shared import Shared
-from bayesplate.diagnosis.evidence.terms import log_sum, normalised
+from bayesplate.diagnosis.terms import log_sum, normalised
 from bayesplate.posterior.convergence import Convergence
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.sampling import Chains, Progress, SamplerSettings, sample

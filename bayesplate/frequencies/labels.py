@@ -6,7 +6,8 @@ from bayesplate.errors import Fault
 from bayesplate.labels import HIGHEST_ORDER, Label
 from bayesplate.modes.beams import is_rigid
 from bayesplate.plate.board import Board
-from bayesplate.plate.setup import NO_OFFSET, Ends, Setup
+from bayesplate.plate.measured import NO_OFFSET
+from bayesplate.plate.setup import Ends, Setup
 
 
 def label_faults(board: Board) -> list[Fault]:

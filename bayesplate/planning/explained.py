@@ -18,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
-from bayesplate.diagnosis.decision.readings import wrong_reading
-from bayesplate.diagnosis.decision.verdict import WITHIN, Answer, answer_words, answers
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.evidence.terms import normalised
-from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.diagnosis.shifts.forms import with_forms
+from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.forms import with_forms
+from bayesplate.diagnosis.readings import wrong_reading
+from bayesplate.diagnosis.search import PASSES, Found
+from bayesplate.diagnosis.terms import normalised
+from bayesplate.diagnosis.verdict import WITHIN, Answer, answer_words, answers
 from bayesplate.planning.beliefs import (
     N_TERMS,
     NOTHING_LACKS,
@@ -93,18 +91,18 @@ def explanations_of(found: Found, left: Sequence[Answer], rng: np.random.Generat
 def _explanation(found: Found, answer: Answer, probability: float, rng: np.random.Generator) -> Explanation:
     """An answer of a search as terms: cells and levels of noise drawn by what they weigh now."""
     base, hypothesis = found.ground.baseline, found.ground.hypotheses[answer.index]
-    terms = hypothesis.terms(found.ground.whole)
+    terms = hypothesis.terms
     seen = hypothesis.seen(base, found.residual[None, :])
     # systematic: drawn with the least scatter
     places = (np.arange(N_TERMS) + rng.random()) / N_TERMS
     shares = np.cumsum(normalised(terms.log_densities(seen)[:, 0]))
     levels, cells = np.divmod(np.minimum(np.searchsorted(shares, places), shares.size - 1), terms.table.n_cells)
     noise = terms.noise.sd[levels]
-    table, own = terms.table, terms.fold.baseline
+    table, own = terms.table, terms.baseline
     sides = np.concatenate([own.slopes, own.input_slopes], axis=1)
     design = np.concatenate([np.tile(sides, (N_TERMS, 1, 1)), table.slopes[cells]], axis=2)
     variance = noise[:, own.setup_index] ** 2 + own.own_variance
-    mean, covariance = _conditioned(design, variance, seen - table.shift[cells], terms.fold.used, own.slopes.shape[1])
+    mean, covariance = _conditioned(design, variance, seen - table.shift[cells], own.used, own.slopes.shape[1])
     n, n_u = own.slopes.shape[1], mean.shape[1]
     forms, z, step = _sizes(found, answer, cells, n_u - table.slopes.shape[2])
     first = n_u - z.shape[1]
@@ -126,19 +124,15 @@ def _explanation(found: Found, answer: Answer, probability: float, rng: np.rando
         middle=np.tile(middle, (N_TERMS, 1)),
         wanted=np.tile(np.pad(gradient, ((0, 0), (0, n_u - first))), (N_TERMS, 1, 1)),
         forms=forms,
-        again=_at_hand(hypothesis, own, base, shift, slopes),
+        again=_at_hand(own, base, shift, slopes),
     )
 
 
-def _at_hand(hypothesis: Hypothesis, own: Baseline, base: Baseline, shift: Floats, slopes: Floats) -> AtHand:
-    """The readings as a hypothesis takes them, of its own labels: what is expected of each of these modes is given."""
-    rows = np.arange(own.n_modes)
-    if hypothesis.swap is not None:
-        rows[[hypothesis.swap.first, hypothesis.swap.second]] = hypothesis.swap.second, hypothesis.swap.first
-    is_mode = own.is_mode[rows]
-    same = (own.rows[rows, None] == base.rows) & is_mode[:, None]
-    expected = np.where(is_mode, shift[:, rows], np.nan)
-    return AtHand(expected, slopes[:, rows], np.where(same.any(axis=1), same.argmax(axis=1), -1))
+def _at_hand(own: Baseline, base: Baseline, shift: Floats, slopes: Floats) -> AtHand:
+    """The readings under the labels of a hypothesis: what is expected of each of these modes is given."""
+    same = (own.rows[:, None] == base.rows) & own.is_mode[:, None]
+    expected = np.where(own.is_mode, shift, np.nan)
+    return AtHand(expected, slopes, np.where(same.any(axis=1), same.argmax(axis=1), -1))
 
 
 def _sizes(found: Found, answer: Answer, cells: Rows, first: int) -> tuple[tuple[FormTerms, ...], Floats, Floats]:

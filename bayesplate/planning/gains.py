@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.evidence.terms import log_sum, normalised
+from bayesplate.diagnosis.terms import log_sum, normalised
 from bayesplate.planning.beliefs import Beliefs, Explanation, entropy
 from bayesplate.planning.plan import Gain
 from bayesplate.plate.material import MODULI

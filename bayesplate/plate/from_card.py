@@ -7,7 +7,8 @@ from types import MappingProxyType
 
 from bayesplate.cards import BoardCard, CoefficientCard, PriorCard, SetupSection
 from bayesplate.plate.board import Board, made_board
-from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid, Peak, Reading, Setup
+from bayesplate.plate.measured import Peak, Reading
+from bayesplate.plate.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid, Setup
 from bayesplate.quantities import Quantity
 
 NO_TABLES: Mapping[str, CoefficientCard] = MappingProxyType({})

@@ -9,8 +9,9 @@ from bayesplate.cards import MISSED, SPURIOUS
 from bayesplate.cards.writing import array, density_numbers, number, quantity, table, text, unstatable
 from bayesplate.errors import Fault, InputError
 from bayesplate.plate.board import WARPS, Board
+from bayesplate.plate.measured import Peak
 from bayesplate.plate.parameter import BOARD
-from bayesplate.plate.setup import NOISE_WANTED, AttachedItem, Peak, Setup
+from bayesplate.plate.setup import NOISE_WANTED, AttachedItem, Setup
 from bayesplate.quantities import Kind, Quantity
 
 _MILLI = 1e-3

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayesplate.diagnosis.wording.candidates import EffectEntry
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis, Histogram, NullControlSummary
-from bayesplate.diagnosis.wording.words import MERITS, names_of
+from bayesplate.diagnosis.candidates import EffectEntry
+from bayesplate.diagnosis.result import Diagnosis, Histogram, NullControlSummary
+from bayesplate.diagnosis.words import MERITS, names_of
 from bayesplate.report.style import (
     BLUE,
     DARK,

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from bayesplate.cards import BoardCard
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.tables import write_diagnosis_tables
+from bayesplate.diagnosis.result import Diagnosis
+from bayesplate.diagnosis.tables import write_diagnosis_tables
 from bayesplate.files import make_folder, write_text
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference

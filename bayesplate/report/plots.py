@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.summary import CampaignSummary
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.sheet import Sheet
 from bayesplate.planning.bench import Bench

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.known import known_table
-from bayesplate.diagnosis.wording.tables import (
+from bayesplate.diagnosis.known_words import known_table
+from bayesplate.diagnosis.result import Diagnosis
+from bayesplate.diagnosis.tables import (
     answers_table,
     candidates_table,
     claim_table,
@@ -15,7 +15,7 @@ from bayesplate.diagnosis.wording.tables import (
     sizes_table,
     what_is_quoted,
 )
-from bayesplate.diagnosis.wording.told import (
+from bayesplate.diagnosis.told import (
     headline_sentence,
     known_sentences,
     remarks,
@@ -23,7 +23,7 @@ from bayesplate.diagnosis.wording.told import (
     verdict_sentences,
     warnings,
 )
-from bayesplate.diagnosis.wording.words import IN_PART, VERDICTS
+from bayesplate.diagnosis.words import IN_PART, VERDICTS
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import Elastic, Rigidity
 from bayesplate.results.fit_tables import compared_constants

@@ -13,7 +13,7 @@ import numpy as np
 
 from bayesplate.cards import BoardCard, CampaignCard, PriorCard
 from bayesplate.cards.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
-from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS
+from bayesplate.diagnosis.null_control import BY_CHANCE, FALSE_ALARMS
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName

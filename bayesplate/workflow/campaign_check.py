@@ -11,7 +11,7 @@ from bayesplate.campaigns.given import GivenShared
 from bayesplate.campaigns.pulls import Pull, moments_before
 from bayesplate.campaigns.scatter import expected_width
 from bayesplate.campaigns.shared import Shared
-from bayesplate.diagnosis.evidence.terms import normalised
+from bayesplate.diagnosis.terms import normalised
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.workflow.campaign import Campaign
 from bayesplate.workflow.check import check_board

@@ -26,8 +26,8 @@ from bayesplate.campaigns.search import Explanation, explanations, search_board,
 from bayesplate.campaigns.shared import shared_by
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.cards import SharedSection
-from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.errors import InputError
 from bayesplate.files import make_folder, write_text

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bayesplate.campaigns.checking import CampaignCheck
-from bayesplate.diagnosis.shifts.signatures import INVISIBLE, Signature, look_alikes, signatures
+from bayesplate.diagnosis.signatures import INVISIBLE, Signature, look_alikes, signatures
 from bayesplate.estimates.identifiability import remarks
 from bayesplate.frequencies.laws import cents
 from bayesplate.plate.material import MODULI, moduli

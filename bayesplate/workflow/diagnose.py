@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,24 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.cards import PriorCard
-from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
-from bayesplate.diagnosis.decision.in_part import named_in_part
-from bayesplate.diagnosis.decision.readings import wrong_reading
-from bayesplate.diagnosis.decision.refits import refit_board
-from bayesplate.diagnosis.decision.stated import stated_claims
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words, decide
-from bayesplate.diagnosis.evidence.folds import Nested
-from bayesplate.diagnosis.evidence.joint import full_search
-from bayesplate.diagnosis.evidence.known import KnownFit, known_fits
-from bayesplate.diagnosis.evidence.leverages import carrying
-from bayesplate.diagnosis.evidence.null_control import N_SETS, NullControl, made_to_choose, null_control
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.shifts.baseline import baseline_of
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis, diagnosis_json
-from bayesplate.diagnosis.wording.findings import Case, Side, diagnosis_of
-from bayesplate.diagnosis.wording.relabelled import relabelled_sentence
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.claim import Claim, judge_claim, named_in_part, nested_of
+from bayesplate.diagnosis.findings import Case, Side, diagnosis_of
+from bayesplate.diagnosis.folds import carrying
+from bayesplate.diagnosis.joint import full_search
+from bayesplate.diagnosis.known import known_fits
+from bayesplate.diagnosis.null_control import N_SETS, made_to_choose, null_control
+from bayesplate.diagnosis.readings import wrong_reading
+from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.sizes import refit_board
+from bayesplate.diagnosis.stated import stated_claims
+from bayesplate.diagnosis.told import relabelled_sentence
+from bayesplate.diagnosis.verdict import Verdict, answer_words, decide
 from bayesplate.errors import Fault, InputError, NotConvergedError, NotIdentifiableError
-from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, indices_of, united
+from bayesplate.estimates.leave_one_out import carrying_modes, indices_of, united
 from bayesplate.files import make_folder, write_text
 from bayesplate.planning.drawn_up import first_of
 from bayesplate.planning.explained import believed, survivors
@@ -184,48 +182,62 @@ def diagnose(
         return fitted(under, seed, begun.checkpoints(name), refuse, stages.sampled)
 
     before = run(problem, BEFORE, "fit without further effects")
+    posed = before.inference.problem
     stages.begin("search for effects", _SEARCH)
-    ground, found = full_search(baseline_of(before.inference.problem), tell=stages.reached)
+    ground, found = full_search(baseline_of(posed), tell=stages.reached)
     stages.begin("effects that are known", _KNOWN)
-    solved = {name: one.laws[0] for name, one in ground.candidates.items()}
-    known = known_fits(before.inference.problem, solved, stages.reached)
+    known = known_fits(posed, stages.reached)
     stages.begin("the same search on simulated boards", _CONTROL)
     control = null_control(ground, np.random.default_rng([seed, _NULL_LINE]), n_null, found.against_none)
     verdict = decide(found, control)
     folded = nested_of(found, control, verdict.tried)
-    in_part = named_in_part(found, verdict, control, folded)
+    in_part = named_in_part(found, verdict, folded)
     finals = verdict.fitted_again[:_MOST_FINALISTS]
     stages.left = _FIT * len(finals) + (_CHOICE if verdict.index else 0.0)
-    refits: dict[int, Fitted] = {}
-    failures = []
+    fits, failures = {0: before}, []
     for answer in finals:
         try:
             name = "-".join((*answer.members, str(answer.index)))
             stage = f"fit with {answer_words(found, answer)}"
-            refits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
+            fits[answer.index] = run(with_board(problem, refit_board(found, answer.index)), name, stage)
         except (NotIdentifiableError, NotConvergedError) as error:
             failures.append(f"the model could not be fitted again with {' and '.join(answer.members)}: {error}")
-    after = refits.get(verdict.tried, before) if verdict.index or in_part else before
-    board = before.inference.problem.board
-    known_carrying = (carrying_modes(board, one.errors.leverages, MODULI) for one in known)
-    of_fits = (one.summary.carrying_modes for one in (before, *refits.values()))
+    last = verdict.tried if (verdict.index or in_part) and verdict.tried in fits else 0
+    after = fits[last]
+    known_carrying = (carrying_modes(posed.board, one.errors.leverages, MODULI) for one in known)
+    of_fits = (one.summary.carrying_modes for one in fits.values())
     carrying_any = united(carrying(found, verdict.tried), *of_fits, *known_carrying)
-    folded = folded and folded.without(indices_of(carrying_any, board))
+    folded = folded and folded.without(indices_of(carrying_any, posed.board))
     if verdict.index and folded is not None and folded.counted.any():
         stages.begin("the same search on simulated boards, made to choose", _CHOICE)
         control = made_to_choose(ground, control, float(folded.ratio[0]), folded.carried)
     notes = [*after.inference.problem.doubts, *failures]  # what an effect explains is no doubt any more
-    if after is not before:
-        with_words = next(answer_words(found, one) for one in finals if one.index == verdict.tried)
-        first, last = (one.inference.problem.board for one in (before, after))
-        told = relabelled_sentence(first, last, with_words)
+    if last:
+        with_words = next(answer_words(found, one) for one in finals if one.index == last)
+        told = relabelled_sentence(posed.board, after.inference.problem.board, with_words)
         notes += [told] if told else []
-    case = _case(
-        found, verdict, control, folded, known, before, after, finals, refits, tuple(notes), in_part, carrying_any
+    sides = {index: Side(index, one.summary, one.draws, _measured(one)) for index, one in fits.items()}
+    diagnosis = diagnosis_of(
+        Case(
+            found=found,
+            verdict=verdict,
+            control=control,
+            folded=folded,
+            before=sides[0],
+            after=sides[last],
+            claim=judge_claim(found, verdict, control, folded) if last else Claim(),
+            recommendation=advice(found, verdict, before.problem.prior, seed),
+            known=known,
+            stated_claims=stated_claims(posed, known) if known else (),
+            finalists=[(one, sides[one.index]) for one in finals if one.index in sides],
+            has_slip=bool(posed.slips),
+            notes=tuple(notes),
+            in_part=in_part,
+            carrying=carrying_any,
+        )
     )
-    diagnosis = diagnosis_of(case)
     if folder is not None:
-        if after is not before:
+        if last:
             make_folder(folder.path / BEFORE)
             write_fit(folder.path / BEFORE, before)
         write_fit(folder.path, after)
@@ -234,41 +246,6 @@ def diagnose(
             write_page(folder.path, after, diagnosis)
         folder.close()
     return DiagnoseResult(begun.path, diagnosis, before, after)
-
-
-def _case(
-    found: Found,
-    verdict: Verdict,
-    control: NullControl,
-    folded: Nested | None,
-    known: Sequence[KnownFit],
-    before: Fitted,
-    after: Fitted,
-    finals: Sequence[Answer],
-    refits: Mapping[int, Fitted],
-    notes: tuple[str, ...],
-    in_part: tuple[str, ...],
-    carrying_any: tuple[CarryingMode, ...],
-) -> Case:
-    is_refitted = after is not before
-    return Case(
-        found=found,
-        verdict=verdict,
-        control=control,
-        folded=folded,
-        before=Side(0, before.summary, before.draws, _measured(before)),
-        after=Side(verdict.tried if is_refitted else 0, after.summary, after.draws, _measured(after)),
-        claim=judge_claim(found, verdict, control, folded) if is_refitted else Claim(),
-        recommendation=advice(found, verdict, before.problem.prior, before.summary.seed),
-        known=known,
-        stated_claims=stated_claims(before.inference.problem, known) if known else (),
-        finalists=[(one, refits[one.index].summary) for one in finals if one.index in refits],
-        drawn={index: one.draws for index, one in refits.items()},
-        has_slip=bool(before.inference.problem.slips),
-        notes=notes,
-        in_part=in_part,
-        carrying=carrying_any,
-    )
 
 
 def _measured(one: Fitted) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
+from bayesplate.diagnosis.result import Diagnosis
 from bayesplate.files import write_text, writing
 from bayesplate.frequencies.laws import LawName
 from bayesplate.posterior.inference import Inference

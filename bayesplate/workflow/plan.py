@@ -12,11 +12,11 @@ from typing import Any
 from bayesplate.campaigns.shared import Shared
 from bayesplate.cards import PriorCard, is_campaign
 from bayesplate.cards.words import EFFECT_NAMES, effect_named
-from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
-from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
-from bayesplate.diagnosis.evidence.joint import full_search
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.hypotheses import RELABELLING
+from bayesplate.diagnosis.joint import full_search
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.verdict import WITHIN, Answer
 from bayesplate.effects import effect_faults
 from bayesplate.errors import Fault, InputError, NotIdentifiableError
 from bayesplate.files import make_folder, require_new, write_text

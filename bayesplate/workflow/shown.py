@@ -8,9 +8,9 @@ from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import campaign_check_tables, campaign_tables, diagnosis_tables
-from bayesplate.diagnosis.wording.diagnosis import Diagnosis
-from bayesplate.diagnosis.wording.tables import every_table
-from bayesplate.diagnosis.wording.told import (
+from bayesplate.diagnosis.result import Diagnosis
+from bayesplate.diagnosis.tables import every_table
+from bayesplate.diagnosis.told import (
     alike_sentence,
     carrying_words,
     known_sentences,

@@ -17,8 +17,8 @@ from made_campaigns import MASS, write_campaign
 from numpy.typing import NDArray
 
 from bayesplate.cards import load_named, read_board_text
-from bayesplate.diagnosis.evidence.joint import full_search
-from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.joint import full_search
 from bayesplate.frequencies.laws import LawName
 from bayesplate.frequencies.terms import term_weights
 from bayesplate.libraries import load_arviz

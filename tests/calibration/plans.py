@@ -31,10 +31,10 @@ from trial.cells import KINDS, SENSORS, UNKNOWN
 from trial.shared import baseline_of_card, median_baseline, shared_law
 
 from bayesplate.cards import load_prior
-from bayesplate.diagnosis.decision.verdict import WITHIN
-from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, Hypothesis
-from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
-from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.diagnosis.forms import forms
+from bayesplate.diagnosis.hypotheses import NONE, ONE, Hypothesis
+from bayesplate.diagnosis.search import Found, Ground, prepare_search, search
+from bayesplate.diagnosis.verdict import WITHIN
 from bayesplate.errors import BayesplateError
 from bayesplate.planning.beliefs import entropy
 from bayesplate.planning.explained import believed, survivors

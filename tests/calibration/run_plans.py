@@ -38,7 +38,7 @@ from calibration.plans import (
 )
 from calibration.records import Record, add_to, publish, read_done
 
-from bayesplate.diagnosis.decision.verdict import WITHIN
+from bayesplate.diagnosis.verdict import WITHIN
 
 SEED = 2
 """Boards of seed 1 were looked at while the trial was written."""

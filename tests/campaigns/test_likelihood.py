@@ -13,7 +13,7 @@ from scipy import stats
 from bayesplate.campaigns.boards import Member, Sample
 from bayesplate.campaigns.evidence import bridge_sampling
 from bayesplate.campaigns.likelihood import _REACH, SharedLikelihood, _near
-from bayesplate.diagnosis.evidence.terms import log_sum
+from bayesplate.diagnosis.terms import log_sum
 from bayesplate.quantities import Quantity
 
 N = 6000

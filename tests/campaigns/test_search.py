@@ -20,7 +20,7 @@ from bayesplate.campaigns.search import (
     search_board,
     shown,
 )
-from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.baseline import baseline_of
 from bayesplate.workflow.campaign_diagnose import _sharing, shareable
 
 
@@ -242,7 +242,7 @@ def test_the_cells_of_two_effects_are_those_of_each_and_make_up_the_evidence(fou
     seen = hypothesis.seen(one.ground.baseline, one.ground.baseline.residual[None, :])
 
     assert len(cells) == tables[0].n_cells * tables[1].n_cells
-    expected = hypothesis.terms(one.ground.whole).log_evidence(seen)[0] + hypothesis.log_labels
+    expected = hypothesis.terms.log_evidence(seen)[0] + hypothesis.log_labels
     assert one.log_evidence(SHEAR_AND_SENSOR) == pytest.approx(expected)
     for key, (log_prior, _) in cells.items():
         at = [np.isclose(table.z, z).all(axis=1) for table, z in zip(tables, (key[1:3], key[4:]), strict=True)]
@@ -269,7 +269,8 @@ def test_the_cells_of_one_effect_beside_another_are_sums_over_those_of_both(foun
 
 def test_a_pair_is_asked_for_where_the_boards_together_would_show_both():
     def seen(**traces):
-        return SimpleNamespace(ground=SimpleNamespace(trace=traces.get))
+        candidates = {name: SimpleNamespace(trace=trace) for name, trace in traces.items()}
+        return SimpleNamespace(ground=SimpleNamespace(candidates=candidates))
 
     effects = [("mass",), ("shear",), ("mass", "shear")]
     assert shown([seen(mass=1.5, shear=9.0)], effects) == (("mass",), ("shear",))

@@ -9,7 +9,7 @@ import pytest
 
 import bayesplate
 from bayesplate.cards import EFFECT_NAMES, load_campaign, physical_faults, read_board_text, remarks
-from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import implied_effects
 from bayesplate.errors import InputError
 from bayesplate.plate.from_card import board_from_card

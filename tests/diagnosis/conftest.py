@@ -8,8 +8,8 @@ from functools import cache
 
 import pytest
 
-from bayesplate.diagnosis.evidence.search import Ground, prepare_search
-from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.search import Ground, prepare_search
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.workflow.diagnose import DiagnoseResult, diagnose
 from bayesplate.workflow.problem import Problem

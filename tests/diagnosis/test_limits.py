@@ -10,13 +10,13 @@ from made_searches import HALF_NORMAL, bare, baseline, candidate, decided, groun
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
-from bayesplate.diagnosis.decision.verdict import answers, at_limit
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.predictive import noise_of_board
-from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.diagnosis.shifts.signatures import Signature, acts_both_ways, look_alikes, signatures
-from bayesplate.diagnosis.wording.entries import effect_entry
+from bayesplate.diagnosis.entries import effect_entry
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.search import Found, noise_of_board
+from bayesplate.diagnosis.signatures import Signature, acts_both_ways, look_alikes, signatures
+from bayesplate.diagnosis.sizes import at_limit
+from bayesplate.diagnosis.verdict import answers
 from bayesplate.effects import declare, effects_of
 from bayesplate.posterior.posing import pose
 from bayesplate.quantities import Quantity
@@ -36,7 +36,7 @@ def found_of(base, directions, probability, residual, prior=HALF_NORMAL, n_cells
     """A search among single effects of given directions, with given probabilities of none and of each."""
     levels = noise_grid(base.board) if level is None else one_level(base, level)
     made = {name: candidate(base, name, d, prior, n_cells) for name, d in directions.items()}
-    every = [bare(base, levels), *(Hypothesis((name,), 0.1, one.fine, levels) for name, one in made.items())]
+    every = [bare(base, levels), *(Hypothesis((name,), 0.1, one.fine, levels, base) for name, one in made.items())]
     shares = np.array(probability)
     return Found(ground_of(base, *every, candidates=made), residual, np.log(shares + 1e-300), shares)
 
@@ -86,7 +86,7 @@ def test_a_size_is_at_its_limit_where_half_a_percent_of_its_prior_lies_beyond(ba
 def test_what_rounding_leaves_of_two_effects_looks_like_nothing(base):
     """Three modes see nothing beside three constants: what is left of a shift is a rounding error, however alike."""
     shift, left = np.full(6, 10.0), np.full(6, 1e-12)
-    seen = [Signature(name, {}, shift, left, {}, 1.0, base.scales, False) for name in (A, B)]
+    seen = [Signature(name, {}, shift, left, {}, base.scales, False) for name in (A, B)]
 
     assert look_alikes(seen) == {A: (), B: ()}
 
@@ -102,7 +102,7 @@ def test_effects_look_alike_from_a_cosine_of_095_on(base, likeness, alike, prior
     one = one / np.linalg.norm(one / base.scales)
     other = other - one * np.sum(one * other / base.scales**2)
     other = likeness * one + np.sqrt(1.0 - likeness**2) * other / np.linalg.norm(other / base.scales)
-    seen = [Signature(name, {}, d, d, {}, 1.0, base.scales, either) for name, d in ((A, one), (B, other))]
+    seen = [Signature(name, {}, d, d, {}, base.scales, either) for name, d in ((A, one), (B, other))]
 
     assert look_alikes(seen) == {A: (B,) if alike else (), B: (A,) if alike else ()}
     found = found_of(base, {A: one, B: other}, [0.1, 0.5, 0.4], np.zeros(6), prior)
@@ -148,7 +148,7 @@ def test_an_amplitude_has_the_interval_of_ninety_percent(base):
     prior = Quantity.from_mean(0.0, 1.0, "normal")
     found = found_of(base, {A: direction}, [0.0, 1.0], 1.2 * direction, prior, n_cells=401, level=NOISE)
     # The size seen through what the constants leave of it.
-    weight = float(np.sum(base.whitened(direction) ** 2))
+    weight = float(np.sum(((direction - base.slopes @ (base.absorbing @ direction)) / base.scales) ** 2))
     sd = 1.0 / np.sqrt(1.0 + weight)
     mean = 1.2 * weight * sd**2
 

@@ -9,12 +9,13 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from bayesplate.diagnosis.decision.constants import draw_constants
-from bayesplate.diagnosis.decision.verdict import at_limit, decide
-from bayesplate.diagnosis.evidence.null_control import null_control
-from bayesplate.diagnosis.evidence.search import prepare_search, search
-from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width
-from bayesplate.diagnosis.shifts.baseline import baseline_of
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.constants import draw_constants
+from bayesplate.diagnosis.null_control import null_control
+from bayesplate.diagnosis.search import prepare_search, search
+from bayesplate.diagnosis.sensitivity import varied
+from bayesplate.diagnosis.sizes import at_limit
+from bayesplate.diagnosis.verdict import decide
 from bayesplate.workflow.fit import fit
 
 slow = pytest.mark.slow
@@ -64,8 +65,9 @@ def test_the_finnish_board_supports_no_claim_and_no_poisson_ratio(diagnosed, fin
     found = search(finnish.ground)
     assert decide(found, null_control(found.ground, np.random.default_rng(9), 200)).effects == told.effects
     for factor in (2.0, 3.0):
-        wider = inclusion_with_width(found, factor)
-        assert wider[""] >= 0.1 or max(wider, key=wider.get) != "poisson_ratio"
+        wider = varied(found, width=factor)
+        inclusion = {name: wider.inclusion(name) for name in found.ground.candidates}
+        assert wider.none >= 0.1 or max(inclusion, key=inclusion.get) != "poisson_ratio"
 
 
 @slow

@@ -13,7 +13,7 @@ import pytest
 from effect_plates import MADE, modes_of
 from generator.known_boards import FREE
 
-from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS, declare
 from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare

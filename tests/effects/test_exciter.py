@@ -20,7 +20,7 @@ from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import System
 from bayesplate.labels import Label
 from bayesplate.modes.naming import find
-from bayesplate.plate.setup import Reading
+from bayesplate.plate.measured import Reading
 from bayesplate.quantities import Quantity
 
 COIL, MASS = 1.6e-3, 48e-3

@@ -19,7 +19,7 @@ from generator.known_boards import FIEMME, FREE
 from made_boards import board_of
 
 from bayesplate.cards import read_board_text
-from bayesplate.diagnosis.shifts.forms import forms
+from bayesplate.diagnosis.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.attached_items import item_on_board
 from bayesplate.plate.from_card import board_from_card

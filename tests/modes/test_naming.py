@@ -17,7 +17,8 @@ from generator.naming import correlations, named
 from generator.plate import Plate
 from generator.plate import solve as generated
 
-from bayesplate.effects.exciter import Drive, Exciter
+from bayesplate.effects.drives import Drive
+from bayesplate.effects.exciter import Exciter
 from bayesplate.effects.fluid_loading import FluidLoading
 from bayesplate.labels import HIGHEST_ORDER
 from bayesplate.modes.beams import is_rigid, product_coefficients

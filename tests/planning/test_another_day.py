@@ -10,7 +10,7 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, setup_of
 
-from bayesplate.diagnosis.evidence.hypotheses import Swap
+from bayesplate.diagnosis.hypotheses import Swap
 from bayesplate.planning.beliefs import AtHand, Explanation
 from bayesplate.planning.explained import _at_hand
 from bayesplate.planning.gains import Readings

@@ -9,9 +9,9 @@ import made_searches as made
 import numpy as np
 import pytest
 
-from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
-from bayesplate.diagnosis.evidence.noise_grid import noise_grid
-from bayesplate.diagnosis.evidence.search import search
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.search import search
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.explained import asked, explanations_of, survivors
 from bayesplate.planning.gains import Readings, probabilities_after

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import ritz
+from made_baselines import baseline_at
 from made_boards import board_of, setup_of
 from scipy import integrate, stats
 
 from bayesplate.cards import load_board
-from bayesplate.diagnosis.shifts.baseline import baseline_at
 from bayesplate.estimates.least_squares import reading_scales, weighted_least_squares
 from bayesplate.plate.densities import DEGREES_OF_FREEDOM
 from bayesplate.plate.from_card import board_from_card

@@ -12,7 +12,8 @@ from bayesplate.errors import InputError
 from bayesplate.labels import Label
 from bayesplate.plate.board import made_board
 from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.setup import AttachedItem, DeclaredFluid, Peak, Reading, Setup
+from bayesplate.plate.measured import Peak, Reading
+from bayesplate.plate.setup import AttachedItem, DeclaredFluid, Setup
 from bayesplate.plate.writing import card_text
 from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare

@@ -12,7 +12,7 @@ from made_boards import board_of, setup_of, with_noise
 from bayesplate.cards import load_prior
 from bayesplate.errors import NotIdentifiableError
 from bayesplate.labels import Label
-from bayesplate.plate.setup import Peak
+from bayesplate.plate.measured import Peak
 from bayesplate.posterior import first_labels
 from bayesplate.posterior.first_labels import Way, only_way, probable_ways, propose_labels
 from bayesplate.quantities import Quantity

@@ -8,7 +8,7 @@ import pytest
 from diagnoses import DIAGNOSES
 from made_summaries import SUMMARY
 
-from bayesplate.diagnosis.wording.tables import candidates_table
+from bayesplate.diagnosis.tables import candidates_table
 from bayesplate.results.layout import column_widths
 from bayesplate.results.tables import Table, render
 from bayesplate.workflow.shown import show_diagnosis, show_fit

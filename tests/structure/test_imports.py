@@ -46,8 +46,17 @@ ROOMS = {
     **dict.fromkeys(OPEN_TO_ALL, OPEN_TO_ALL),
 }
 
-WITHIN = {"diagnosis": ("shifts", "evidence", "decision", "wording")}
-"""Folders that are divided again: each part sees the parts before it, and every file stands in one."""
+WITHIN = {
+    "diagnosis": (
+        ("baseline", "forms", "laws", "signatures", "shifts"),
+        ("noise_grid", "terms", "hypotheses", "search", "draws", "peaks", "joint", "sensitivity", "folds",
+         "null_control", "known"),
+        ("sizes", "verdict", "claim", "stated", "constants", "readings"),
+        ("candidates", "known_words", "result", "words", "told", "entries", "findings", "tables", "exports",
+         "notebook"),
+    )
+}  # fmt: skip
+"""Steps of a folder: the files of each see those of the same step and of the steps before, and every file is in one."""
 NAMES_ALONE = {
     # `system_of` says which theory is to be cited
     "results": {"modes": set(), "frequencies": {"LawName", "PeakLikelihood", "cents", "system_of"}},
@@ -105,8 +114,8 @@ def _import_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
     if room not in ROOMS:
         yield 1, f"stands in no known room: {room}"
         return
-    inner = inside.parts[1] if len(inside.parts) > 2 else ""
-    if room in WITHIN and inner not in WITHIN[room] and inside.name != "__init__.py":
+    inner = "" if inside.name == "__init__.py" else inside.with_suffix("").parts[-1]
+    if room in WITHIN and inner and (len(inside.parts) > 2 or _step(inner, WITHIN[room]) < 0):
         yield 1, f"stands in no known part of {room}"
         return
     for item in _imports(tree):
@@ -130,9 +139,14 @@ def _import_faults(tree: ast.Module, inside: Path) -> Iterator[tuple[int, str]]:
             yield item.line, f"imports {item.module} at the top"
 
 
-def _comes_later(target: str, inner: str, order: tuple[str, ...]) -> bool:
-    """Whether a part of a room stands after the one that imports it; nothing comes before the room's own file."""
-    return target in order and (inner not in order or order.index(target) > order.index(inner))
+def _comes_later(target: str, inner: str, steps: tuple[tuple[str, ...], ...]) -> bool:
+    """Whether a file of a room is of a later step than the one that imports it; the room's own file is of none."""
+    return _step(target, steps) > _step(inner, steps)
+
+
+def _step(inner: str, steps: tuple[tuple[str, ...], ...]) -> int:
+    """In which step of a room a file stands; -1: in none."""
+    return next((i for i, step in enumerate(steps) if inner in step), -1)
 
 
 def _imports(tree: ast.Module) -> Iterator[Import]:
@@ -234,7 +248,7 @@ BAD_FILES = [
     ("plate/bad.py", "import bayesplate.modes.plate", "plate imports modes"),
     ("cards/bad.py", "def f():\n    from bayesplate.plate.board import Board", "cards imports plate"),
     ("modes/bad.py", "import importlib\nimportlib.import_module('bayesplate.report.page')", "modes imports report"),
-    ("diagnosis/wording/bad.py", "from bayesplate.campaigns.shared import Shared", "diagnosis imports campaigns"),
+    ("diagnosis/words.py", "from bayesplate.campaigns.shared import Shared", "diagnosis imports campaigns"),
     ("campaigns/bad.py", "from bayesplate.report.page import policy", "campaigns imports report"),
     ("recordings/bad.py", "from bayesplate.plate.board import Board", "recordings imports plate"),
     ("posterior/bad.py", "from bayesplate.workflow.fit import fit", "posterior imports workflow"),
@@ -249,24 +263,24 @@ BAD_FILES = [
     ("diagnosis/bad.py", "", "stands in no known part of diagnosis"),
     ("diagnosis/gadgets/bad.py", "", "stands in no known part of diagnosis"),
     (
-        "diagnosis/shifts/bad.py",
-        "from bayesplate.diagnosis.evidence.search import Found",
-        "diagnosis.shifts imports diagnosis.evidence",
+        "diagnosis/shifts.py",
+        "from bayesplate.diagnosis.search import Found",
+        "diagnosis.shifts imports diagnosis.search",
     ),
     (
-        "diagnosis/evidence/bad.py",
-        "from bayesplate.diagnosis import decision",
-        "diagnosis.evidence imports diagnosis.decision",
+        "diagnosis/terms.py",
+        "from bayesplate.diagnosis import verdict",
+        "diagnosis.terms imports diagnosis.verdict",
     ),
     (
-        "diagnosis/decision/__init__.py",
-        "import bayesplate.diagnosis.wording.told",
-        "diagnosis.decision imports diagnosis.wording",
+        "diagnosis/claim.py",
+        "import bayesplate.diagnosis.told",
+        "diagnosis.claim imports diagnosis.told",
     ),
     (
         "diagnosis/__init__.py",
-        "from bayesplate.diagnosis.shifts.laws import form_law",
-        "diagnosis imports diagnosis.shifts",
+        "from bayesplate.diagnosis.laws import form_law",
+        "diagnosis imports diagnosis.laws",
     ),
     ("modes/bad.py", "from . import plate", "imports relatively"),
     ("modes/bad.py", "def f():\n    import emcee", "modes imports emcee, which belongs to posterior"),

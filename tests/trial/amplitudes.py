@@ -10,8 +10,9 @@ from generator.boards import PlantedBoard
 from generator.designs import POISSON, Design
 from numpy.typing import NDArray
 
-from bayesplate.diagnosis.decision.verdict import Verdict, size_posterior
-from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.diagnosis.search import Found
+from bayesplate.diagnosis.sizes import size_posterior
+from bayesplate.diagnosis.verdict import Verdict
 from bayesplate.plate.material import rigidities
 from bayesplate.quantities import Quantity
 

@@ -16,12 +16,11 @@ from trial.amplitudes import recovered
 from trial.cells import KINDS, SENSORS, Cell
 from trial.shared import control_of, ground_of, shared_law
 
-from bayesplate.diagnosis.decision.claim import judge_claim
-from bayesplate.diagnosis.decision.constants import ConstantDraws, draw_constants
-from bayesplate.diagnosis.decision.in_part import named_in_part
-from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answers, decide
-from bayesplate.diagnosis.evidence.null_control import NullControl
-from bayesplate.diagnosis.evidence.search import Found, search
+from bayesplate.diagnosis.claim import judge_claim, named_in_part, nested_of
+from bayesplate.diagnosis.constants import Constants, draw_constants
+from bayesplate.diagnosis.null_control import NullControl
+from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.verdict import Verdict, alternatives, answers, decide
 from bayesplate.errors import BayesplateError
 from bayesplate.plate.material import MODULI
 
@@ -108,7 +107,8 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         For draws of the constants.
     """
     verdict = decide(found, control)
-    claim = judge_claim(found, verdict, control)
+    folded = nested_of(found, control, verdict.tried)
+    claim = judge_claim(found, verdict, control.without(folded.carried if folded else ()), folded)
     ranked = answers(found)
     near = verdict.stands_for or (alternatives(found, ranked) if ranked else ())
     best = verdict.best
@@ -117,7 +117,7 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
         "needed": verdict.is_needed,
         "effects": list(verdict.effects),
         "reason": verdict.reason,
-        "in_part": list(named_in_part(found, verdict, control)),
+        "in_part": list(named_in_part(found, verdict, folded)),
         "claim": bool(claim.holds),
         "conditions": {condition.name: bool(condition.is_met) for condition in claim.conditions},
         "best": list(best.members) if best else [],
@@ -130,7 +130,9 @@ def findings(found: Found, planted: PlantedBoard, control: NullControl, rng: np.
             "bare": _probability(found.p_value(0)),
             "best": _probability(found.p_value(best.index)) if best else None,
         },
-        "below_sight": [name for name in found.ground.candidates if found.ground.is_below_detection_limit(name)],
+        "below_sight": [
+            name for name, one in found.ground.candidates.items() if one.signature.is_below_detection_limit
+        ],
         "amplitudes": recovered(found, verdict, planted) if verdict.word == "named" else {},
         "constants": _constants(found, verdict, planted.truth.constants, rng) if planted.truth.effects else {},
     }
@@ -156,8 +158,8 @@ def _constants(
     return {name: {way: _interval(draws, name, truth[name]) for way, draws in drawn.items()} for name in MODULI}
 
 
-def _interval(draws: ConstantDraws, name: str, truth: float) -> dict[str, Any]:
-    low, high = draws.interval(name)
+def _interval(draws: Constants, name: str, truth: float) -> dict[str, Any]:
+    low, high = np.quantile(draws[name], [0.05, 0.95])
     return {"q05": _rounded(low), "q95": _rounded(high), "holds": bool(low <= truth <= high)}
 
 

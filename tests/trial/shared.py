@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 from generator.boards import PlantedBoard, plant
 from generator.designs import MEDIANS
+from made_baselines import baseline_at
 from numpy.typing import NDArray
 from trial.cells import KINDS, SENSORS, UNKNOWN, Setting
 
-from bayesplate.diagnosis.evidence.null_control import NullControl, made_to_choose, null_control
-from bayesplate.diagnosis.evidence.search import Ground, prepare_search
-from bayesplate.diagnosis.shifts.baseline import Baseline, baseline_at
-from bayesplate.diagnosis.shifts.forms import Form, forms
-from bayesplate.diagnosis.shifts.laws import FormLaw, form_law
+from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.forms import Form, forms
+from bayesplate.diagnosis.laws import FormLaw, form_law
+from bayesplate.diagnosis.null_control import NullControl, made_to_choose, null_control
+from bayesplate.diagnosis.search import Ground, prepare_search
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.refit import Predict
 from bayesplate.frequencies.laws import ExactLaw

@@ -31,7 +31,7 @@ from trial.counts import (
 )
 from trial.sizes import errors
 
-from bayesplate.diagnosis.decision.claim import ConditionName
+from bayesplate.diagnosis.claim import ConditionName
 
 COLUMNS = ("named right", "named wrong", "group with it", "group without it", "none needed", "undetectable",
            "unexplained")  # fmt: skip

@@ -21,7 +21,7 @@ from trial.run import BASE_SEED, run
 from trial.shared import baseline_of_card, control_of
 from trial.summary import CONDITIONS
 
-from bayesplate.diagnosis.evidence.null_control import null_control
+from bayesplate.diagnosis.null_control import null_control
 
 FEW = (Cell("one", "cantilever-6", 2, size=2.0), Cell("null", "cantilever-6", 2))
 
@@ -105,10 +105,9 @@ def test_the_shared_law_is_that_of_the_board():
     """
     planted = plant_board(np.random.default_rng(2), Cell("null", "cantilever-6", 1), ())
     baseline = baseline_of_card(planted)
-    assert baseline.predict is not None
-    predicted = baseline.predict(baseline.log_rigidities[None, :])[0]
+    predicted = baseline.every.predict(baseline.log_rigidities[None, :])[0]
     assert 1200.0 / math.log(2.0) * (predicted - baseline.log_frequency) == pytest.approx(np.zeros(6), abs=1e-2)
-    larger = baseline.predict(baseline.log_rigidities[None, :] + math.log(1.1))[0]
+    larger = baseline.every.predict(baseline.log_rigidities[None, :] + math.log(1.1))[0]
     assert larger - predicted == pytest.approx(np.full(6, 0.5 * math.log(1.1)))  # f goes with the root of D
 
 

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from runs import files_in, read_json
 
 from bayesplate.cli import main
-from bayesplate.diagnosis.evidence.joint import full_search
+from bayesplate.diagnosis.joint import full_search
 from bayesplate.errors import InputError
 from bayesplate.posterior.checkpoint import CHAINS
 from bayesplate.posterior.convergence import Gate
@@ -290,7 +290,7 @@ def test_there_is_nothing_to_resume(tmp_path):
     assert "none to resume" in run.stderr
 
 
-@pytest.mark.parametrize("place", [pytest.param("full_search", marks=pytest.mark.slow), "_case"])
+@pytest.mark.parametrize("place", [pytest.param("full_search", marks=pytest.mark.slow), "diagnosis_of"])
 def test_an_interrupted_diagnosis_resumes_to_the_same_bytes(tmp_path, quick, monkeypatch, with_shear, place):
     """Stopped after the first fit, and after both; what is computed between the two is of the resumed run."""
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from bayesplate.diagnosis.decision.verdict import Answer, Verdict
+from bayesplate.diagnosis.verdict import Answer, Verdict
 from bayesplate.workflow.diagnose import advice
 
 

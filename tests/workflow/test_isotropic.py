@@ -13,7 +13,7 @@ from scipy.stats import binom
 
 import bayesplate
 from bayesplate import Board, Quantity, Setup
-from bayesplate.diagnosis.evidence.known import known_fit
+from bayesplate.diagnosis.known import known_fit
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents

@@ -17,14 +17,15 @@ from bayesplate.campaigns.agreement import p_value
 from bayesplate.campaigns.search import OF_TWO
 from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
 from bayesplate.cards.shelf import card_names
-from bayesplate.diagnosis.decision.claim import IMPROBABLE, STANDARD_ERRORS
-from bayesplate.diagnosis.decision.verdict import AT_LIMIT, CLEARLY, WITHIN
-from bayesplate.diagnosis.evidence.folds import NEEDED
-from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, TWO
-from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS
-from bayesplate.diagnosis.evidence.predictive import PASSES
-from bayesplate.diagnosis.evidence.sensitivity import NOISES, WIDTHS
-from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
+from bayesplate.diagnosis.claim import IMPROBABLE, STANDARD_ERRORS
+from bayesplate.diagnosis.folds import NEEDED
+from bayesplate.diagnosis.hypotheses import NONE, ONE, TWO
+from bayesplate.diagnosis.null_control import BY_CHANCE, FALSE_ALARMS, N_SETS
+from bayesplate.diagnosis.search import PASSES
+from bayesplate.diagnosis.sensitivity import NOISES, WIDTHS
+from bayesplate.diagnosis.signatures import LOOK_ALIKE
+from bayesplate.diagnosis.sizes import AT_LIMIT
+from bayesplate.diagnosis.verdict import CLEARLY, WITHIN
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
 from bayesplate.planning import gains, places

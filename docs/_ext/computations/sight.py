@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.diagnosis.shifts.signatures import cosine, look_alikes, signatures
+from bayesplate.diagnosis.signatures import cosine, look_alikes, signatures
 from bayesplate.frequencies.laws import cents
 from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare

@@ -1,0 +1,93 @@
+"""The forms in which the search tries each effect that is not declared: a board with it, and its free parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from bayesplate.effects import EFFECTS, declare
+from bayesplate.effects.base import EffectForm
+from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import Parameter
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """One way in which an effect may be present.
+
+    Attributes
+    ----------
+    effect : str
+    detail : str
+        What tells it from the effect's other forms; empty if there are none.
+    board : Board
+        The board with the effect declared.
+    free : tuple of Parameter
+        Parameters that have an uncertainty, one per owner: two setups' masses are two.
+    """
+
+    effect: str
+    detail: str
+    board: Board
+    free: tuple[Parameter, ...]
+
+    @property
+    def title(self) -> str:
+        """Effect and detail."""
+        return f"{self.effect} ({self.detail})" if self.detail else self.effect
+
+
+def forms(board: Board) -> dict[str, tuple[Form, ...]]:
+    """Every form of every effect that is not declared and can act in a setup of the board.
+
+    Parameters
+    ----------
+    board : Board
+
+    Returns
+    -------
+    dict
+        Effect name -> its forms, which share the effect's prior probability equally.
+    """
+    tried = {name: effect.forms(board) for name, effect in EFFECTS.items() if name not in board.effects}
+    return {name: tuple(_form(board, name, one) for one in found) for name, found in tried.items() if found}
+
+
+def _form(board: Board, name: str, form: EffectForm) -> Form:
+    declared = declare(replace(board, effects=(*board.effects, name), chosen=(*board.chosen, *form.effects)))
+    every = {one.name: one for effect in form.effects for one in effect.parameters()}
+    return Form(name, form.detail, declared, tuple(one for one in every.values() if not one.prior.is_exact))
+
+
+def with_forms(board: Board, added: Sequence[Form]) -> Board:
+    """A board with the effects of some forms declared together."""
+    for form in added:
+        board = replace(
+            board,
+            effects=tuple(dict.fromkeys((*board.effects, *form.board.effects))),
+            chosen=tuple(dict.fromkeys((*board.chosen, *form.board.chosen))),
+        )
+    return declare(board)
+
+
+def with_labels_exchanged(board: Board, first: int, second: int) -> Board:
+    """A board on which two readings of one setup have exchanged their labels.
+
+    Parameters
+    ----------
+    board : Board
+    first, second : int
+        Indices among the readings of all setups.
+    """
+    start = 0
+    setups = []
+    for setup in board.setups:
+        readings = list(setup.readings)
+        i, j = first - start, second - start
+        if 0 <= i < len(readings) and 0 <= j < len(readings):
+            one, other = readings[i], readings[j]
+            readings[i] = replace(one, label=other.label, beams=other.beams)
+            readings[j] = replace(other, label=one.label, beams=one.beams)
+        start += len(readings)
+        setups.append(replace(setup, readings=tuple(readings)))
+    return replace(board, setups=tuple(setups))

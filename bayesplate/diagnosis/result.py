@@ -1,0 +1,274 @@
+"""A diagnosis as one result, typed: the fields of diagnosis.json under their names and in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from bayesplate.diagnosis.candidates import CandidateEntry
+from bayesplate.diagnosis.claim import Condition
+from bayesplate.diagnosis.known_words import KnownModel
+from bayesplate.diagnosis.stated import StatedClaim
+from bayesplate.diagnosis.verdict import Word
+from bayesplate.estimates.leave_one_out import CarryingMode
+from bayesplate.results.contract import NOT_IN_JSON, Spread, as_json
+
+FORMAT = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """The errors of a model; None for what these readings are too few to tell.
+
+    Attributes
+    ----------
+    in_sample_rms_cents : float
+        Of the modes that the fit has seen.
+    leave_one_out_rms_cents : float or None
+        Of each mode, predicted by a fit that has not seen it.
+    nested_leave_one_out_rms_cents : float or None
+        The same, the effect chosen anew without that mode.
+    log_score : float or None
+        Sum of the log densities of the readings, each predicted from the others.
+    hits_90 : float
+        Share of the readings inside their 90 % intervals.
+    """
+
+    in_sample_rms_cents: float
+    leave_one_out_rms_cents: float | None
+    nested_leave_one_out_rms_cents: float | None
+    log_score: float | None
+    hits_90: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class PValues:
+    """Prior predictive probability of a misfit as large as that of each model; None where no misfit is possible."""
+
+    before: float | None
+    after: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Histogram:
+    """Numbers of simulated sets by a value.
+
+    Attributes
+    ----------
+    edges : (n_bins + 1,) tuple of float
+    counts : (n_bins,) tuple of int
+    """
+
+    edges: tuple[float, ...]
+    counts: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NullControlSummary:
+    """What the same search makes of simulated readings without any effect.
+
+    Attributes
+    ----------
+    n_sets : int
+    flagged_percent : float
+        Share of the sets in which an effect would be called needed.
+    log_odds : float or None
+        ln odds of these readings that something is lacking; None where nothing could be.
+    log_odds_needed : float
+        Those above which an effect is needed.
+    log_odds_of_sets : Histogram or None
+        None where nothing could be lacking.
+    nested_ratio, nested_ratio_to_beat : float or None
+        Nested error after over before of these readings, and what 95 of 100 sets stay above that are made to choose
+        their most probable effect.
+    nested_ratio_percentile : float or None
+        Share of the sets with a larger ratio than these readings, percent.
+    nested_ratio_of_sets : Histogram or None
+        Of as many sets as were needed to tell; this, its limit and the percentile None where nothing is claimed.
+    """
+
+    n_sets: int
+    flagged_percent: float
+    log_odds: float | None
+    log_odds_needed: float
+    log_odds_of_sets: Histogram | None
+    nested_ratio: float | None
+    nested_ratio_to_beat: float | None
+    nested_ratio_percentile: float | None
+    nested_ratio_of_sets: Histogram | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticShift:
+    """One modulus before and after, Pa, and the change in standard deviations of the first fit."""
+
+    before: float
+    after: float
+    shift_in_sd: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finalist:
+    """An explanation that was fitted again: its errors, its constants (Pa) and its sizes, by the sampler.
+
+    Attributes
+    ----------
+    effects : tuple of str
+    probability : float
+    in_sample_rms_cents : float
+    leave_one_out_rms_cents : float or None
+    elastic : dict of Spread
+        By modulus.
+    sizes : dict
+        "board" or setup -> effect -> parameter -> Spread.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    in_sample_rms_cents: float
+    leave_one_out_rms_cents: float | None
+    elastic: Mapping[str, Spread]
+    sizes: Mapping[str, Mapping[str, Mapping[str, Spread]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explanation:
+    """One way to explain the residual, an effect, a pair or an exchange of labels, with its probability.
+
+    Attributes
+    ----------
+    effects : tuple of str
+    probability : float
+    words : str
+        The same as people read it; not written to JSON.
+    is_stated : bool
+        Whether it is of known effects of which the card states one; not written to JSON.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    words: str = field(metadata=NOT_IN_JSON)
+    is_stated: bool = field(default=False, metadata=NOT_IN_JSON)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """What a diagnosis found: the verdict, the errors before and after, every candidate, what to measure next.
+
+    Attributes
+    ----------
+    format : int
+    name : str
+        Of the board.
+    seed : int
+    card_sha256 : str
+    verdict : str
+        "none needed", "named", "indistinguishable group", "unexplained" or "undetectable".
+    claim : bool
+        Whether it may be said that the error is reduced.
+    conditions : tuple of Condition
+        What that rests on; empty where nothing was added.
+    effects : tuple of str
+        Named: all of them are present. Group: each is an alternative.
+    words : str
+        The same as people read them, with the labels of an exchange; not written to JSON.
+    refitted : tuple of str
+        What the model after holds beyond the one before.
+    refitted_words : str
+        The same as people read it; not written to JSON.
+    reason : str
+    sentences : tuple of str
+        What each of `effects` is.
+    declared : tuple of str
+        Effects that were part of the model from the beginning.
+    known : tuple of KnownModel
+        What physics knows, computed before the search and not fitted: the board as it stands first, then with its
+        known effects in every combination of up to three, whether the card declares them or not.
+    stated_claims : tuple of StatedClaim
+        Whether it may be said that what the card states reduces the error; empty where it states no known effect.
+    probability_of_none : float
+    probability_of_none_with_halved_priors, probability_of_none_with_doubled_priors : float
+    p_value : PValues
+    before, after : Errors
+        The same where nothing was added.
+    gain_null_percentile : float or None
+        Share of simulated boards without any effect with smaller odds against no effect, percent; None where no
+        readings are left to judge by, or every effect is declared.
+    null_control : NullControlSummary
+    elastic_shift : dict of ElasticShift
+        By modulus.
+    finalists : tuple of Finalist
+        Best first; the one that comes nearest where none is enough.
+    elastic_averaged, rigidity_averaged : dict of Spread
+        The constants to quote, Pa and N m: averaged over everything that may be the case, each by its probability; if
+        nothing explains the readings, those of the first fit. The rigidities are not written to JSON.
+    answers : tuple of Explanation
+        Best first; with the probability of none they sum to one.
+    candidates : tuple of EffectEntry and ExchangeEntry
+    recommendation : str
+    notes : tuple of str
+    named_in_part : tuple of str
+        Effects that explain the readings in part, where the verdict is "unexplained" and something else remains: the
+        model after has them, nothing is claimed, and the constants are not to be trusted.
+    in_part_words : str
+        The same as people read it; not written to JSON.
+    carrying_modes : tuple of CarryingMode
+        Modes that alone carry a constant or a size, before or after: they count in no left-out error and no score.
+    """
+
+    format: int = FORMAT
+    name: str
+    seed: int
+    card_sha256: str
+    verdict: Word
+    claim: bool
+    conditions: tuple[Condition, ...]
+    effects: tuple[str, ...]
+    words: str = field(metadata=NOT_IN_JSON)
+    refitted: tuple[str, ...]
+    refitted_words: str = field(metadata=NOT_IN_JSON)
+    reason: str
+    sentences: tuple[str, ...]
+    declared: tuple[str, ...]
+    known: tuple[KnownModel, ...]
+    stated_claims: tuple[StatedClaim, ...]
+    probability_of_none: float
+    probability_of_none_with_halved_priors: float
+    probability_of_none_with_doubled_priors: float
+    p_value: PValues
+    before: Errors
+    after: Errors
+    gain_null_percentile: float | None
+    null_control: NullControlSummary
+    elastic_shift: Mapping[str, ElasticShift]
+    finalists: tuple[Finalist, ...]
+    elastic_averaged: Mapping[str, Spread]
+    rigidity_averaged: Mapping[str, Spread] = field(metadata=NOT_IN_JSON)
+    answers: tuple[Explanation, ...]
+    candidates: tuple[CandidateEntry, ...]
+    recommendation: str
+    notes: tuple[str, ...]
+    named_in_part: tuple[str, ...] = ()
+    in_part_words: str = field(default="", metadata=NOT_IN_JSON)
+    carrying_modes: tuple[CarryingMode, ...] = ()
+
+    @property
+    def is_refitted(self) -> bool:
+        """Whether something was added to the model, so that there is an after."""
+        return bool(self.refitted)
+
+    def __repr__(self) -> str:
+        named = f": {', '.join(self.effects)}" if self.effects else ""
+        claim = ", error reduced" if self.claim else ""
+        return f"<Diagnosis of {self.name}, {self.verdict}{named}{claim}>"
+
+    def _repr_html_(self) -> str:
+        from bayesplate.diagnosis.tables import html
+
+        return html(self)
+
+
+def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """The content of diagnosis.json."""
+    return dict(as_json(diagnosis))

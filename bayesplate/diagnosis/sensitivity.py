@@ -1,0 +1,179 @@
+"""How far the answer hangs on what was assumed: the same search with other priors, and under the exact law.
+
+The terms are linear in the constants about the fit of the ideal board. Where an effect moves the constants far, or the
+law bends within their uncertainty, that is not exact: a draw x of them then counts by the weight
+
+    w(x) = L_exact(x) / L_linear(x),
+
+the mean of which over the draws is the evidence's correction. Exact in the constants and in the size of each effect;
+of two effects that were not solved together the shifts at a draw's constants add, and uncertain inputs stay linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.draws import TermDraws, draw_terms, joint_sizes_of, sizes_of
+from bayesplate.diagnosis.hypotheses import Hypothesis, probabilities
+from bayesplate.diagnosis.peaks import log_mean, log_of_terms, log_summed
+from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.shifts import Table
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+
+WIDTHS = {"halved": 0.5, "doubled": 2.0}
+"""Factors of the standard deviation of the priors of all sizes."""
+NOISES = {"smaller": 1.0 / 1.5, "larger": 1.5}
+"""Factors of the noise prior."""
+_N_DRAWS = 128
+_WORTH = 0.01
+"""Probability beside the largest below which an explanation is corrected as no effect is."""
+_OVERSAMPLED = 2
+"""Draws for each that is kept by its weight."""
+
+
+def variants(found: Found) -> Iterator[tuple[str, Found]]:
+    """The searches that a name has to survive, each made when it is asked for, and which it is in words.
+
+    With the width of the sizes' priors halved and doubled, the noise prior moved by 1.5 either way, and under the exact
+    law where some draw is a plate by it.
+    """
+    for word, factor in WIDTHS.items():
+        yield f"with the priors of the sizes {word}", varied(found, width=factor)
+    for word, factor in NOISES.items():
+        yield f"if the noise is 1.5 times {word}", varied(found, noise=factor)
+    exact = under_exact_law(found)
+    if exact is not None:
+        yield "under the exact law", exact
+
+
+@lru_cache(maxsize=8)  # the verdict, the claim and the result ask for the same
+def varied(found: Found, *, width: float = 1.0, noise: float = 1.0) -> Found:
+    """The same search with other priors.
+
+    Parameters
+    ----------
+    found : Found
+    width : float
+        Factor of the standard deviation of every size's prior. The cells reach three of the old standard deviations;
+        what a wider prior puts beyond them counts as unable to explain the readings.
+    noise : float
+        Factor of every noise prior.
+
+    Returns
+    -------
+    Found
+    """
+    ground = found.ground
+    changed = replace(ground, hypotheses=tuple(_changed(found, i, width, noise) for i in range(len(ground.hypotheses))))
+    return search(changed, found.residual)
+
+
+def _changed(found: Found, index: int, width: float, noise: float) -> Hypothesis:
+    one = found.ground.hypotheses[index]
+    weights = one.table.weights.copy()
+    for which, candidate in enumerate(found.ground.members(index)):
+        table, cells = one.table.member(which)
+        weights *= _widening(table, [[free.prior for free in law.form.free] for law in candidate.laws], width)[cells]
+    return replace(one, table=replace(one.table, weights=weights), noise=replace(one.noise, sd=noise * one.noise.sd))
+
+
+def _widening(table: Table, priors: list[list[Quantity]], factor: float) -> Floats:
+    """Density of the wider prior over that of the old one at each cell: (n_cells,) array."""
+    result = np.ones(table.n_cells)
+    for index, of_form in enumerate(priors):
+        own = table.form == index
+        for i, prior in enumerate(of_form):
+            z = table.z[own, i]
+            wider = np.exp(-0.5 * (z / factor) ** 2) / (factor * _inside(prior, factor))
+            result[own] *= wider / (np.exp(-0.5 * z**2) / _inside(prior, 1.0))
+    return result
+
+
+def _inside(prior: Quantity, factor: float) -> float:
+    """Share of a normal distribution of that standard deviation within the prior's bounds."""
+    from scipy.special import ndtr
+
+    low, high = (float(prior.standard(bound)) / factor for bound in (prior.lower, prior.upper))
+    return float(ndtr(high) - ndtr(low))
+
+
+@lru_cache(maxsize=2)  # the verdict and the averages ask for the same
+def under_exact_law(found: Found) -> Found | None:
+    """The same search with every evidence corrected to the exact law.
+
+    Parameters
+    ----------
+    found : Found
+
+    Returns
+    -------
+    Found or None
+        None where no draw of any hypothesis is a plate by it.
+    """
+    rng = np.random.default_rng(0)
+    corrections = np.full(found.probability.size, _correction(found, 0, rng))
+    worth = found.probability > _WORTH * found.probability.max()
+    for index in 1 + np.flatnonzero(worth[1:]):
+        corrections[index] = _correction(found, int(index), rng)
+    evidence = found.log_evidence + corrections
+    if not np.isfinite(evidence).any():
+        return None
+    return replace(found, log_evidence=evidence, probability=probabilities(found.ground.hypotheses, evidence))
+
+
+def draw_exact(found: Found, index: int, rng: np.random.Generator, n_draws: int) -> TermDraws:
+    """Draw under one hypothesis and the exact law."""
+    drawn = draw_terms(found, index, rng, _OVERSAMPLED * n_draws)
+    log_weights = log_weights_of(found, index, drawn)
+    if not np.isfinite(log_weights.max()):  # no draw is a plate by the exact law: the linear terms are all there is
+        return drawn.at(np.arange(0, drawn.n_draws, _OVERSAMPLED))  # which stand in the order of their noise
+    shares = np.exp(log_weights - log_weights.max())
+    return drawn.at(rng.choice(drawn.n_draws, size=n_draws, p=shares / shares.sum()))
+
+
+def log_weights_of(found: Found, index: int, drawn: TermDraws) -> Floats:
+    """ln of the likelihood under the exact law over that of the linear terms: (n_draws,) array.
+
+    Where readings may be other modes than their labels say, the former is summed over all ways to take them.
+    """
+    own, exact = found.ground.hypotheses[index].own, exact_log_frequencies(found, index, drawn)
+    seen = own.middle + found.seen(index)[0]
+    if own.every.is_open:
+        return log_summed(own, exact, drawn.noise) - log_of_terms(own, seen, drawn)
+    squares = ((seen - exact[:, own.rows]) ** 2 - (seen - drawn.predicted[:, own.rows]) ** 2) / drawn.variance
+    return np.nan_to_num(-0.5 * squares.sum(axis=1), nan=-np.inf, neginf=-np.inf)
+
+
+def exact_log_frequencies(found: Found, index: int, drawn: TermDraws) -> Floats:
+    """ln f (Hz) of all modes that readings may be, at each draw: (n_draws, n_every) array."""
+    baseline = found.ground.baseline
+    n_members = len(found.ground.members(index))
+    total = np.zeros((drawn.n_draws, baseline.every.log_frequency.size))
+    if n_members != 1:
+        total += (1 - n_members) * baseline.every.predict(drawn.log_rigidities)
+    for which in range(n_members):
+        for _, law, rows, values in sizes_of(found, index, drawn, which):
+            total[rows] += law.every_log_frequency(baseline, drawn.log_rigidities[rows], values)
+    for law, rows, values in joint_sizes_of(found, index, drawn):
+        total[rows] = law.every_log_frequency(baseline, drawn.log_rigidities[rows], values)
+    return np.asarray(total + (drawn.inputs - baseline.every.inputs) @ baseline.every.input_slopes.T)
+
+
+def _correction(found: Found, index: int, rng: np.random.Generator) -> float:
+    drawn = draw_terms(found, index, rng, _N_DRAWS)
+    log_weights = log_weights_of(found, index, drawn)
+    if not np.isfinite(log_weights.max()):
+        return -np.inf
+    own = found.ground.hypotheses[index].own
+    if not own.every.is_open:
+        return log_mean(log_weights)
+    # The sum over labels is in the evidence already: what the law adds is the ratio of both sums at the same draws.
+    by_terms = log_of_terms(own, own.middle + found.seen(index)[0], drawn)
+    return log_mean(log_weights) - log_mean(log_summed(own, drawn.predicted, drawn.noise) - by_terms)

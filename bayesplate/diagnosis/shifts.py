@@ -1,0 +1,295 @@
+"""The exact visible shift of an effect over all its sizes, tabulated once: cells of its prior with a tangent each.
+
+The prior of an effect's parameters, pushed through the exact frequencies and the refit of the constants, is a cloud of
+shifts. It is kept as a mixture of normal cells: a regular grid in the standard coordinates of the parameters, the exact
+shift at each point, and its change up to the sides of the cell, so that neighbouring cells join without a gap.
+Evidence, prediction and the posterior of a size are then sums over cells.
+
+The shifts of two effects are added; a mass that slows a mode makes the tension that speeds it up count the less, so
+that plausible pairs are solved together, at every pair of their cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.forms import Form, with_forms
+from bayesplate.diagnosis.laws import FormLaw, form_law
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+JointLaws = Mapping[tuple[int, int], FormLaw]
+"""Laws of two effects at once, by the indices of their forms; the free parameters are those of the first, then those
+of the second."""
+
+FINE, COARSE = (33, 11, 256), (9, 5, 27)
+"""Cells along one parameter, along each of two, and at most in all of more; the second where effects are combined."""
+
+_REACH = 3.0
+_OVERLAP = 0.5
+_REFITS = 10
+_SETTLED = 2e-4
+_LONGEST_STEP = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Cells of one effect, or of two together.
+
+    Attributes
+    ----------
+    weights : (n_cells,) array
+        Prior probability, summing to 1.
+    shift : (n_cells, n_modes) array
+        ln f with the effect, constants refitted, less ln f of the baseline; of all modes that readings may be, or of
+        those that they are taken for.
+    slopes : (n_cells, n_modes, n_tangents) array
+        Change of the shift over one standard deviation of the cell.
+    moved : (n_cells, n_constants) array
+        Change of ln D by the refit.
+    moved_slopes : (n_cells, n_constants, n_tangents) array
+    form : (n_cells,) array of int
+        Which form of the effect; of the first one where there are two.
+    z : (n_cells, n_parameters) array
+        Standard coordinates of the first effect's parameters.
+    z_slopes : (n_cells, n_parameters) array
+        Their change over one standard deviation of the cell.
+    parts : tuple of Table
+        Of two effects together: the tables of both, the cells of the second running fastest.
+    """
+
+    weights: Floats
+    shift: Floats
+    slopes: Floats
+    moved: Floats
+    moved_slopes: Floats
+    form: Rows
+    z: Floats
+    z_slopes: Floats
+    parts: tuple[Table, ...] = ()
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return int(self.weights.size)
+
+    def some(self, cells: slice | Rows) -> Table:
+        """Some of the cells, with the weights that they have among all."""
+        return replace(self, **{key: getattr(self, key)[cells] for key in _PER_CELL})
+
+    def of(self, rows: Rows) -> Table:
+        """The same cells for some of the modes, by their indices."""
+        if np.array_equal(rows, np.arange(self.shift.shape[1])):
+            return self
+        return replace(self, shift=self.shift[:, rows], slopes=self.slopes[:, rows])
+
+    def member(self, which: int, cells: Rows | None = None) -> tuple[Table, Rows]:
+        """The table of one of its effects, and which cell there each cell of this one has; by default of all."""
+        cells = np.arange(self.n_cells) if cells is None else cells
+        return (self.parts[which], np.divmod(cells, self.parts[1].n_cells)[which]) if self.parts else (self, cells)
+
+    def tangents(self, which: int) -> slice:
+        """Which tangents are of one of its effects."""
+        ends = np.cumsum([0, *(part.slopes.shape[2] for part in self.parts or (self,))])
+        return slice(int(ends[which]), int(ends[which + 1]))
+
+
+_PER_CELL = ("weights", "shift", "slopes", "moved", "moved_slopes", "form", "z", "z_slopes")
+
+
+def nothing(n_modes: int, n_constants: int = 3) -> Table:
+    """No effect: one cell without shift."""
+    return Table(
+        weights=np.ones(1),
+        shift=np.zeros((1, n_modes)),
+        slopes=np.zeros((1, n_modes, 0)),
+        moved=np.zeros((1, n_constants)),
+        moved_slopes=np.zeros((1, n_constants, 0)),
+        form=np.zeros(1, dtype=np.intp),
+        z=np.zeros((1, 0)),
+        z_slopes=np.zeros((1, 0)),
+    )
+
+
+def tabulate(baseline: Baseline, laws: Sequence[FormLaw], cells: tuple[int, int, int] = FINE) -> Table:
+    """Tabulate an effect over all its forms.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    laws : sequence of FormLaw
+        Of the effect's forms, equally probable.
+    cells : tuple of int
+        `FINE` or `COARSE`.
+
+    Returns
+    -------
+    Table
+        Without any cells where no size of the effect leaves a plate.
+    """
+    n_tangents = max(len(law.form.free) for law in laws)
+    parts = [_of_form(baseline, i, law, cells, n_tangents) for i, law in enumerate(laws)]
+    joined: dict[str, Any] = {key: np.concatenate([getattr(part, key) for part in parts]) for key in _PER_CELL}
+    return replace(parts[0], **joined | {"weights": joined["weights"] / len(laws)})
+
+
+def together(one: Table, other: Table) -> Table:
+    """Two effects at once: their shifts and refits add."""
+
+    def added(first: Floats, second: Floats) -> Floats:
+        total = first[:, None] + second[None]
+        return total.reshape(-1, *total.shape[2:])
+
+    def joined(first: Floats, second: Floats) -> Floats:
+        parts = (np.repeat(first, len(second), axis=0), np.tile(second, (len(first), 1, 1)))
+        return np.concatenate(parts, axis=2)
+
+    return Table(
+        weights=np.outer(one.weights, other.weights).ravel(),
+        shift=added(one.shift, other.shift),
+        slopes=joined(one.slopes, other.slopes),
+        moved=added(one.moved, other.moved),
+        moved_slopes=joined(one.moved_slopes, other.moved_slopes),
+        form=np.repeat(one.form, other.n_cells),
+        z=np.repeat(one.z, other.n_cells, axis=0),
+        z_slopes=np.repeat(one.z_slopes, other.n_cells, axis=0),
+        parts=(one, other),
+    )
+
+
+def joint_law(baseline: Baseline, one: Form, other: Form) -> FormLaw:
+    """Solve a board with two effects around a baseline and over the priors of both."""
+    detail = ", ".join(part for part in (one.detail, other.detail) if part)
+    board = with_forms(baseline.board, (one, other))
+    both = Form(f"{one.effect} and {other.effect}", detail, board, (*one.free, *other.free))
+    return form_law(baseline, both).placed(baseline)
+
+
+def joint_table(baseline: Baseline, added: Table, laws: JointLaws) -> Table:
+    """Two effects at once, exactly where there are laws of both.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    added : Table
+        Of both, their shifts added.
+    laws : JointLaws
+
+    Returns
+    -------
+    Table
+        With the same cells in the same order.
+    """
+    (one, first), (other, second) = added.member(0), added.member(1)
+    found = {key: getattr(added, key).copy() for key in ("shift", "moved", "slopes", "moved_slopes")}
+    for (i, j), law in laws.items():
+        cells = np.flatnonzero((one.form[first] == i) & (other.form[second] == j))
+        used = np.flatnonzero(np.r_[one.z_slopes[first[cells[0]]], other.z_slopes[second[cells[0]]]] > 0.0)
+        z, step = (
+            np.hstack([of_one[first[cells]], of_other[second[cells]]])[:, used]
+            for of_one, of_other in ((one.z, other.z), (one.z_slopes, other.z_slopes))
+        )
+        solved = _cells(baseline, law, z, step)
+        good = _finite(*solved)
+        for key, values in zip(found, solved, strict=True):
+            if key.endswith("slopes"):
+                found[key][np.ix_(cells[good], np.arange(values.shape[1]), used)] = values[good]
+            else:
+                found[key][cells[good]] = values[good]
+    return replace(added, **found)
+
+
+def refitted(baseline: Baseline, law: FormLaw, z: Floats) -> tuple[Floats, Floats]:
+    """Shifts of all modes with the constants refitted to the baseline's readings, and what the refit changed.
+
+    Parameters
+    ----------
+    baseline : Baseline
+    law : FormLaw
+    z : (n, n_parameters) array
+        Standard coordinates.
+
+    Returns
+    -------
+    shift : (n, n_every) array
+        Not a number where the law gives no frequency.
+    moved : (n, n_constants) array
+    """
+    values = {free.name: free.prior.value(z[:, i]) for i, free in enumerate(law.form.free)}
+    moved = np.zeros((len(z), baseline.log_rigidities.size))
+    shift = np.empty((len(z), baseline.every.log_frequency.size))
+    moving = np.arange(len(z))
+    for n_done in range(_REFITS):
+        there = {name: value[moving] for name, value in values.items()}
+        at = baseline.log_rigidities + moved[moving]
+        shift[moving] = law.every_log_frequency(baseline, at, there) - baseline.every.log_frequency
+        step = -np.nan_to_num(shift[moving][:, baseline.rows]) @ baseline.absorbing.T
+        longest = np.abs(step).max(axis=1)
+        moving, step, longest = (each[longest > _SETTLED] for each in (moving, step, longest))
+        if not moving.size or n_done == _REFITS - 1:
+            break
+        moved[moving] += step * np.minimum(1.0, _LONGEST_STEP / longest)[:, None]
+    return shift, moved
+
+
+def _cells(baseline: Baseline, law: FormLaw, z: Floats, step: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Shift and refit of cells, and their changes over one standard deviation of each along every parameter."""
+    shift, moved = refitted(baseline, law, z)
+    sides = []
+    for k in range(z.shape[1]):
+        along = step * (np.arange(z.shape[1]) == k)
+        above, below = (refitted(baseline, law, z + sign * along) for sign in (1.0, -1.0))
+        sides.append([0.5 * (after - before) for after, before in zip(above, below, strict=True)])
+    if not sides:
+        return shift, moved, np.zeros((*shift.shape, 0)), np.zeros((*moved.shape, 0))
+    slopes, moved_slopes = (np.stack(each, axis=2) for each in zip(*sides, strict=True))
+    return shift, moved, slopes, moved_slopes
+
+
+def _finite(*values: Floats) -> NDArray[np.bool_]:
+    return np.all([np.isfinite(one).reshape(len(one), -1).all(axis=1) for one in values], axis=0)
+
+
+def _of_form(baseline: Baseline, index: int, law: FormLaw, cells: tuple[int, int, int], n_tangents: int) -> Table:
+    free = law.form.free
+    axes = [_axis(one.prior, cells_along(len(free), cells)) for one in free]
+    points = list(product(*(points for points, _ in axes)))
+    z = np.reshape(points, (len(points), len(axes)))
+    step = np.tile([_OVERLAP * width for _, width in axes], (len(z), 1))
+    log_weights = np.sum([one.prior.log_prior(z[:, i]) for i, one in enumerate(free)], axis=0) + np.zeros(len(z))
+    shift, moved, slopes, moved_slopes = _cells(baseline, law, z, step)
+    good = _finite(shift, slopes, log_weights)
+    weights = np.exp(np.where(good, log_weights, -np.inf))
+    none = n_tangents - len(free)
+    return Table(
+        weights=weights / max(weights.sum(), np.finfo(float).tiny),
+        shift=shift,
+        slopes=np.pad(slopes, ((0, 0), (0, 0), (0, none))),
+        moved=moved,
+        moved_slopes=np.pad(moved_slopes, ((0, 0), (0, 0), (0, none))),
+        form=np.full(len(z), index),
+        z=np.pad(z, ((0, 0), (0, none))),
+        z_slopes=np.pad(step, ((0, 0), (0, none))),
+    ).some(np.flatnonzero(good))
+
+
+def cells_along(n_parameters: int, cells: tuple[int, int, int]) -> int:
+    """Cells along each of so many parameters; their product stays bounded, however many setups have one each."""
+    *few, most = cells
+    return few[n_parameters - 1] if n_parameters <= len(few) else int(most ** (1.0 / n_parameters) + 1e-9)
+
+
+def _axis(prior: Quantity, n: int) -> tuple[Floats, float]:
+    """Middles of n equal cells between the prior's bounds or three standard deviations, and their width."""
+    low = max(float(prior.standard(prior.lower)), -_REACH) if np.isfinite(prior.lower) else -_REACH
+    high = min(float(prior.standard(prior.upper)), _REACH) if np.isfinite(prior.upper) else _REACH
+    width = (high - low) / n
+    return np.asarray(low + width * (np.arange(n) + 0.5)), width

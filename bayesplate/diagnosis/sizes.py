@@ -1,0 +1,92 @@
+"""Sizes of the effects of a hypothesis: their posterior, whether one is at its limit, and the board to fit again."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.draws import draw_terms, standard_sizes_of
+from bayesplate.diagnosis.forms import with_forms, with_labels_exchanged
+from bayesplate.diagnosis.search import Found
+from bayesplate.plate.board import Board
+from bayesplate.plate.parameter import unit_of_people
+from bayesplate.quantities import Quantity
+
+Floats = NDArray[np.float64]
+
+AT_LIMIT = 0.005
+"""Prior probability between the posterior median of a size and a bound below which the size is at its limit."""
+_N_DRAWS = 2000
+
+
+def size_posterior(found: Found, index: int, member: int, form: int, parameter: int) -> tuple[Floats, Floats]:
+    """Probability and standard coordinate of each cell of a member's form, under one hypothesis.
+
+    Parameters
+    ----------
+    found : Found
+    index : int
+        Of the hypothesis.
+    member : int
+        0 or 1: which of its effects.
+    form, parameter : int
+        Which form of that effect, and which of its parameters.
+    """
+    table, cells = found.ground.hypotheses[index].table.member(member)
+    by_cell = np.bincount(cells, weights=found.cells(index), minlength=table.n_cells)
+    of_form = table.form == form
+    return by_cell[of_form], table.z[of_form, parameter]
+
+
+def likely_form(found: Found, index: int, member: int) -> int:
+    """Which form of one effect of a hypothesis is most probable."""
+    table, cells = found.ground.hypotheses[index].table.member(member)
+    laws = found.ground.members(index)[member].laws
+    return int(np.argmax(np.bincount(table.form[cells], weights=found.cells(index), minlength=len(laws))))
+
+
+def refit_board(found: Found, index: int) -> Board:
+    """The board under a hypothesis: with its effects declared in their most probable forms, or two labels exchanged."""
+    hypothesis, board = found.ground.hypotheses[index], found.ground.baseline.board
+    if hypothesis.swap is not None:
+        return with_labels_exchanged(board, hypothesis.swap.first, hypothesis.swap.second)
+    members = enumerate(found.ground.members(index))
+    return with_forms(board, [one.laws[likely_form(found, index, which)].form for which, one in members])
+
+
+def at_limit(found: Found, index: int) -> str:
+    """Which size of a hypothesis sits at the limit of its range; empty if none does.
+
+    A size that may be zero is not at a limit there: zero is no effect. The size is looked at by draws, for a cell of a
+    table may be wider than what counts as the limit.
+    """
+    drawn = draw_terms(found, index, np.random.default_rng(0), _N_DRAWS)
+    for which in range(len(found.ground.members(index))):
+        for _, law, rows, z in standard_sizes_of(found, index, drawn, which):
+            if 2 * rows.size < drawn.n_draws:
+                continue
+            for free, column in zip(law.form.free, z.T, strict=True):
+                median = _median_within(free.prior, column)
+                if _is_extreme(free.prior, median):
+                    factor, unit = unit_of_people(free.unit)
+                    return f"{free.key} = {factor * float(free.prior.value(median)):.3g} {unit}".rstrip()
+    return ""
+
+
+def _median_within(prior: Quantity, z: Floats) -> float:
+    """Median of the draws that lie within the bounds of a prior; the bound next to them where none does."""
+    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    inside = z[(low <= z) & (z <= high)]
+    return float(np.median(inside) if inside.size else np.clip(np.median(z), low, high))
+
+
+def _is_extreme(prior: Quantity, z: float) -> bool:
+    """Whether hardly any of a prior lies between a size and a bound; a zero that means no effect is no bound."""
+    from scipy.special import ndtr
+
+    low, high = float(prior.standard(prior.lower)), float(prior.standard(prior.upper))
+    whole = ndtr(high) - ndtr(low)
+    starts_at_nothing = prior.lower == 0.0 and prior.mean == 0.0
+    near_top = np.isfinite(high) and (ndtr(high) - ndtr(z)) / whole < AT_LIMIT
+    near_bottom = np.isfinite(low) and not starts_at_nothing and (ndtr(z) - ndtr(low)) / whole < AT_LIMIT
+    return bool(near_top or near_bottom)

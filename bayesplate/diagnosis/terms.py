@@ -1,0 +1,165 @@
+"""How probable readings are under an effect: a sum over its sizes and the noise, constants projected out.
+
+With a flat prior on the logarithms of the constants the marginal density of the readings is that of their projection
+on the directions that they cannot reach, n - 3 of a board of wood (the restricted likelihood). Under one cell of a
+table and one level of noise the projection is normal, with the precision Q of the readings; evidence is a sum of such
+terms. So is the prediction of readings m that are left out, whatever the term: they miss it by Q_mm^-1 (Q g)_m, with g
+what the term leaves of all readings, and the others are as probable as all of them over the density of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesplate.diagnosis.baseline import Baseline
+from bayesplate.diagnosis.noise_grid import NoiseGrid
+from bayesplate.diagnosis.shifts import Table
+
+Floats = NDArray[np.float64]
+
+_MOST_NUMBERS = 200_000
+"""Held at once of any one kind: larger arrays cost more to fetch and to give back than to fill."""
+_LOG_TWO_PI = float(np.log(2.0 * np.pi))
+_LEAST = 1e-12
+"""Of its precision without the constants, what a reading keeps at least: one that alone carries a constant has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Normal terms of a table: one per level of noise and cell, cells running fastest.
+
+    Attributes
+    ----------
+    table : Table
+        Of the modes that the readings are taken for.
+    baseline : Baseline
+    noise : NoiseGrid
+    """
+
+    table: Table
+    baseline: Baseline
+    noise: NoiseGrid
+
+    @cached_property
+    def log_weights(self) -> Floats:
+        """Logarithm of the prior probability of each term: (n_terms,) array."""
+        with np.errstate(divide="ignore"):
+            return np.log(np.outer(self.noise.weights, self.table.weights).ravel())
+
+    @cached_property
+    def _whitening(self) -> Floats:
+        """L^-1 B, with B the blind directions and L L' their covariance by noise and inputs: (n_levels, d, n) array."""
+        base, blind = self.baseline, self.baseline.blind
+        variances = self.noise.sd[:, base.setup_index] ** 2 + base.own_variance
+        inputs = blind @ base.input_slopes
+        covariance = np.einsum("di,li,ei->lde", blind, variances, blind) + inputs @ inputs.T
+        return np.linalg.inv(np.linalg.cholesky(covariance)) @ blind
+
+    @cached_property
+    def _tangents(self) -> tuple[Floats, Floats]:
+        """What the tangents T of the cells, whitened, take off the squares of whitened readings.
+
+        C^-1 T' with C C' = I + T' T, (n_levels, n_cells, p, d) array, and ln of the determinant of C.
+        """
+        n_cells, n_modes, p = self.table.slopes.shape
+        n_levels, d, _ = self._whitening.shape
+        spread = np.moveaxis(self.table.slopes, 1, 0).reshape(n_modes, n_cells * p)
+        along = np.moveaxis((self._whitening @ spread).reshape(n_levels, d, n_cells, p), 1, 3)
+        factors = np.linalg.cholesky(np.eye(p) + along @ np.swapaxes(along, 2, 3))
+        return np.linalg.solve(factors, along), np.log(np.diagonal(factors, axis1=2, axis2=3)).sum(axis=2)
+
+    def _densities(self, residuals: Floats) -> tuple[Floats, Floats]:
+        """ln of weight times density, (n_levels, n_cells, n_sets) array, and the readings along the tangents."""
+        along, log_factor = self._tangents
+        n_levels, n_cells, p, d = along.shape
+        seen = np.swapaxes(residuals @ np.swapaxes(self._whitening, 1, 2), 1, 2)
+        middles = self.table.shift @ np.swapaxes(self._whitening, 1, 2)
+        squares = (seen**2).sum(axis=1)[:, None] + (middles**2).sum(axis=2)[:, :, None] - 2.0 * (middles @ seen)
+        inside = (along.reshape(n_levels, n_cells * p, d) @ seen).reshape(n_levels, n_cells, p, len(residuals))
+        inside -= np.einsum("lkpd,lkd->lkp", along, middles)[:, :, :, None]
+        squares -= (inside**2).sum(axis=2)
+        gram = self._whitening @ np.swapaxes(self._whitening, 1, 2)
+        volume = 0.5 * np.linalg.slogdet(gram)[1][:, None] - log_factor - 0.5 * d * _LOG_TWO_PI
+        offsets = self.log_weights.reshape(n_levels, n_cells) + volume
+        return offsets[:, :, None] - 0.5 * squares, inside
+
+    def log_densities(self, residuals: Floats) -> Floats:
+        """Logarithm of weight times density of each term: (n_terms, n_sets) array.
+
+        Parameters
+        ----------
+        residuals : (n_sets, n_modes) array
+            ln measured less ln f of the baseline.
+        """
+        return self._densities(residuals)[0].reshape(-1, len(residuals))
+
+    def log_evidence(self, residuals: Floats) -> Floats:
+        """Logarithm of the restricted marginal density of data sets: (n_sets,) array."""
+        parts = [log_sum(part.log_densities(residuals)) for part in self._in_parts(len(residuals))]
+        return np.asarray(log_sum(np.stack(parts)) - self.baseline.half_log_det)
+
+    def left_out(self, residuals: Floats) -> tuple[Floats, Floats]:
+        """Each mode left out in turn, with all its readings.
+
+        Parameters
+        ----------
+        residuals : (n_sets, n_modes) array
+
+        Returns
+        -------
+        log_evidence : (n_same_modes, n_sets) array
+            Of the readings of the other modes.
+        errors : (n_modes, n_sets) array
+            Each reading less its mean prediction by these, ln f; not a number where the reading is no mode.
+        """
+        parts = [part._left_out(residuals) for part in self._in_parts(len(residuals))]
+        log_masses, errors = (np.stack(each) for each in zip(*parts, strict=True))
+        mean = (normalised(log_masses)[:, self.baseline.mode_index] * errors).sum(axis=0)
+        return np.asarray(log_sum(log_masses) - self.baseline.half_log_det), np.asarray(mean)
+
+    def _left_out(self, residuals: Floats) -> tuple[Floats, Floats]:
+        """The same with the weight of these cells, the change of volume not counted."""
+        log_densities, inside = self._densities(residuals)
+        white, along = self._whitening, self._tangents[0] @ self._whitening[:, None]
+        seen = np.swapaxes(white, 1, 2) @ (white @ residuals.T)
+        middles = self.table.shift @ (np.swapaxes(white, 1, 2) @ white)
+        log_mass = np.empty((len(self.baseline.same_modes), len(residuals)))
+        errors = np.full((self.baseline.n_modes, len(residuals)), np.nan)
+        for i, mode in enumerate(self.baseline.same_modes):
+            rows = [reading for reading in mode if self.baseline.is_mode[reading]]
+            own, tangents = white[:, :, rows], along[:, :, :, rows]
+            pulled = seen[:, None, rows] - middles[:, :, rows, None] - np.swapaxes(tangents, 2, 3) @ inside
+            bare = np.swapaxes(own, 1, 2) @ own
+            least = _LEAST * bare * np.eye(len(rows))
+            precision = (bare + least)[:, None] - np.swapaxes(tangents, 2, 3) @ tangents
+            misses = np.linalg.inv(precision) @ pulled
+            log_others = log_densities + 0.5 * (pulled * misses).sum(axis=2) + 0.5 * len(rows) * _LOG_TWO_PI
+            log_others -= 0.5 * np.linalg.slogdet(precision)[1][:, :, None]
+            log_mass[i] = log_sum(log_others.reshape(-1, len(residuals)))
+            errors[rows] = np.einsum("lks,lkms->ms", np.exp(log_others - log_mass[i]), misses)
+        return log_mass, errors
+
+    def _in_parts(self, n_sets: int) -> Iterator[Terms]:
+        """The terms of some cells at a time, so many that what they make of the data sets stays small."""
+        n_modes, n_tangents = self.table.slopes.shape[1:]
+        step = max(1, _MOST_NUMBERS // (self.noise.weights.size * max(n_sets, n_modes * n_tangents)))
+        for first in range(0, self.table.n_cells, step):
+            part = self.table.some(slice(first, first + step))
+            yield self if step >= self.table.n_cells else replace(self, table=part)
+
+
+def log_sum(values: Floats) -> Floats:
+    """ln of the sum of exponentials over the first axis."""
+    top = values.max(axis=0)
+    return np.asarray(top + np.log(np.exp(values - top).sum(axis=0)))
+
+
+def normalised(log_values: Floats) -> Floats:
+    """Probabilities from logarithms of weights, summing to one over the first axis."""
+    shares = np.exp(log_values - log_values.max(axis=0))
+    return np.asarray(shares / shares.sum(axis=0))

@@ -1,1 +1,0 @@
-"""A diagnosis as one result, and what people read of it."""

@@ -1,0 +1,309 @@
+"""Evidence, and what a fold predicts, against sums over a dense grid and against refits by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from made_boards import setup_of
+from made_searches import FREE, NOISE, bare, baseline, ground_of, left_out, one_level, table, with_modes
+from scipy.stats import multivariate_normal
+
+from bayesplate.diagnosis.folds import log_score, log_score_gains, nested
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.noise_grid import NoiseGrid, noise_grid
+from bayesplate.diagnosis.terms import Terms
+from bayesplate.plate.board import made_board
+from bayesplate.plate.parameter import Owner
+from bayesplate.quantities import Quantity
+
+_REACH, _STEP = 6.0, 1.0
+"""Of the grid, in standard deviations.  The trapezoidal sum of a normal density errs by 2 exp(-2 (pi / step)^2) a
+dimension, 5.4e-9 here, and what lies beyond the reach is 2e-9 of it: five dimensions stay below 5e-8."""
+EXACT = 5e-8
+
+
+def log_normal(residuals, variances):
+    return -0.5 * (residuals**2 / variances + np.log(2.0 * np.pi * variances)).sum(axis=-1)
+
+
+def by_grid(base, cells, grid, residual, used):
+    """Log evidence as a sum of the plain likelihood over constants, place in the cell, inputs, cells and noise levels.
+
+    The grid lies along the axes of each term's least-squares fit; that only places its points.
+    """
+    y = residual[used]
+    X, Z = base.slopes[used], base.input_slopes[used]
+    total = 0.0
+    for sd, level in zip(grid.sd, grid.weights, strict=True):
+        variances = (sd[base.setup_index] ** 2 + base.own_variance)[used]
+        for shift, slopes, weight in zip(cells.shift[:, used], cells.slopes[:, used], cells.weights, strict=True):
+            columns = np.hstack([X, slopes, Z])
+            n_standard = columns.shape[1] - 3
+            prior = np.r_[np.zeros(3), np.ones(n_standard)]
+            spread = np.linalg.inv(columns.T @ (columns / variances[:, None]) + np.diag(prior))
+            centre = spread @ (columns.T @ ((y - shift) / variances))
+            axes = np.linalg.cholesky(spread)
+            line = np.arange(-_REACH, _REACH + _STEP, _STEP)
+            points = centre + np.array(list(product(line, repeat=columns.shape[1]))) @ axes.T
+            standard = points[:, 3:]
+            log_density = log_normal(y - shift - points @ columns.T, variances)
+            log_density += -0.5 * (standard**2).sum(axis=1) - 0.5 * n_standard * np.log(2.0 * np.pi)
+            total += level * weight * np.exp(log_density).sum() * np.abs(np.diagonal(axes)).prod() * _STEP ** len(axes)
+    return float(np.log(total))
+
+
+CASES = {
+    "plain": {},
+    "rounded readings": {"resolution": 1.0},
+    "an uncertain input": {"n_inputs": 1},
+    "two setups": {"noise": (0.004, 0.009), "resolution": 0.5},
+}
+
+
+@pytest.mark.parametrize("without", [None, 2])
+@pytest.mark.parametrize("case", CASES)
+def test_evidence_is_the_integral_over_constants_sizes_inputs_and_noise(case, without):
+    rng = np.random.default_rng(1)
+    base = baseline(rng, **CASES[case])
+    cells = table(rng, n_cells=2)
+    grid = NoiseGrid(np.array([[0.6], [1.7]]) * [s.noise.median for s in base.board.setups], np.array([0.3, 0.7]))
+    residual = 0.01 * rng.standard_normal(6)
+    terms = Terms(cells, base, grid)
+    used = np.arange(6) if without is None else np.delete(np.arange(6), without)
+
+    found = [terms.log_evidence(residual[None, :])[0]]
+    if without is not None:  # as a reading that is left out, and as one that is no mode
+        fewer = base.labelled(np.where(np.isin(np.arange(6), used), base.rows, -1))
+        found = [terms.left_out(residual[None, :])[0][without, 0]]
+        found += [Terms(cells, fewer, grid).log_evidence(residual[None, :])[0]]
+    expected = by_grid(base, cells, grid, residual, used)
+    assert found == pytest.approx([expected] * len(found), abs=EXACT)
+
+
+@pytest.mark.parametrize("forgotten", ["input", "rounding", "tangent", "cell", "reading"])
+def test_an_integral_that_forgets_something_is_not_the_evidence(forgotten):
+    """Negative control: the comparison sees each part of the model."""
+    rng = np.random.default_rng(1)
+    base = baseline(rng, resolution=1.0, n_inputs=1)
+    cells = table(rng, n_cells=2)
+    grid = one_level(base)
+    residual = 0.01 * rng.standard_normal(6)
+    found = Terms(cells, base, grid).log_evidence(residual[None, :])[0]
+
+    used = np.arange(5 if forgotten == "reading" else 6)
+    if forgotten in ("input", "rounding"):
+        rng = np.random.default_rng(1)
+        base = baseline(rng, resolution=0.0 if forgotten == "rounding" else 1.0, n_inputs=int(forgotten != "input"))
+    if forgotten == "tangent":
+        cells.slopes[...] = 0.0
+    if forgotten == "cell":
+        cells.weights[...] = [1.0, 0.0]
+    assert abs(found - by_grid(base, cells, grid, residual, used)) > 1e5 * EXACT
+
+
+def test_many_sets_at_once_are_each_alone():
+    rng = np.random.default_rng(2)
+    base = baseline(rng)
+    terms = Terms(table(rng, n_cells=4, n_tangents=2), base, noise_grid(base.board))
+    residuals = 0.01 * rng.standard_normal((5, 6))
+    alone = [terms.log_evidence(one[None, :])[0] for one in residuals]
+    assert terms.log_evidence(residuals) == pytest.approx(alone, abs=1e-12)
+
+
+@pytest.mark.parametrize("n_tangents", [0, 2])
+def test_few_cells_at_a_time_give_what_all_together_do(n_tangents, monkeypatch):
+    rng = np.random.default_rng(4)
+    base = baseline(rng, noise=(0.004, 0.009))
+    cells = table(rng, n_cells=7, n_tangents=n_tangents)
+    residuals = 0.01 * rng.standard_normal((5, base.n_modes))
+
+    def found():
+        terms = Terms(cells, base, noise_grid(base.board))
+        return terms.log_evidence(residuals), *terms.left_out(residuals)
+
+    together = found()
+    monkeypatch.setattr("bayesplate.diagnosis.terms._MOST_NUMBERS", 300)
+    assert len(list(Terms(cells, base, noise_grid(base.board))._in_parts(5))) > 2
+    for apart, whole in zip(found(), together, strict=True):
+        np.testing.assert_allclose(apart, whole, rtol=1e-12)
+
+
+def test_constants_are_not_seen():
+    rng = np.random.default_rng(3)
+    base = baseline(rng, resolution=1.0)
+    terms = Terms(table(rng), base, noise_grid(base.board))
+    residual = 0.01 * rng.standard_normal((1, 6))
+    moved = residual + 0.3 * rng.standard_normal((1, 3)) @ base.slopes.T
+    assert terms.log_evidence(moved) == pytest.approx(terms.log_evidence(residual), abs=1e-9)
+    assert abs(terms.log_evidence(residual + 0.02 * np.eye(6)[0]) - terms.log_evidence(residual))[0] > 1e-3
+
+
+@pytest.mark.parametrize(("n_setups", "few", "allowed"), [(1, False, 0.03), (1, True, 0.2), (2, False, 0.2)])
+def test_the_noise_levels_stand_for_the_log_normal_prior(n_setups, few, allowed):
+    """Evidence with the few levels against a fine sum over the noise, for residuals of 1/3 to 3 times the median.
+
+    The levels cut the prior 2.5 sd below its median and 3.5 above, which holds all but 0.6 %.
+    """
+    setup = setup_of(FREE, {(i, 0): 50.0 + i for i in range(4)}, noise=Quantity.from_median(0.005, np.exp(0.5)))
+    board = made_board("made", {}, [setup] * n_setups)
+    grid = noise_grid(board, few=few)
+    fine = np.linspace(-5, 5, 401)
+    prior = np.exp(-0.5 * fine**2)
+    levels = 0.005 * np.exp(0.5 * fine)
+    for size in 0.005 * np.exp(np.linspace(-1.1, 1.1, 12)):
+        exact = np.zeros(1)
+        for own in [size] * n_setups:
+            exact = exact + np.log(prior @ np.exp(-1.5 * (own / levels) ** 2 - 3.0 * np.log(levels)) / prior.sum())
+        found = np.log(grid.weights @ np.exp((-1.5 * (size / grid.sd) ** 2 - 3.0 * np.log(grid.sd)).sum(axis=1)))
+        assert found == pytest.approx(exact[0], abs=allowed)
+    assert grid.weights.sum() == pytest.approx(1.0)
+
+
+def refitted_without(base, mode, residual, cell, sd):
+    """Error of predicting one reading by the fit of constants, inputs and place in the cell to the others."""
+    shift, slopes = cell
+    used = np.delete(np.arange(base.n_modes), mode)  # or those of one mode
+    columns = np.hstack([base.slopes, slopes, base.input_slopes])
+    scales = np.broadcast_to(sd, base.n_modes)[used]
+    rows = np.vstack([columns[used] / scales[:, None], np.eye(columns.shape[1])[3:]])
+    target = np.r_[(residual - shift)[used] / scales, np.zeros(columns.shape[1] - 3)]
+    fitted = np.linalg.lstsq(rows, target, rcond=None)[0]
+    return (residual - shift)[mode] - columns[mode] @ fitted
+
+
+@pytest.mark.parametrize("n_inputs", [0, 2])
+@pytest.mark.parametrize("n_tangents", [0, 1, 2])
+def test_a_reading_that_was_left_out_is_predicted_as_by_a_refit(n_tangents, n_inputs):
+    """What the others tell of the inputs counts: sizes of declared effects, which may lie far from their priors."""
+    rng = np.random.default_rng(4)
+    base = baseline(rng, n_inputs=n_inputs)
+    cells = table(rng, n_cells=1, n_tangents=n_tangents)
+    ground = ground_of(base, Hypothesis(("first",), 1.0, cells, one_level(base), base))
+    residual = 0.01 * rng.standard_normal(6)
+    refits = [refitted_without(base, i, residual, (cells.shift[0], cells.slopes[0]), NOISE) for i in range(6)]
+    assert left_out(ground, 0, residual) == pytest.approx(refits, abs=1e-12)
+
+    wrong = [refitted_without(base, i, residual, (cells.shift[0], cells.slopes[0]), 2 * NOISE) for i in range(6)]
+    if n_tangents or n_inputs:
+        assert np.abs(left_out(ground, 0, residual) - wrong).max() > 1e-4
+    bare_ground = ground_of(base, bare(base, one_level(base)))
+    nothing_added = np.zeros(6), np.zeros((6, 0))
+    without = [refitted_without(base, i, residual, nothing_added, NOISE) for i in range(6)]
+    assert nested(bare_ground, residual[None, :]).before[0] == pytest.approx(without, abs=1e-12)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_cells_and_levels_predict_with_their_share(case):
+    """Where readings differ in noise, what each level of it makes of the others is another fit of the constants."""
+    rng = np.random.default_rng(5)
+    base = baseline(rng, **CASES[case])
+    cells = table(rng, n_cells=3)
+    grid = noise_grid(base.board)
+    residual = 0.01 * rng.standard_normal(6)
+    used = np.delete(np.arange(6), 1)
+    total, predicted = 0.0, 0.0
+    for by_setup, level in zip(grid.sd, grid.weights, strict=True):
+        sd = np.sqrt(by_setup[base.setup_index] ** 2 + base.own_variance)
+        for k in range(3):
+            columns = np.hstack([base.slopes, cells.slopes[k], base.input_slopes])[used]
+            gap = (residual - cells.shift[k])[used]
+            wide = np.diag(sd[used] ** 2) + 1e4 * columns[:, :3] @ columns[:, :3].T + columns[:, 3:] @ columns[:, 3:].T
+            share = np.exp(-0.5 * gap @ np.linalg.solve(wide, gap) - 0.5 * np.linalg.slogdet(wide)[1])
+            share *= level * cells.weights[k]
+            total += share
+            predicted += share * refitted_without(base, 1, residual, (cells.shift[k], cells.slopes[k]), sd)
+    found = Terms(cells, base, grid).left_out(residual[None, :])[1][1, 0]
+    assert found == pytest.approx(predicted / total, abs=1e-7)  # the constants' sd of 100 stands for a flat prior
+
+
+def test_without_effect_the_error_left_out_is_the_residual_over_one_less_the_leverage():
+    rng = np.random.default_rng(6)
+    base = baseline(rng)
+    ground = ground_of(base, bare(base, noise_grid(base.board)))
+    residuals = 0.01 * rng.standard_normal((3, 6))
+    weighted = base.slopes / base.scales[:, None]
+    hat = weighted @ np.linalg.inv(weighted.T @ weighted) @ weighted.T
+    closed = (residuals / base.scales) @ (np.eye(6) - hat) / (1.0 - np.diagonal(hat)) * base.scales
+
+    folded = nested(ground, residuals)
+    assert folded.before == pytest.approx(closed, abs=1e-12)
+    assert folded.after == pytest.approx(closed, abs=1e-12)
+    assert folded.ratio == pytest.approx(np.ones(3))
+    assert not folded.chosen.any()
+    assert np.abs(folded.before - residuals @ (np.eye(6) - hat)).max() > 1e-4
+
+
+def test_too_few_readings_have_no_nested_error():
+    rng = np.random.default_rng(6)
+    base = baseline(rng, 4)
+    assert nested(ground_of(base, bare(base, noise_grid(base.board))), np.zeros((1, 4))) is None
+
+
+@pytest.mark.parametrize("n_inputs", [0, 1])
+def test_the_log_score_is_the_sum_of_the_conditional_densities(n_inputs):
+    """One cell and one level: each reading given the others is normal, its mean and variance by elimination."""
+    rng = np.random.default_rng(7)
+    base = baseline(rng, resolution=1.0, n_inputs=n_inputs)
+    cells = table(rng, n_cells=1)
+    ground = ground_of(base, Hypothesis(("first",), 1.0, cells, one_level(base), base))
+    residual = 0.01 * rng.standard_normal(6)
+    wide = 1e2  # sd of the constants; the flat prior is its limit
+    known = cells.slopes[0] @ cells.slopes[0].T + base.input_slopes @ base.input_slopes.T
+    covariance = np.diag(NOISE**2 + base.own_variance) + known + wide**2 * base.slopes @ base.slopes.T
+    precision = np.linalg.inv(covariance)
+    gap = residual - cells.shift[0]
+    variances = 1.0 / np.diagonal(precision)
+    errors = (precision @ gap) * variances
+    direct = float(-0.5 * (errors**2 / variances + np.log(2.0 * np.pi * variances)).sum())
+
+    assert log_score(ground, 0, residual) == pytest.approx(direct, abs=1e-4)
+    assert abs(log_score(ground, 0, residual + 0.003 * np.eye(6)[0]) - direct) > 1e-2
+
+
+@pytest.fixture(scope="module")
+def days():
+    """Six modes read on two days, one of them off on both as by something that the plate lacks."""
+    rng = np.random.default_rng(8)
+    base = baseline(rng, 12, noise=(NOISE, NOISE))
+    first = base.board.setups[0]
+    setups = tuple(replace(first, name=day, group=Owner("group", "days")) for day in ("monday", "friday"))
+    slopes, frequency = np.tile(base.slopes[:6], (2, 1)), np.tile(base.log_frequency[:6], 2)
+    base = with_modes(replace(base, board=replace(base.board, setups=setups)), slopes=slopes, log_frequency=frequency)
+    return base, 0.02 * np.tile(np.eye(6)[2], 2) + 0.001 * rng.standard_normal(12)
+
+
+def test_of_several_sessions_a_mode_is_left_out_with_all_its_readings(days):
+    """Its reading on the other day would foretell it, whatever the model."""
+    base, residual = days
+    ground = ground_of(base, bare(base, one_level(base)))
+    assert base.same_modes == tuple((i, i + 6) for i in range(6))
+    found = left_out(ground, 0, residual)
+    nothing_added = np.zeros(12), np.zeros((12, 0))
+    for i in range(12):
+        mode = [i, (i + 6) % 12]
+        without = refitted_without(base, mode, residual, nothing_added, NOISE)
+        assert found[i] == pytest.approx(without[0], abs=1e-12)
+    assert nested(ground, residual[None, :]).before[0] == pytest.approx(found, abs=1e-12)
+    alone = refitted_without(base, 2, residual, nothing_added, NOISE)
+    assert abs(found[2]) > abs(alone) + 1e-3
+
+
+def test_the_log_score_of_several_sessions_is_one_term_per_mode(days):
+    """What both days say of a mode is one piece of evidence: as two, it would halve the variance of a gain."""
+    base, residual = days
+    cells = table(np.random.default_rng(9), 12, n_cells=1, n_tangents=1)
+    ground = ground_of(base, bare(base, one_level(base)), Hypothesis(("first",), 0.5, cells, one_level(base), base))
+    scores, wide = np.zeros((2, 6)), 10.0  # sd of the constants; the flat prior is its limit
+    for k, (shift, slopes) in enumerate([(np.zeros(12), np.zeros((12, 1))), (cells.shift[0], cells.slopes[0])]):
+        precision = np.linalg.inv(NOISE**2 * np.eye(12) + slopes @ slopes.T + wide**2 * base.slopes @ base.slopes.T)
+        for i in range(6):
+            mode = [i, i + 6]
+            covariance = np.linalg.inv(precision[np.ix_(mode, mode)])
+            error = covariance @ (precision @ (residual - shift))[mode]
+            scores[k, i] = multivariate_normal(np.zeros(2), covariance).logpdf(error)
+    gains = log_score_gains(ground, residual, np.ones(12, dtype=int))
+    assert gains == pytest.approx(scores[1] - scores[0], abs=1e-3)
+    assert log_score(ground, 1, residual) == pytest.approx(scores[1].sum(), abs=1e-3)

@@ -1,0 +1,593 @@
+"""From a search to its result: what each candidate is told to have been rejected for, the claim, and three readings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnoses import spread
+from made_searches import HALF_NORMAL, NOISE, bare, baseline, candidate, decided, exchanged, ground_of, visible_of
+from made_summaries import SUMMARY, mode
+
+from bayesplate.diagnosis import constants
+from bayesplate.diagnosis.candidates import EffectEntry
+from bayesplate.diagnosis.claim import Claim, Condition
+from bayesplate.diagnosis.entries import effect_entry, exchange_entries, fate_of
+from bayesplate.diagnosis.findings import Case, Side, _nearest_sentence, diagnosis_of
+from bayesplate.diagnosis.folds import Nested, log_score, nested
+from bayesplate.diagnosis.hypotheses import RELABELLING, Hypothesis, Swap, probabilities
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.null_control import NullControl, null_control
+from bayesplate.diagnosis.result import Diagnosis, diagnosis_json
+from bayesplate.diagnosis.search import Found, search
+from bayesplate.diagnosis.shifts import nothing, together
+from bayesplate.diagnosis.signatures import cosine
+from bayesplate.diagnosis.terms import Terms
+from bayesplate.diagnosis.told import verdict_sentence, verdict_sentences, warnings
+from bayesplate.diagnosis.verdict import NOTHING_LEFT, Answer, answers
+from bayesplate.effects import EFFECTS
+from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
+from bayesplate.plate.material import RIGIDITIES, moduli
+from bayesplate.plate.parameter import BOARD, Parameter
+from bayesplate.quantities import Quantity
+from bayesplate.report.verdict import diagnosis_section, quoted
+from bayesplate.results.contract import Elastic, json_text
+from bayesplate.workflow.shown import show_diagnosis
+
+SHEAR, AIR, GRAIN = NAMES = ("transverse_shear", "fluid_loading", "grain_angle")
+FIGURES = replace(
+    SUMMARY,
+    seed=3,
+    error=replace(SUMMARY.error, in_sample_rms_cents=21.25, leave_one_out_rms_cents=46.5),
+    elastic=Elastic(*(spread(1e9) for _ in range(3))),
+    effects={},
+)
+MOVED = replace(
+    FIGURES,
+    error=replace(FIGURES.error, in_sample_rms_cents=4.25),
+    elastic=Elastic(*(spread(1.25e9) for _ in range(3))),
+    effects={"board": {SHEAR: {"size": spread(1.0, "1")}, "declared": {"x": spread(1.0)}}},
+)
+
+
+def made(probability, size=0.05, residual=None, n_modes=6):
+    """A search of three effects and one exchange of labels that found given probabilities by members.
+
+    The readings are those of shear at its nominal size.
+    """
+    base = baseline(np.random.default_rng(1), n_modes)
+    directions = size * np.linalg.qr(np.random.default_rng(2).standard_normal((n_modes, n_modes)))[0][:3]
+    candidates = {name: candidate(base, name, one) for name, one in zip(NAMES, directions, strict=True)}
+    levels = noise_grid(base.board)
+    every = [bare(base, levels)]
+    every += [Hypothesis((name,), 0.1, one.fine, levels, base) for name, one in candidates.items()]
+    every += [Hypothesis((RELABELLING,), 0.1, nothing(n_modes), levels, Swap(1, 2).applied(base), Swap(1, 2))]
+    shares = np.array([probability.get(one.members, 0.0) for one in every])
+    residual = visible_of(candidates[SHEAR]) if residual is None else residual
+    ground = ground_of(base, *every, candidates=candidates)
+    return Found(ground, residual, np.log(shares + 1e-300), shares)
+
+
+def entries(found: Found) -> dict[str, EffectEntry]:
+    verdict, ranked = decided(found), answers(found)
+    told = [effect_entry(found, verdict, ranked, one, 0.5) for one in found.ground.candidates.values()]
+    return {one.name: one for one in told} | {RELABELLING: exchange_entries(found, verdict, ranked)[0]}
+
+
+def draws_of(predictive: np.ndarray, E_x: float = 10e9) -> SimpleNamespace:
+    moduli = {"E_x": E_x, "E_y": 1e9, "G_xy": 1e9}
+    rigidities = {"D_x": 30.0, "D_y": 2.0, "D_s": 5.0}
+    every = ({name: np.full((1, 5), value) for name, value in group.items()} for group in (moduli, rigidities))
+    return SimpleNamespace(predictive=predictive, **dict(zip(("moduli", "rigidities"), every, strict=True)))
+
+
+def case_of(found: Found, control: NullControl, folded: Nested | None, **changed) -> Case:
+    verdict = decided(found)
+    readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
+    draws = draws_of(readings * np.linspace(0.99, 1.01, 21)[None, :, None])
+    after = Side(verdict.index, MOVED, draws, readings) if verdict.index else Side(0, FIGURES, draws, readings)
+    case = Case(found, verdict, control, folded, Side(0, FIGURES, draws, readings), after, Claim(), "Measure on.")
+    return replace(case, **changed)
+
+
+def refit(found: Found, answer: Answer) -> tuple[Answer, Side]:
+    """An answer that was fitted again."""
+    after = case_of(found, control_of(found, 0.5), folds_of(found, 0.25)).after
+    return answer, replace(after, index=answer.index, summary=MOVED)
+
+
+NAMED = {(): 0.01, (SHEAR,): 0.79, (AIR,): 0.15, (GRAIN,): 0.05}
+
+
+def control_of(found: Found, to_beat: float) -> NullControl:
+    n = 101
+    return NullControl(np.linspace(-5.0, 1.0, n), np.full(n, to_beat))
+
+
+def folds_of(found: Found, ratio: float) -> Nested:
+    errors = 0.01 * np.ones((1, found.ground.baseline.n_modes))
+    return Nested(errors, ratio * errors, np.ones(errors.shape, dtype=np.intp))
+
+
+def test_what_became_of_each_candidate_of_a_named_effect():
+    found = made(NAMED)
+    told = entries(found)
+    assert {name: one.fate for name, one in told.items()} == {
+        SHEAR: "in the verdict", AIR: "does not fit", GRAIN: "does not fit", RELABELLING: "does not fit",
+    }  # fmt: skip
+    assert told[SHEAR].rejected_because is None
+    p_value = found.p_value([one.members for one in found.ground.hypotheses].index((AIR,)))
+    assert 0.001 < p_value < 0.05
+    assert told[AIR].rejected_because == f"with it alone the misfit is still too large (p = {p_value:.3f})"
+    assert told[RELABELLING].labels == ("(1,0)", "(2,0)")
+
+
+def test_a_group_holds_its_members():
+    told = entries(made({(SHEAR,): 0.5, (AIR,): 0.4, (GRAIN,): 0.04}))
+    assert [told[name].fate for name in NAMES] == ["in the verdict", "in the verdict", "does not fit"]
+    assert [told[name].rejected_because is None for name in NAMES] == [True, True, False]
+    with_exchange = entries(made({(SHEAR,): 0.5, (RELABELLING,): 0.4}))
+    assert with_exchange[RELABELLING].fate == "in the verdict"
+
+
+def test_exchanged_labels_that_are_named_are_not_rejected():
+    found = made({(RELABELLING,): 0.99, (): 0.01})
+    found = replace(found, residual=exchanged(found.ground.baseline, Swap(1, 2), np.zeros((1, 6)))[0])
+    told = entries(found)
+    assert (told[RELABELLING].fate, told[RELABELLING].rejected_because) == ("in the verdict", None)
+    assert told[SHEAR].rejected_because.startswith("with it alone the misfit")
+
+
+def test_less_probable_is_only_what_is_so_and_would_fit():
+    """Readings of pure noise, which every candidate fits: the answer's own probability beside the winner's."""
+    quiet = made({(SHEAR,): 0.6, (AIR,): 0.1, (RELABELLING,): 0.05}, residual=np.zeros(6))
+    told = entries(quiet)
+    assert told[SHEAR].fate == "in the verdict"
+    assert (told[AIR].fate, told[AIR].rejected_because) == (
+        "less probable", "less probable (0.100) than transverse shear (0.600)",
+    )  # fmt: skip
+    assert told[RELABELLING].rejected_because.startswith("with it alone the misfit is still too large (p < 0.001); ")
+    alike = fate_of(quiet, replace(decided(quiet), effects=()), answers(quiet), SHEAR, 1)
+    assert alike == ("less probable", "no more probable (0.600) than transverse shear (0.600)")
+
+
+def test_a_size_at_its_limit_is_told_so_and_not_as_less_probable():
+    """Whatever the verdict rejects its winner for is told of the winner, though its probability is one."""
+    found = made({(SHEAR,): 1.0})
+    verdict = replace(decided(found), word="unexplained", effects=(), index=0, reason="only at the limit of its range")
+    told = fate_of(found, verdict, answers(found), SHEAR, 1)
+    assert told == ("does not fit", "only at the limit of its range")
+
+
+@pytest.mark.parametrize(("gained", "words"), [(3.0, "20 times likelier"), (-1.0, "2.7 times less likely"),
+                                              (30.0, "more than a million times likelier")])  # fmt: skip
+def test_an_exchange_is_told_with_its_likelihood_ratio(gained, words):
+    found = made({(): 0.5, (RELABELLING,): 0.1}, residual=np.zeros(6))
+    found = replace(found, log_evidence=np.array([2.0, 0.0, 0.0, 0.0, 2.0 + gained]))
+    told = entries(found)[RELABELLING]
+    assert told.rejected_because == (
+        f"not needed: nothing lacking has a probability of 0.50; with these labels exchanged the readings are {words}"
+    )
+
+
+def test_only_the_exchange_that_the_verdict_stands_for_is_in_it():
+    """A second pair of labels within reach of nothing stays out, and the verdict says which two it means."""
+    found = made({(SHEAR,): 0.5, (RELABELLING,): 0.45})
+    ground = found.ground
+    more = replace(ground.hypotheses[4], swap=Swap(3, 4))
+    shares = np.array([*found.probability, 0.01])
+    ground = replace(ground, hypotheses=(*ground.hypotheses, more))
+    found = Found(ground, found.residual, np.log(shares + 1e-300), shares)
+    verdict, ranked = decided(found), answers(found)
+    assert verdict.effects == (SHEAR, RELABELLING)
+    assert [one.fate for one in exchange_entries(found, verdict, ranked)] == ["in the verdict", "does not fit"]
+    told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
+    assert told.words == "transverse shear or relabelling (1,0) and (2,0)"
+    assert [one.words for one in told.answers][:2] == ["transverse shear", "relabelling (1,0) and (2,0)"]
+    assert any("The labels (1,0) and (2,0) may have been exchanged" in one for one in told.sentences)
+
+
+def test_the_answers_and_none_sum_to_one():
+    told = diagnosis_of(case_of(found := made(NAMED), control_of(found, 0.5), folds_of(found, 0.25)))
+    assert told.probability_of_none + sum(one.probability for one in told.answers) == pytest.approx(1.0)
+
+
+def test_the_constants_to_quote_are_averaged_and_never_those_of_one_member(monkeypatch):
+    """Draws of each model that was fitted, by its probability: here 10 GPa without and 20 GPa with shear."""
+    found = made({(): 0.4, (SHEAR,): 0.6}, residual=np.zeros(6))
+    found = replace(found, probability=np.array([0.04, 0.96, 0.0, 0.0, 0.0]))
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    monkeypatch.setattr(constants, "under_exact_law", lambda _: None)  # the probabilities are made by hand
+    group = replace(case.verdict, word="indistinguishable group", index=1)
+    fitted = replace(case.after, index=1, draws=draws_of(case.before.draws.predictive, 20e9))
+    told = diagnosis_of(replace(case, verdict=group, finalists=[(group.best, fitted)]))
+    n = 8000
+    assert told.elastic_averaged["E_x"].mean / 1e9 == pytest.approx(19.6, abs=4 * 10 * np.sqrt(0.04 * 0.96 / n))
+    assert told.elastic_averaged["E_x"].sd / 1e9 == pytest.approx(10 * np.sqrt(0.04 * 0.96), rel=0.15)
+    assert (told.rigidity_averaged["D_x"].mean, told.rigidity_averaged["D_x"].unit) == (30.0, "N m")
+
+    unexplained = diagnosis_of(replace(case, verdict=replace(group, word="unexplained", index=0), after=case.before))
+    assert unexplained.elastic_averaged == dict(FIGURES.elastic.items())
+    assert unexplained.rigidity_averaged == dict(FIGURES.rigidity.items())
+
+
+def test_a_size_that_the_card_fixes_is_shown():
+    found = made(NAMED)
+    one = found.ground.candidates[AIR]
+    fixed = Parameter("density", BOARD, Quantity.exact(1.2), "kg/m^3", 0.0, effect=AIR)
+    board = replace(one.laws[0].form.board, parameters=(fixed,))
+    law = replace(one.laws[0], form=replace(one.laws[0].form, free=(), board=board))
+    ground = replace(found.ground, candidates={**found.ground.candidates, AIR: replace(one, laws=(law,))})
+    size = entries(replace(found, ground=ground))[AIR].amplitude
+    assert (size.parameter, size.q05, size.q50, size.q95, size.unit) == ("density", 1.2, 1.2, 1.2, "kg/m^3")
+
+
+def test_nothing_is_needed_from_a_tenth_on():
+    calm = made({(): 0.1, (SHEAR,): 0.9}, residual=np.zeros(6))
+    assert {one.fate for one in entries(calm).values()} == {"not needed"}
+    assert entries(calm)[SHEAR].rejected_because == "not needed: nothing lacking has a probability of 0.10"
+    rough = replace(calm, residual=0.3 * calm.ground.baseline.log_frequency * np.array([1, -1, 1, 1, -1, -1]))
+    assert entries(rough)[SHEAR].rejected_because == "not established: nothing lacking has a probability of 0.10"
+    assert entries(rough)[SHEAR].fate == "not established"
+    probable = made({(): 0.0999, (SHEAR,): 0.9001})
+    assert entries(probable)[SHEAR].fate == "in the verdict"
+
+
+def test_the_winner_that_fails_the_gate_is_told_so():
+    found = made({(SHEAR,): 1.0})
+    found = replace(found, residual=0.3 * found.ground.baseline.log_frequency * np.array([1, -1, 1, 1, -1, -1]))
+    told = entries(found)
+    assert told[SHEAR].fate == "does not fit"
+    assert told[SHEAR].rejected_because.startswith("with transverse shear the misfit is still too large (p ")
+    assert told[AIR].fate == "does not fit"
+
+
+def test_below_sight_comes_first():
+    told = entries(made({(): 0.5, (SHEAR,): 0.5}, size=1e-4, residual=np.zeros(6)))
+    assert {told[name].fate for name in NAMES} == {"not detectable"}
+    assert told[AIR].rejected_because == "its visible part is below what these readings could show"
+    assert all(told[name].below_detection_limit for name in NAMES)
+
+
+def test_what_would_not_show_at_its_usual_size_may_be_probable_at_another():
+    """A candidate that is found with a tenth or more is told by its probability; with less it could not have been."""
+    probable = entries(made({(SHEAR,): 0.8, (AIR,): 0.11, (GRAIN,): 0.09}, size=1e-4, residual=np.zeros(6)))
+    assert [probable[name].fate for name in NAMES] == ["in the verdict", "less probable", "not detectable"]
+
+
+def test_an_exchange_that_would_fit_is_told_with_its_own_probability():
+    found = made({(SHEAR,): 0.6, (RELABELLING,): 0.05})
+    found = replace(found, residual=exchanged(found.ground.baseline, Swap(1, 2), np.zeros((1, 6)))[0])
+    told = entries(found)[RELABELLING].rejected_because
+    assert told.startswith("less probable (0.050) than transverse shear (0.600); with these labels exchanged")
+
+
+def test_an_entry_by_hand():
+    """Cents from logarithms, bias from the refit of the constants, the size's quantiles from the cells."""
+    found = made(NAMED)
+    one, told = found.ground.candidates[AIR], entries(found)[AIR]
+    base, direction = found.ground.baseline, one.laws[0].direction
+    raw, moved = direction * float(HALF_NORMAL.value(1.0)), -base.absorbing @ direction
+    in_cents = 1200.0 / np.log(2.0)
+    assert told.raw_rms_cents == pytest.approx(in_cents * np.sqrt(np.mean(raw**2)))
+    assert told.visible_cents == pytest.approx(in_cents * (raw + base.slopes @ moved))
+    assert told.log_bayes_factor == pytest.approx(np.log(0.15 / 0.01))
+    values = found.ground.baseline.values
+    fitted = [np.asarray(values[name]) for name in RIGIDITIES]
+    true = [D * np.exp(m) for D, m in zip(fitted, moved, strict=True)]
+    sizes = values["thickness"], values["poisson_xy"]
+    wanted = [100 * (a / b - 1) for a, b in zip(moduli(*fitted, *sizes), moduli(*true, *sizes), strict=True)]
+    assert list(told.bias_percent.values()) == pytest.approx(wanted)
+    shear = entries(found)[SHEAR].amplitude
+    assert shear.q05 < 1.0 < shear.q95  # the readings are those of a size of one
+    assert shear.q95 - shear.q05 < 1.0  # its prior alone has 1.9
+    assert (shear.parameter, shear.form, shear.unit) == ("size", "", "1")
+
+
+def test_look_alikes_are_effects_of_one_direction():
+    found = made(NAMED)
+    ground = found.ground
+    shear = ground.candidates[SHEAR]
+    twin = replace(shear, name=AIR, signature=replace(shear.signature, effect=AIR))
+    alike = {**ground.candidates, AIR: twin}
+    twins = replace(found, ground=replace(ground, candidates=alike))
+    assert [entries(found)[name].look_alikes for name in NAMES] == [()] * 3
+    assert [entries(twins)[name].look_alikes for name in NAMES] == [(AIR,), (SHEAR,), ()]
+    others = (ground.candidates[name].signature for name in (AIR, GRAIN))
+    assert all(0.01 < abs(cosine(shear.signature, other)) < 0.95 for other in others)  # they are not orthogonal
+
+
+def test_what_the_width_of_a_prior_costs():
+    """The evidence is a mean of the density over the prior; its logarithm less that of the best size is the cost."""
+    made_up = made({})
+    found = search(made_up.ground, made_up.residual)
+    table, noise = found.ground.candidates[SHEAR].fine, found.ground.hypotheses[1].noise
+    log_terms = found.ground.hypotheses[1].terms.log_densities(found.residual[None, :])[:, 0]
+    by_size = np.exp(log_terms.reshape(noise.weights.size, table.n_cells)).sum(axis=0) / table.weights
+    assert entries(found)[SHEAR].ockham_log_factor == pytest.approx(np.log(table.weights @ by_size / by_size.max()))
+    assert entries(found)[SHEAR].ockham_log_factor < -0.5
+
+
+def test_a_named_effect_that_was_refitted():
+    found = made(NAMED)
+    ranked = answers(found)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25), finalists=[refit(found, ranked[0])])
+    told = diagnosis_of(case)
+    assert (told.verdict, told.effects, told.refitted) == ("named", (SHEAR,), (SHEAR,))
+    assert told.sentences == (EFFECTS[SHEAR].sentence,)
+    assert (told.before.in_sample_rms_cents, told.after.in_sample_rms_cents) == (21.25, 4.25)
+    nested_cents = told.before.nested_leave_one_out_rms_cents
+    assert nested_cents == pytest.approx(0.01 * 1200 / np.log(2))
+    assert told.after.nested_leave_one_out_rms_cents == pytest.approx(0.25 * nested_cents)
+    assert told.before.hits_90 == 1.0
+    assert told.elastic_shift["E_x"].shift_in_sd == pytest.approx(2.5)
+    assert told.p_value.before < 0.05 < told.p_value.after
+    assert told.null_control.nested_ratio == pytest.approx(0.25)
+    assert told.gain_null_percentile == 100.0  # ln (0.99 / 0.01) is beyond the last of the null sets
+    (finalist,) = told.finalists
+    assert (finalist.effects, list(finalist.sizes["board"])) == ((SHEAR,), [SHEAR])
+    assert told.after.log_score > told.before.log_score
+
+
+@pytest.mark.parametrize(("members", "told"), [
+    ((AIR,), 'Declare it, effects = ["fluid_loading"], and diagnose again to look for what else is lacking.'),
+    ((RELABELLING,), "for a mode left out."),
+])  # fmt: skip
+def test_what_comes_nearest_is_told_though_it_is_not_enough(members, told):
+    found = made({members: 0.99, (): 0.01})
+    verdict = decided(found)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25), finalists=[refit(found, answers(found)[0])])
+    (sentence,) = diagnosis_of(replace(case, after=case.before)).sentences
+
+    assert (verdict.word, verdict.nearest) == ("unexplained", answers(found)[0])
+    assert verdict.fitted_again == (verdict.nearest,)
+    assert "comes nearest: with it the error goes from 21.2 to 4.2 cents in the fit" in sentence
+    assert sentence.endswith(told)
+    (wary,) = diagnosis_of(replace(case, after=case.before, has_slip=True)).sentences
+    assert "Declare it" not in wary
+    assert members == (RELABELLING,) or "look at the readings" in wary
+    base = found.ground.baseline
+    declared = replace(base, board=replace(base.board, effects=("thickness_profile",)))
+    beside = replace(found, ground=replace(found.ground, baseline=declared))
+    (sentence,) = diagnosis_of(replace(case, found=beside, after=case.before)).sentences
+    assert ('effects = ["thickness_profile", "fluid_loading"]' in sentence) is (members == (AIR,))
+
+
+def test_only_what_is_needed_and_not_enough_comes_nearest():
+    named = decided(made(NAMED))
+    assert named.nearest is None
+    assert named.fitted_again == named.stands_for
+    assert decided(made({(): 0.99})).nearest is None
+
+
+def test_a_claim_is_told_with_its_conditions():
+    found = made(NAMED)
+    met, missed = (Condition("prior predictive", value, 0.05, value >= 0.05) for value in (0.5, 0.01))
+    for conditions, holds in (((met,), True), ((met, missed), False)):
+        case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25), claim=Claim(conditions))
+        told = diagnosis_of(case)
+        assert (told.claim, told.conditions) == (holds, conditions)
+    assert told.null_control.nested_ratio_percentile == 100.0
+
+
+def test_what_was_learnt_of_a_size_is_how_far_it_left_its_prior():
+    """Readings far out move the size; readings of large noise leave it where its prior has it."""
+    learnt = entries(made(NAMED))[SHEAR].learnt_bits
+    assert list(learnt) == ["size"]
+    quiet = entries(made(NAMED, size=1e-5))[SHEAR].learnt_bits["size"]
+    assert quiet == pytest.approx(0.0, abs=1e-3)
+    found = made(NAMED)
+    table = found.ground.candidates[SHEAR].fine
+    log_terms = Terms(table, found.ground.baseline, noise_grid(found.ground.baseline.board)).log_densities(
+        found.residual[None, :]
+    )[:, 0]
+    after = np.exp(log_terms).reshape(-1, table.n_cells).sum(axis=0)
+    after /= after.sum()
+    assert learnt["size"] == pytest.approx(np.sum(after * np.log2(after / table.weights)))
+    assert learnt["size"] > 0.5
+
+
+def test_a_refit_that_failed_leaves_the_model_as_it_was():
+    found = made(NAMED)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    told = diagnosis_of(replace(case, after=case.before, notes=("it failed",)))
+    assert (told.verdict, told.refitted, told.claim) == ("named", (), False)
+    assert told.before == told.after
+    assert told.notes == ("it failed",)
+
+
+def test_readings_outside_their_band_are_counted():
+    found = made(NAMED)
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    readings = np.concatenate([setup.measured for setup in found.ground.baseline.board.setups])
+    # the last two lie at the 2.5 and 97.5 % quantiles of the draws, outside the 90 % but inside the range
+    off = np.array([1.0, 1.0, 1.0, 1.0, 1.0095, 0.9905]) * readings * np.linspace(0.99, 1.01, 201)[None, :, None]
+    before = replace(case.before, draws=draws_of(off))
+    assert diagnosis_of(replace(case, before=before)).before.hits_90 == pytest.approx(4 / 6)
+
+
+def judged(n_modes: int) -> tuple[Found, Diagnosis]:
+    """The whole road of a diagnosis without a refit, on readings that are nothing but noise."""
+    found = made({}, n_modes=n_modes)
+    rng = np.random.default_rng(4)
+    found = search(found.ground, NOISE * rng.standard_normal(n_modes))
+    folded = nested(found.ground, found.residual[None, :])
+    return found, diagnosis_of(case_of(found, null_control(found.ground, rng, 40), folded))
+
+
+def test_three_modes_leave_nothing_to_judge_by():
+    found, told = judged(3)
+    assert found.ground.n_directions == 0
+    priors = np.array([one.prior for one in found.ground.hypotheses])
+    assert found.probability == pytest.approx(priors / priors.sum())  # nothing was learned
+    assert (told.verdict, told.effects, told.claim) == ("undetectable", (), False)
+    assert told.reason == NOTHING_LEFT
+    content = diagnosis_json(told)
+    for place, name in (
+        ("before", "nested_leave_one_out_rms_cents"), ("before", "log_score"),
+        ("p_value", "before"), ("p_value", "after"),
+        ("null_control", "nested_ratio"), ("null_control", "nested_ratio_to_beat"),
+    ):  # fmt: skip
+        assert content[place][name] is None
+    assert content["gain_null_percentile"] is None
+    assert [one["look_alikes"] for one in content["candidates"]] == [[]] * 4
+    assert all(one["below_detection_limit"] and one["p_value"] is None for one in content["candidates"][:3])
+    assert [one["visible_rms_cents"] for one in content["candidates"]] == [None] * 4
+    assert content["candidates"][0]["visible_cents"] == [None] * 3
+    assert content["candidates"][0]["raw_rms_cents"] > 0.0
+    amplitude = told.candidates[0].amplitude  # its half-normal prior, to half a cell of 33 over three deviations
+    assert [amplitude.q05, amplitude.q50, amplitude.q95] == pytest.approx([0.0627, 0.6745, 1.96], abs=1.5 / 33)
+
+
+def test_three_modes_leave_nothing_to_judge_by_even_without_candidates():
+    base = baseline(np.random.default_rng(1), 3)
+    ground = ground_of(base, bare(base, noise_grid(base.board)))
+    assert decided(search(ground, np.zeros(3))).word == "undetectable"
+
+
+@pytest.mark.parametrize("n_modes", [4, 5])
+def test_four_and_five_modes_are_judged(n_modes):
+    found, told = judged(n_modes)
+    assert found.ground.n_directions == n_modes - 3
+    assert told.reason != NOTHING_LEFT
+    assert told.verdict == "none needed"
+    assert 0.0 < told.p_value.before <= 1.0
+    assert 0.0 <= told.gain_null_percentile <= 100.0
+    assert (told.before.log_score is None) is (n_modes < 5)
+
+
+def test_a_misfit_beyond_all_doubt_has_odds():
+    """Probabilities of none below the smallest number there is: the odds are those of the logarithms."""
+    found = made(NAMED)
+    evidence = np.array([-2000.0, -3.0, -9.0, -9.0, -9.0])
+    sure = Found(found.ground, found.residual, evidence, probabilities(found.ground.hypotheses, evidence))
+    assert sure.none == 0.0
+    wanted = 1997.0 + np.log(0.1 / 0.5) + np.log1p(3.0 * np.exp(-6.0))
+    assert sure.against_none == pytest.approx(wanted)
+    told = diagnosis_of(case_of(sure, control_of(sure, 0.5), folds_of(sure, 0.25)))
+    assert told.null_control.log_odds == pytest.approx(wanted)
+    assert told.gain_null_percentile == 100.0
+    json_text(diagnosis_json(told))
+
+
+def test_a_board_that_declares_every_effect_has_no_odds():
+    base = baseline(np.random.default_rng(1))
+    ground = ground_of(base, bare(base, noise_grid(base.board), 1.0))
+    found = search(ground, 0.003 * np.random.default_rng(2).standard_normal(6))
+    control = null_control(ground, np.random.default_rng(3), 100, found.against_none)
+    told = diagnosis_of(case_of(found, control, folds_of(found, 1.0)))
+    assert (told.verdict, told.null_control.log_odds, told.gain_null_percentile) == ("none needed", None, None)
+    assert told.null_control.flagged_percent == 0.0
+    json_text(diagnosis_json(told))
+
+
+def test_two_effects_that_are_one_alternative_stay_together():
+    """Neither of a pair explains the readings by itself: it is not told as two alternatives."""
+    found = made({}, residual=np.zeros(6))
+    ground = found.ground
+    tables = [ground.candidates[name].coarse for name in (SHEAR, AIR)]
+    pair = Hypothesis((SHEAR, AIR), 0.1, together(*tables), ground.hypotheses[0].noise, ground.baseline)
+    shares = np.array([0.02, 0.01, 0.01, 0.4, 0.01, 0.55])
+    ground = replace(ground, hypotheses=(*ground.hypotheses, pair))
+    found = Found(ground, found.residual, np.log(shares), shares)
+    told = diagnosis_of(case_of(found, control_of(found, 0.5), folds_of(found, 0.25)))
+    assert (told.verdict, told.effects) == ("indistinguishable group", (SHEAR, AIR, GRAIN))
+    assert told.words == "transverse shear and fluid loading, or grain angle"
+
+
+def test_two_effects_come_nearest_where_one_comes_nearest():
+    found = made({}, residual=np.zeros(6))
+    case = case_of(found, control_of(found, 0.5), folds_of(found, 0.25))
+    told = _nearest_sentence(case, Answer((SHEAR, AIR), 1, 0.9), MOVED)
+    assert told.startswith("Transverse shear and fluid loading come nearest: with them the error goes from")
+    assert 'Declare them, effects = ["transverse_shear", "fluid_loading"],' in told
+
+
+UNEXPLAINED = {(): 1e-6, (SHEAR,): 0.97, (AIR,): 0.02, (GRAIN,): 0.01}
+
+
+def in_part_case(**changed) -> Case:
+    """A search whose best answer fails the gate, fitted again."""
+    found = made(UNEXPLAINED, residual=np.array([0.2, -0.2, 0.15, 0.1, -0.3, 0.2]))
+    verdict = decided(found)
+    assert (verdict.word, verdict.index, verdict.tried) == ("unexplained", 0, 1)
+    case = case_of(found, control_of(found, 0.4), folds_of(found, 0.5))
+    after = Side(1, MOVED, case.before.draws, case.before.measured)
+    finalists = [(verdict.nearest, after)]
+    return replace(case, after=after, finalists=finalists, in_part=(SHEAR,), **changed)
+
+
+def test_what_is_named_in_part_stands_beside_the_word_unexplained_and_nothing_is_claimed():
+    told = diagnosis_of(in_part_case())
+    assert (told.verdict, told.effects, told.claim, told.conditions) == ("unexplained", (), False, ())
+    assert told.named_in_part == told.refitted == (SHEAR,)
+    assert (told.in_part_words, told.refitted_words) == ("transverse shear", "transverse shear")
+    assert (told.before.in_sample_rms_cents, told.after.in_sample_rms_cents) == (21.25, 4.25)
+    assert told.after.nested_leave_one_out_rms_cents == pytest.approx(0.5 * told.before.nested_leave_one_out_rms_cents)
+    assert told.p_value.after < 0.05
+    assert told.elastic_averaged["E_x"].mean == told.elastic_shift["E_x"].after == 1.25e9
+    assert diagnosis_json(told)["named_in_part"] == [SHEAR]
+    words = verdict_sentence(told)
+    assert words.startswith("Verdict: unexplained. Named in part: transverse shear; something else remains.")
+    assert "The constants are not to be trusted." in words
+    assert "No improvement is claimed: the misfit that is left is too large." in words
+    section = diagnosis_section(told)
+    assert section.heading == "Part of what is missing was found"
+    assert any(one.startswith("Named in part: transverse shear") for one in section.sentences)
+    assert "The model does not explain the readings" in warnings(told)[0]
+    assert quoted(MOVED, told).error.in_sample_rms_cents == 4.25
+
+
+def test_without_a_part_the_word_unexplained_leaves_the_model_as_it_was():
+    case = in_part_case()
+    told = diagnosis_of(replace(case, after=case.before, in_part=()))
+    assert told.named_in_part == told.refitted == ()
+    assert diagnosis_json(told)["named_in_part"] == []
+    assert told.before == told.after
+    assert "in part" not in verdict_sentence(told)
+    assert diagnosis_section(told).heading == "Something is missing that was not found"
+
+
+def carrying_case(*carried: str):
+    """A named effect; some modes alone carry something, in one of the two fits or by the search."""
+    found = made(NAMED)
+    rows = tuple(
+        mode(str(label), 100.0, 100.0, 1.0, setup="setup-0", left_out_cents=10.0 * (i + 1))
+        for i, label in enumerate(found.ground.baseline.board.setups[0].labels)
+    )
+    modes = tuple(CarryingMode("setup-0", label, 0.95, "E_y") for label in carried)
+    case = case_of(
+        found, control_of(found, 0.4), folds_of(found, 0.5).without(indices_of(modes, found.ground.baseline.board))
+    )
+    before, after = (replace(side, summary=replace(side.summary, modes=rows)) for side in (case.before, case.after))
+    return replace(case, before=before, after=after, carrying=modes), found
+
+
+def test_modes_that_alone_carry_something_count_neither_before_nor_after():
+    case, found = carrying_case("(2,0)", "(5,0)")
+    told = diagnosis_of(case)
+    kept = np.sqrt(np.mean(np.square([10.0, 20.0, 40.0, 50.0])))
+    assert told.before.leave_one_out_rms_cents == pytest.approx(kept)
+    assert told.after.leave_one_out_rms_cents == pytest.approx(kept)
+    assert told.before.log_score == pytest.approx(log_score(found.ground, 0, found.residual, (2, 5)))
+    assert told.after.log_score == pytest.approx(log_score(found.ground, 1, found.residual, (2, 5)))
+    assert told.before.log_score != pytest.approx(log_score(found.ground, 0, found.residual))
+    assert [one["label"] for one in diagnosis_json(told)["carrying_modes"]] == ["(2,0)", "(5,0)"]
+    sentence = (
+        "Mode (2,0) alone carries E_y and mode (5,0) alone carries E_y: they are left out of the left-out error, "
+        "before and after alike."
+    )
+    assert sentence in verdict_sentences(told)
+    assert sentence in show_diagnosis(told).remarks
+
+
+def test_where_every_mode_alone_carries_something_there_is_no_left_out_error():
+    case, _ = carrying_case(*(f"({i},0)" for i in range(6)))
+    told = diagnosis_of(case)
+    for errors in (told.before, told.after):
+        assert errors.leave_one_out_rms_cents is errors.nested_leave_one_out_rms_cents is errors.log_score is None
+    assert told.null_control.nested_ratio is None
+    assert "no mode is left to judge by, and nothing can be claimed" in " ".join(verdict_sentences(told))
+    json_text(diagnosis_json(told))

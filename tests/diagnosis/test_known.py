@@ -1,0 +1,321 @@
+"""Known effects, computed: the same figures as a check of a card that declares them, and errors that fall and rise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from generator.boards import plant
+from generator.card import SHEAR_MEANS
+from scipy.stats import chi2
+
+from bayesplate.diagnosis import known
+from bayesplate.diagnosis.known import (
+    every_combination,
+    known_effects,
+    known_fit,
+    known_fits,
+    stated_effects,
+    with_combination,
+)
+from bayesplate.diagnosis.known_words import known_models, known_sentence
+from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
+from bayesplate.frequencies.laws import cents
+from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.system import system_of
+from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
+from bayesplate.plate.parameter import BOARD, Owner
+from bayesplate.quantities import Quantity
+from bayesplate.workflow.check import check
+from bayesplate.workflow.problem import Problem
+
+FIEMME = "fiemme-spruce-clamped"
+SHEAR, AIR, MASS = "transverse_shear", "fluid_loading", "attached_mass"
+SHEAR_LINES = ("shear_xz_gpa", "shear_yz_gpa")
+ATTACHED = '\n[[setup.attached]]\nkind = "accelerometer"\nmass_g = {mass}\nat_mm = [450, 100]\n'
+UNWEIGHED = '\n[[setup.attached]]\nkind = "accelerometer"\nat_mm = [100, 200]\n'
+EXCITER = "\n[[setup.attached]]"
+"""Begins what the card says of the exciter, which it states and, by an empty list of effects, does not declare."""
+WITHIN = 0.02
+"""Cents by which the exact law on few vectors, and the mesh of the board as it stands, may differ from full solves."""
+
+
+def card_of(tmp_path, *, lines=(), without=(), after=""):
+    """The clamped card without its exciter, with lines of its material in place of others, and more after it."""
+    text = Problem.from_card(FIEMME).prepared.card_text.partition(EXCITER)[0]
+    kept = [line for line in text.splitlines() if not line.startswith((*without, "effects ="))]
+    at = kept.index("[material]") + 1
+    path = tmp_path / f"{FIEMME}.toml"
+    path.write_text("\n".join([*kept[:at], *lines, *kept[at:]]) + "\n" + after, encoding="utf-8")
+    return path
+
+
+def by_hand(card, effects=None):
+    """Rms error, cents, and moduli, Pa, of the least squares with full solves of a card with declared effects."""
+    board = Problem.from_card(card, effects=effects).prepared.board
+    estimate = weighted_least_squares(board)
+    inputs = board.nominal()
+    D_x, D_y, D_s = estimate.rigidities
+    return rms(estimate.residuals), np.array(moduli(D_x, D_y, D_s, inputs["thickness"], inputs["poisson_xy"]))
+
+
+def are_alike(found, error, constants):
+    return rms(found.errors.in_sample) == pytest.approx(error, abs=WITHIN) and found.moduli == pytest.approx(
+        constants, rel=5e-4
+    )
+
+
+def rms(errors):
+    return float(np.sqrt(np.mean(cents(errors) ** 2)))
+
+
+@pytest.fixture(scope="module")
+def fiemme(tmp_path_factory):
+    return Problem.from_card(card_of(tmp_path_factory.mktemp("bare"))).posed
+
+
+@pytest.fixture(scope="module")
+def fits(fiemme):
+    """All of them, every model solved anew, by what is computed."""
+    return {one.effects: one for one in known_fits(fiemme)}
+
+
+@pytest.mark.parametrize("effects", [(), (SHEAR,), (AIR,), (SHEAR, AIR)])
+def test_the_figures_are_those_of_full_solves_with_the_effects_declared(fits, effects):
+    """This card states exact shear moduli, and half a baffle is the mean of its prior as well as the median."""
+    assert are_alike(fits[effects], *by_hand(FIEMME, effects))
+
+
+def test_they_are_the_figures_of_a_check(fits, monkeypatch):
+    monkeypatch.setattr("bayesplate.workflow.check.signatures", lambda _: [])  # of the other effects: not looked at
+    checked = check(FIEMME, effects=(SHEAR,))
+    assert are_alike(fits[SHEAR,], checked.in_sample_rms_cents, [checked.estimate[name] for name in MODULI])
+
+
+def test_a_size_is_the_median_of_its_prior_where_the_card_states_none(tmp_path):
+    stated_card = card_of(tmp_path, without=SHEAR_LINES, lines=("shear_xz_gpa = 0.62", "shear_yz_gpa = 0.030"))
+    expected = by_hand(stated_card, (SHEAR,))
+    found = known_fit(Problem.from_card(card_of(tmp_path, without=SHEAR_LINES)).posed, (SHEAR,))
+    assert are_alike(found, *expected)
+
+
+def test_the_left_out_errors_are_those_of_full_refits(fiemme, fits):
+    board = with_combination(fiemme.board, (AIR,))
+    (setup,) = board.setups
+    errors, some = [], [0, 3, 5]
+    for i in some:
+        fewer = replace(setup, readings=setup.readings[:i] + setup.readings[i + 1 :])
+        values = weighted_least_squares(replace(board, setups=(fewer,))).values
+        predicted = setup_model(system_of(board, setup), values).log_frequencies(values, "linear")[0]
+        errors.append(log_measured(board)[i] - predicted[i])
+    assert cents(fits[AIR,].errors.left_out[some]) == pytest.approx(cents(errors), abs=0.2, rel=2e-3)
+
+
+def test_nothing_is_fitted_but_the_constants(tmp_path, monkeypatch):
+    """However uncertain sizes and inputs are: with the same middles the same fit, of three parameters."""
+    sizes = []
+
+    def spy(law, target, scales, start):
+        sizes.append(start.size)
+        return fitted(law, target, scales, start)
+
+    fitted = known.refit
+    monkeypatch.setattr(known, "refit", spy)
+    card = card_of(tmp_path)
+    text = card.read_text(encoding="utf-8")
+    found = []
+    for sd in (0.001, 0.1):
+        card.write_text(text.replace("thickness_mm = 3\n", f"thickness_mm = {{ mean = 3, sd = {sd} }}\n"), "utf-8")
+        problem = Problem.from_card(card).posed
+        assert "thickness" in problem.board.uncertain_inputs
+        found.append([known_fit(problem), known_fit(problem, (AIR,))])
+    assert set(sizes) == {3}
+    for narrow, broad in zip(*found, strict=True):
+        assert rms(narrow.errors.in_sample) == pytest.approx(rms(broad.errors.in_sample), abs=WITHIN)
+        assert narrow.moduli == pytest.approx(broad.moduli, rel=1e-4)
+
+
+def test_sizes_are_fixed_at_their_medians_and_all_else_is_left(fiemme):
+    prior = Quantity.from_median(3e7, 3.0)
+    broad = replace(fiemme.board, shear_yz=prior)
+    sized = with_combination(broad, (SHEAR, AIR))
+    added = {one.name: one.prior for one in sized.parameters if one.effect in (SHEAR, AIR)}
+    assert added == {
+        f"{SHEAR}.G_xz": Quantity.exact(0.62e9),
+        f"{SHEAR}.G_yz": Quantity.exact(prior.median),
+        f"{AIR}.density[clamped]": Quantity.exact(1.2),
+        f"{AIR}.baffle[clamped]": Quantity.exact(0.5),
+    }
+    assert {name: sized.inputs[name] for name in broad.inputs} == broad.inputs
+    assert {one.owner for one in sized.parameters if one.effect == AIR} == {Owner("setup", "clamped")}
+    assert {one.owner for one in sized.parameters if one.effect == SHEAR} == {BOARD}
+
+
+@pytest.mark.parametrize("declared", [(), (SHEAR,), (AIR, SHEAR)])
+def test_every_combination_is_computed_whatever_is_declared(fiemme, declared):
+    board = replace(fiemme.board, effects=declared)
+    assert known_effects(board) == (SHEAR, AIR)
+    assert every_combination(board) == [(), (SHEAR,), (AIR,), (SHEAR, AIR)]
+
+
+def test_an_exciter_of_stated_mass_is_known_and_stated_though_an_empty_list_declares_nothing():
+    board = Problem.from_card(FIEMME).posed.board
+    assert board.effects == ()
+    assert (known_effects(board), stated_effects(board)) == ((SHEAR, AIR, "exciter"), ("exciter",))
+    assert len(every_combination(board)) == 2**3
+
+
+def test_four_known_effects_are_combined_by_up_to_three_and_all_where_the_card_states_them(fiemme, monkeypatch):
+    names = (MASS, "exciter", SHEAR, AIR)
+    monkeypatch.setattr(known, "known_effects", lambda _: names)
+    monkeypatch.setattr(known, "stated_effects", lambda _: names[:2])
+    found = every_combination(fiemme.board)
+    assert [len(one) for one in found] == [0] + 4 * [1] + 6 * [2] + 4 * [3]
+    assert len(set(found)) == len(found)
+    monkeypatch.setattr(known, "stated_effects", lambda _: names)
+    assert every_combination(fiemme.board) == [*found, names]
+
+
+def test_a_sensor_of_stated_mass_is_shown_by_leaving_it_out(tmp_path):
+    problem = Problem.from_card(card_of(tmp_path, after=ATTACHED.format(mass=5))).posed
+    assert problem.board.effects == (MASS,)
+    told: list[float] = []
+    found = known_fits(problem, told.append)
+    assert told == pytest.approx(np.arange(1.0, 9.0) / 8.0)
+    assert [one.combination for one in found] == [
+        (MASS,), (), (SHEAR,), (AIR,), (SHEAR, AIR), (SHEAR, MASS), (AIR, MASS), (SHEAR, AIR, MASS),
+    ]  # fmt: skip
+    assert {(one.effects, one.without) for one in found[1:3]} == {((), (MASS,)), ((SHEAR,), (MASS,))}
+    assert are_alike(found[1], *by_hand(FIEMME))
+    assert abs(found[0].moduli / found[1].moduli - 1.0).max() > 0.005
+
+
+def test_what_a_card_states_and_does_not_declare_is_computed_as_if_it_did(tmp_path):
+    """The stated sensor of a card whose effects are taken from it, and the same card with the sensor declared."""
+    card = card_of(tmp_path, after=ATTACHED.format(mass=5))
+    declared, bare = (Problem.from_card(card, effects=effects).posed for effects in (None, ()))
+    assert (declared.board.effects, bare.board.effects) == ((MASS,), ())
+    wanted, found = known_fit(declared), known_fit(bare, (MASS,))
+    assert (found.effects, found.without) == ((MASS,), ())
+    assert rms(found.errors.in_sample) == pytest.approx(rms(wanted.errors.in_sample), abs=WITHIN)
+    assert found.moduli == pytest.approx(wanted.moduli, rel=5e-4)
+
+
+def test_a_declared_size_of_the_library_is_fixed_in_combinations_and_learnt_as_the_board_stands(tmp_path):
+    card = card_of(tmp_path, without=SHEAR_LINES)
+    problem = Problem.from_card(card, effects=(SHEAR,)).posed
+    bare = Problem.from_card(card).posed
+    found = {one.combination: one for one in known_fits(problem)[1:]}
+    assert set(found) == {(), (SHEAR,), (AIR,), (SHEAR, AIR)}
+    wanted = known_fit(bare, (SHEAR,))
+    assert rms(found[SHEAR,].errors.in_sample) == pytest.approx(rms(wanted.errors.in_sample), abs=WITHIN)
+    assert abs(rms(known_fit(problem).errors.in_sample) - rms(wanted.errors.in_sample)) > 10 * WITHIN
+
+
+@pytest.mark.parametrize(
+    ("after", "effects", "expected"),
+    [
+        (ATTACHED.format(mass="{ mean = 0.6, sd = 0.1 }"), None, (MASS,)),
+        (ATTACHED.format(mass=0.6), (), (MASS,)),
+        (UNWEIGHED, (MASS,), ()),
+        (UNWEIGHED, (), ()),
+        ('\n[setup.fluid]\nbaffle = "none"\n', None, (AIR,)),
+        ('\n[setup.fluid]\nbaffle = "none"\n', (SHEAR,), (SHEAR, AIR)),
+        ("", (), ()),
+        ("", ("grain_angle",), ()),
+    ],
+)
+def test_what_a_card_states_or_declares_of_known_effects_counts_as_stated(tmp_path, after, effects, expected):
+    board = Problem.from_card(card_of(tmp_path, after=after), effects=effects).prepared.board
+    assert stated_effects(board) == expected
+
+
+def planted(tmp_path, design, effects, noise, seed=1, **fixed):
+    """A generator board as a posed problem, and its truth."""
+    board = plant(np.random.default_rng(seed), design, effects, noise_cents=noise, fixed=fixed)
+    path = tmp_path / f"{board.name}.toml"
+    path.write_text(board.card_text(), encoding="utf-8")
+    return Problem.from_card(path).posed, board.truth
+
+
+MEDIANS = {name: mean / np.sqrt(1.0 + (sd / mean) ** 2) for name, (mean, sd) in SHEAR_MEANS.items()}
+PLANTED = {
+    SHEAR: ("cantilever-9", MEDIANS, 2.0),
+    AIR: ("cantilever-9", {"density": 1.2, "baffle": 0.5}, 0.5),
+}
+
+
+@pytest.mark.parametrize("effect", PLANTED)
+def test_a_planted_effect_of_known_size_lowers_the_error_to_the_noise(tmp_path, effect):
+    """Readings of another discretisation: chi-squared of the misfit below its 99.9 % point with, far above without."""
+    design, sizes, noise = PLANTED[effect]
+    problem, truth = planted(tmp_path, design, [effect], noise, **{effect: sizes})
+    found = {one: known_fit(problem, one) for one in ((), (effect,))}
+    n = found[()].errors.in_sample.size
+    squares = {effects: n * (rms(one.errors.in_sample) / noise) ** 2 for effects, one in found.items()}
+    assert squares[effect,] < chi2.ppf(0.999, n - 3) < squares[()]
+    assert rms(found[effect,].errors.left_out) < rms(found[()].errors.left_out)
+    scale = noise / cents(problem.board.setups[0].noise.median)
+    limits = 4.0 * scale * np.array(list(problem.identifiability.standard_errors))[:3]
+    true = np.array([truth.constants[name] for name in MODULI])
+    assert np.all(np.abs(np.log(found[effect,].moduli / true)) < limits)
+    assert np.any(np.abs(np.log(found[()].moduli / true)) > limits)
+
+
+SUPPORT = "support_stiffness"
+
+
+def test_a_declared_size_that_the_readings_tell_stands_where_they_have_it(tmp_path):
+    """A support far stiffer than the median of its prior: chi-squared as above, and far above it at that median."""
+    noise, stiffness = 2.0, 5e4
+    board = plant(
+        np.random.default_rng(1), "free-12", [SUPPORT], noise_cents=noise, fixed={SUPPORT: {"stiffness": stiffness}}
+    )
+    path = tmp_path / f"{board.name}.toml"
+    path.write_text(board.card_text(), encoding="utf-8")
+    problem = Problem.from_card(path, effects=(SUPPORT,)).posed
+    (size,) = (one for one in problem.board.uncertain if one.effect == SUPPORT)
+    assert size.prior.median < 0.5 * stiffness
+    at_the_median = replace(problem, board=problem.board.with_priors({size.name: Quantity.exact(size.prior.median)}))
+    errors = [known_fit(one).errors.in_sample for one in (problem, at_the_median)]
+    squares = [one.size * (rms(one) / noise) ** 2 for one in errors]
+    assert squares[0] < chi2.ppf(0.999, errors[0].size - 4) < squares[1]
+
+
+def test_an_error_that_rises_where_something_opposes_is_told(tmp_path):
+    """A frame that pulls on the board raises its low modes; computed air, which is not there, would lower them."""
+    problem, _ = planted(tmp_path, "clamped-9", ["membrane_tension"], 2.0)
+    as_it_stands, known_air = known_models((known_fit(problem), known_fit(problem, (AIR,))))
+    assert known_air.in_sample_rms_cents > 1.5 * as_it_stands.in_sample_rms_cents
+    assert known_air.leave_one_out_rms_cents > 1.5 * as_it_stands.leave_one_out_rms_cents
+    told = known_sentence((as_it_stands, known_air))
+    assert "fluid loading raises the left-out error from" in told
+    assert "Where the error rises, something that acts the other way is lacking" in told
+
+
+MOVED = np.array([0.06, -0.02, 0.05])
+"""Change of ln D that the air makes on the board below."""
+
+
+@pytest.mark.slow
+def test_modes_that_lie_close_keep_their_names_from_one_model_to_the_next():
+    """On this board air brings two modes so close that their shapes would exchange names."""
+    problem = Problem.from_card("spruce-free-3L").posed
+    board = with_combination(problem.board, (AIR,))
+    (solved,) = known._solved(problem, board, board.nominal(), np.log(problem.estimate.rigidities) + MOVED)
+    (before,) = problem.posterior.models
+    assert [(one.parity, one.rank) for one in solved.places] == [(one.parity, one.rank) for one in before.places]
+    constants = dict(zip(RIGIDITIES, problem.estimate.rigidities * np.exp(MOVED), strict=True))
+    anew = setup_model(solved.system, {**board.nominal(), **constants}, solved.plate)
+    assert [one.rank for one in anew.places] != [one.rank for one in solved.places]
+
+
+def test_of_an_isotropic_plate_every_combination_fits_one_modulus():
+    """And, of two effects together, the one that full solves of a card with both declared give."""
+    posed = Problem.from_card("steel-air-water").posed
+    found = {one.combination: one for one in known_fits(posed)}
+
+    assert {one.baseline.log_rigidities.shape for one in found.values()} == {(1,)}
+    assert {one.baseline.slopes.shape for one in found.values()} == {(10, 1)}
+    assert are_alike(found[SHEAR, AIR], *by_hand("steel-air-water", (SHEAR, AIR)))

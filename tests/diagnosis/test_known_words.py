@@ -1,0 +1,190 @@
+"""What is said of known effects: which lower the error, which raise it, in a table, a sentence, CSV and LaTeX."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnoses import DIAGNOSES, KNOWN, STATED, known_model
+from made_searches import baseline
+
+from bayesplate.diagnosis.known import KnownFit
+from bayesplate.diagnosis.known_words import known_models, known_sentence, known_table
+from bayesplate.diagnosis.tables import write_diagnosis_tables
+from bayesplate.diagnosis.told import stated_sentences
+from bayesplate.estimates.leave_one_out import Errors, Leverages
+from bayesplate.report.verdict import diagnosis_section
+from bayesplate.results.tables import render
+
+CENTS = np.log(2.0) / 1200.0
+STANDS, SHEAR, AIR, _, SENSOR = KNOWN
+BEGINNING = "Computed at its known size, with nothing fitted but the constants by weighted least squares, "
+RISE = "Where the error rises, something that acts the other way is lacking"
+
+
+def test_what_is_told_of_a_fit_by_hand():
+    def fit(effects, moduli, in_sample, left_out):
+        nobody = Leverages(np.zeros(2), np.full(2, -1))
+        errors = Errors(*(CENTS * np.array(one) for one in (in_sample, left_out)), nobody)
+        return KnownFit(effects, effects, (), baseline(np.random.default_rng(1), 2), np.array(moduli), errors)
+
+    first = fit((), [10e9, 1e9, 0.5e9], [3.0, -4.0], [6.0, 8.0])
+    second = fit(("fluid_loading",), [10.5e9, 0.9e9, 0.5e9], [1.0, 7.0], [np.nan, 5.0])
+    stands, air = known_models((first, second))
+    assert stands.in_sample_rms_cents == pytest.approx(np.sqrt(12.5))
+    assert (stands.leave_one_out_rms_cents, air.leave_one_out_rms_cents) == pytest.approx((8.0, 5.0))
+    assert (stands.n_left_out, stands.n_readings) == (1, 2)
+    assert set(stands.change_percent.values()) == {0.0}
+    assert (air.combination, air.effects, air.without) == (("fluid_loading",), ("fluid_loading",), ())
+    assert air.in_sample_rms_cents == pytest.approx(5.0)
+    assert known_models((first,), carried=(1,))[0].leave_one_out_rms_cents == pytest.approx(6.0)
+    assert [one.leave_one_out_rms_cents for one in known_models((first, second), carried=(1,))] == [None, None]
+    assert air.change_percent == pytest.approx({"E_x": 5.0, "E_y": -10.0, "G_xy": 0.0})
+    third = fit(("fluid_loading",), [10e9, 1e9, 0.5e9], [1.0, 7.0], [5.0, np.nan])
+    assert [one.leave_one_out_rms_cents for one in known_models((first, second, third))] == [None] * 3
+
+
+def test_the_table_has_a_row_a_model_and_no_change_where_nothing_was_changed():
+    table = known_table(KNOWN)
+    assert table.columns == ("model", "in the fit", "left out", "E_x, %", "E_y, %", "G_xy, %")
+    assert table.texts[0] == ("as it stands", "21.2", "46.5", "0.0", "0.0", "0.0")
+    assert table.texts[2] == ("with fluid loading and attached mass", "42.8", "94.0", "+1.2", "-2.5", "0.0")
+    assert [row[0] for row in table.texts[3:]] == [
+        "with transverse shear, fluid loading and attached mass",
+        "without attached mass",
+    ]
+    both = replace(AIR, combination=("fluid_loading",), without=("attached_mass",))
+    assert known_table((STANDS, both)).texts[1][0] == "with fluid loading, without attached mass"
+    assert known_table((STANDS, replace(AIR, leave_one_out_rms_cents=None))).texts[1][2] == "–"
+    assert known_table(KNOWN[:1]) is known_table(()) is None
+
+
+def test_falls_and_rises_are_said_plainly():
+    assert known_sentence(KNOWN) == (
+        f"{BEGINNING}transverse shear lowers the left-out error from 46 to 12 cents; fluid loading raises it from 46 "
+        "to 94 cents; attached mass, as the card states it, lowers it from 61 to 46 cents. "
+        f"{RISE}, or the effect has another size on this board, or the fit was that good by chance. Of 5 combinations "
+        "the board with transverse shear and attached mass has the lowest left-out error, 12 cents."
+    )
+    assert known_sentence(KNOWN[:1]) == known_sentence(()) == ""
+
+
+@pytest.mark.parametrize(
+    ("models", "words", "rises"),
+    [
+        ((STANDS, SHEAR), "transverse shear lowers the left-out error from 46 to 12 cents.", False),
+        ((STANDS, AIR), "fluid loading raises the left-out error from 46 to 94 cents. ", True),
+        ((STANDS, SENSOR), "as the card states it, lowers the left-out error from 61 to 46 cents.", False),
+        (
+            (STANDS, replace(SENSOR, leave_one_out_rms_cents=12.0)),
+            "attached mass, as the card states it, raises the left-out error from 12 to 46 cents. ",
+            True,
+        ),
+        ((STANDS, replace(AIR, leave_one_out_rms_cents=46.6)), "raises the left-out error from 46 to 47 cents. ", True),
+        ((STANDS, replace(AIR, leave_one_out_rms_cents=46.3)), "leaves the left-out error at 46 cents.", False),
+        ((STANDS, replace(AIR, leave_one_out_rms_cents=None)), "the error in the fit from 21 to 43 cents.", True),
+        ((known_model(4.0, 6.0), known_model(5.0, 8.25, "fluid_loading")), "from 6.0 to 8.2 cents. ", True),
+    ],
+)  # fmt: skip
+def test_each_effect_is_told_by_its_own_error(models, words, rises):
+    told = known_sentence(models)
+    assert words in told
+    assert (RISE in told) is rises
+
+
+def of_errors(neither, first, second, both):
+    """A board that declares nothing, with shear, with air, with both."""
+    names = ((), ("transverse_shear",), ("fluid_loading",), ("transverse_shear", "fluid_loading"))
+    return tuple(
+        replace(known_model(value, value), combination=one, effects=one)
+        for one, value in zip(names, (neither, first, second, both), strict=True)
+    )
+
+
+def test_the_best_combination_is_told_or_that_there_is_none():
+    assert (
+        "Of 4 combinations the board with transverse shear and fluid loading has the lowest left-out error, 11 cents."
+        in known_sentence(of_errors(16.0, 20.0, 43.0, 11.0))
+    )
+    none = "None of 3 other combinations has a lower left-out error than the board as it stands."
+    assert none in known_sentence(of_errors(16.0, 20.0, 43.0, 21.0))
+    assert none in known_sentence(of_errors(16.0, 20.0, 43.0, 15.8))  # shown as 16 too
+    assert none not in known_sentence(of_errors(16.0, 20.0, 43.0, 15.4))
+    assert "combinations" not in known_sentence(of_errors(16.0, 20.0, 43.0, 15.4)[:3])
+
+
+@pytest.mark.parametrize(
+    ("errors", "is_told"),
+    [
+        ((16.0, 20.0, 43.0, 4.0), True),
+        ((16.0, 15.9, 43.0, 4.0), False),
+        ((16.0, 20.0, 15.9, 4.0), False),
+        ((16.0, 20.0, 43.0, 16.1), False),
+    ],
+)
+def test_two_effects_that_work_only_together_are_told_so(errors, is_told):
+    """Both together lower the error, and either alone raises it."""
+    words = (
+        "Transverse shear and fluid loading work only together: transverse shear alone takes the left-out error from "
+        "16.0 to 20.0 cents, fluid loading alone to 43.0, both to 4.0."
+    )
+    assert (words in known_sentence(of_errors(*errors))) is is_told
+    assert ("only together" in known_sentence(of_errors(*errors))) is is_told
+
+
+def test_two_effects_of_which_one_is_declared_are_seen_to_work_only_together():
+    """The board as it stands has the sensor: without it the error is the reference."""
+    stands, air, bare, both = (
+        replace(known_model(value, value, without=without), combination=names, effects=effects)
+        for value, names, effects, without in (
+            (20.0, ("attached_mass",), (), ()),
+            (4.0, ("fluid_loading", "attached_mass"), ("fluid_loading",), ()),
+            (16.0, (), (), ("attached_mass",)),
+            (43.0, ("fluid_loading",), ("fluid_loading",), ("attached_mass",)),
+        )
+    )
+    told = known_sentence((stands, bare, both, air))
+    assert "work only together" in told
+    assert "from 16.0 to" in told
+
+
+def test_of_how_many_readings_a_left_out_error_is_told_where_it_is_not_of_all():
+    some = [replace(one, n_left_out=4) for one in KNOWN]
+    words = "Left-out errors are of 4 of 6 readings: without one of the others a model leaves a constant open."
+    assert known_sentence(some).endswith(words)
+    assert "Left-out errors are of" not in known_sentence(KNOWN)
+
+
+def test_the_page_shows_the_table_and_the_sentence_where_there_are_any():
+    named, bare = (diagnosis_section(DIAGNOSES[word]) for word in ("named", "none needed"))
+    assert named.known == " ".join([known_sentence(KNOWN), *stated_sentences(STATED)])
+    assert named.known_effects == known_table(KNOWN)
+    assert bare.known == ""
+    assert bare.known_effects is None
+
+
+def test_the_same_as_csv_at_full_precision():
+    header, *rows = csv.reader(io.StringIO(render(known_table(KNOWN), "csv")))
+    assert header[:3] == ["model", "in_sample_rms_cents", "leave_one_out_rms_cents"]
+    assert rows[2] == ["with fluid loading and attached mass", "42.75", "94.0", "1.25", "-2.5", "0.0"]
+    assert len(rows) == len(KNOWN)
+    unknown = render(known_table((STANDS, replace(AIR, leave_one_out_rms_cents=None))), "csv")
+    assert unknown.splitlines()[2] == "with fluid loading and attached mass,42.75,,1.25,-2.5,0.0"
+
+
+def test_the_same_as_latex():
+    comment, begin, *body, last = render(known_table(KNOWN), "latex").splitlines()
+    assert comment.startswith("% What physics knows")
+    assert (begin, last) == (r"\begin{tabular}{lrrrrr}", r"\end{tabular}")
+    assert r"model & in the fit & left out & $E_{x}$, \% & $E_{y}$, \% & $G_{xy}$, \% \\" in body
+    assert r"as it stands & 21.2 & 46.5 & 0.0 & 0.0 & 0.0 \\" in body
+
+
+def test_files_are_written_only_where_there_is_something_to_tell(tmp_path):
+    always = ["before-after.csv", "before-after.tex"]
+    for word, wanted in (("none needed", always), ("named", [*always, "known-effects.csv", "known-effects.tex"])):
+        written = [path.name for path in write_diagnosis_tables(tmp_path, DIAGNOSES[word], "x")]
+        assert written == sorted(path.name for path in tmp_path.iterdir()) == wanted

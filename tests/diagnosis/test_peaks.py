@@ -1,0 +1,219 @@
+"""Peaks as each hypothesis takes them: evidence against the sum over all assignments, labels against planted ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from made_searches import NOISE, bare, baseline, candidate, ground_of, one_level
+from scipy.special import logsumexp
+
+from bayesplate.diagnosis.baseline import Baseline, Spectrum
+from bayesplate.diagnosis.folds import log_score_gains, nested
+from bayesplate.diagnosis.hypotheses import Hypothesis, confusable
+from bayesplate.diagnosis.peaks import log_summed, with_own_labels
+from bayesplate.diagnosis.search import search
+from bayesplate.diagnosis.shifts import nothing
+from bayesplate.frequencies.model import OtherMode
+from bayesplate.frequencies.peaks import PeakLikelihood
+from bayesplate.modes.naming import Place
+from bayesplate.modes.terms import Parity
+
+PLACE = Place(Parity(0, 0), 0, 1.0)
+N_EVERY = 9
+READ = [0, 1, 2, 4, 5, 7]
+"""Modes that left a peak; the last one of the others lies far above the highest."""
+MISSED, SPURIOUS = 0.2, 0.02
+
+
+def peaked(rng, readings, labels=READ, confidence=0.0, spacing=0.3) -> Baseline:
+    """A baseline of nine modes, whose readings (ln f) have labels that the card does not state."""
+    whole = baseline(rng, N_EVERY, spacing=spacing)
+    order = [*labels, *(i for i in range(N_EVERY) if i not in labels)]
+    board = baseline(rng, len(labels)).board
+    (setup,) = board.setups
+    told = tuple(
+        replace(one, frequency=type(one.frequency).exact(float(np.exp(at))), confidence=confidence, beams=(2 + i, 0))
+        for i, (one, at) in enumerate(zip(setup.readings, readings, strict=True))
+    )
+    setup = replace(setup, readings=told, missed=MISSED, spurious=SPURIOUS)
+    others = tuple(OtherMode(PLACE, (20 + i, 0)) for i in range(N_EVERY - len(labels)))
+    model = SimpleNamespace(setup=setup, others=others, residues=None, every_place=(PLACE,) * N_EVERY)
+    every = Spectrum(
+        log_frequency=whole.log_frequency[order],
+        slopes=whole.slopes[order],
+        input_slopes=whole.input_slopes[order],
+        places=((PLACE,) * N_EVERY,),
+        inputs=np.zeros(0),
+        peaks=(PeakLikelihood.of(model),),
+        predict=lambda x: whole.every.predict(x)[:, order],
+    )
+    return Baseline(
+        board=replace(board, setups=(setup,)),
+        values=whole.values,
+        log_rigidities=whole.log_rigidities,
+        log_readings=np.asarray(readings),
+        every=every,
+        rows=np.arange(len(labels)),
+        symmetry=whole.symmetry,
+    )
+
+
+def enumerated(base: Baseline) -> float:
+    """ln of the evidence of no effect at a known noise, flat in the constants: over all sets of rising pairs."""
+    every, readings = base.every, base.residual + base.log_frequency
+    peaks = np.argsort(readings)
+    modes = np.argsort(every.log_frequency)[:-1]  # the last one is above all peaks
+    logs = []
+    for n in range(4, len(peaks) + 1):
+        for rows in combinations(peaks, n):
+            for columns in combinations(modes, n):
+                x, y = every.slopes[list(columns)], readings[list(rows)] - every.log_frequency[list(columns)]
+                precision = x.T @ x / NOISE**2
+                off = y - x @ np.linalg.solve(precision, x.T @ y / NOISE**2)
+                fit = -0.5 * off @ off / NOISE**2 - 0.5 * (n - 3) * np.log(2.0 * np.pi) - n * np.log(NOISE)
+                fit -= 0.5 * np.linalg.slogdet(precision)[1]
+                known = n * np.log((1.0 - SPURIOUS) * (1.0 - MISSED)) + (len(modes) - n) * np.log(MISSED)
+                known += sum(
+                    np.log(len(peaks) * SPURIOUS) + readings[i] - readings.max() for i in peaks if i not in rows
+                )
+                logs.append(fit + known)
+    return float(logsumexp(logs))
+
+
+def noisy(rng, base_of, spoilt=0.0):
+    """Readings of the planted modes with noise; the third one off by so much."""
+    middle = baseline(np.random.default_rng(3), N_EVERY).log_frequency[READ]
+    readings = middle + NOISE * rng.standard_normal(len(READ))
+    readings[2] += spoilt
+    return base_of(np.random.default_rng(3), readings)
+
+
+def summed(base: Baseline):
+    """The search of no effect, by the labels on the board alone and summed over all."""
+    ground = ground_of(base, bare(base, one_level(base)))
+    ground = replace(ground, hypotheses=(with_every(ground.hypotheses[0]),))
+    return search(ground).log_evidence[0], search(with_own_labels(ground)).log_evidence[0]
+
+
+@pytest.mark.parametrize("spoilt", [0.0, 0.3], ids=["as labelled", "another mode"])
+def test_the_evidence_is_summed_over_all_assignments(spoilt):
+    """Whatever the labels on the board say; a search by these alone is off."""
+    base = noisy(np.random.default_rng(5), peaked, spoilt)
+    by_labels, found = summed(base)
+    assert found == pytest.approx(enumerated(base), abs=0.02)
+    assert abs(by_labels - enumerated(base)) > 4.0  # control
+
+
+@pytest.mark.parametrize("spoilt", [0.05, 0.13, 0.2])
+def test_a_peak_between_two_modes_is_hardly_undervalued(spoilt):
+    """Ways to take it that no draw comes near are not in the sum: it is a lower bound, off by a nat or so."""
+    base = noisy(np.random.default_rng(5), peaked, spoilt)
+    by_labels, found = summed(base)
+    assert enumerated(base) - 1.5 < found < enumerated(base) + 0.1
+    assert by_labels < enumerated(base) - 10.0  # control
+
+
+def with_every(none):
+    """No effect on any of the nine modes."""
+    return replace(none, table=nothing(N_EVERY))
+
+
+def planted():
+    """A board whose third peak is the fourth mode, moved down by an effect to where the third one is expected."""
+    rng = np.random.default_rng(11)
+    direction = 0.02 * rng.standard_normal(N_EVERY)
+    direction[3] = -0.3
+    labels = [0, 1, 2, 4, 5, 7]
+    truth = [0, 1, 3, 4, 5, 7]
+    whole = baseline(np.random.default_rng(3), N_EVERY)
+    readings = (whole.log_frequency + direction)[truth] + 0.3 * NOISE * rng.standard_normal(6)
+    base = peaked(np.random.default_rng(3), readings, labels)
+    order = [*labels, *(i for i in range(N_EVERY) if i not in labels)]
+    one = candidate(replace_all(base), "a", direction[order])
+    levels = one_level(base)
+    none = bare(base, levels)
+    hypotheses = (
+        with_every(none),
+        Hypothesis(("a",), 0.5, one.fine, levels, base),
+    )
+    return ground_of(base, *hypotheses, candidates={"a": one}), [*range(2), order.index(3), 3, 4, 5]
+
+
+def replace_all(base: Baseline) -> Baseline:
+    """A baseline of all modes, for an effect that acts on all of them."""
+    return replace(
+        base,
+        board=baseline(np.random.default_rng(3), N_EVERY).board,
+        log_readings=base.every.log_frequency,
+        every=replace(base.every, peaks=(None,)),
+        rows=np.arange(N_EVERY),
+    )
+
+
+def test_each_hypothesis_has_the_labels_that_it_makes_likely():
+    ground, truth = planted()
+    found = with_own_labels(ground)
+    assert found.hypotheses[1].own.rows.tolist() == truth
+    assert found.hypotheses[0].own.rows[2] != truth[2]
+
+
+def test_certain_labels_leave_the_hypotheses_alone():
+    base = baseline(np.random.default_rng(1), 6)
+    ground = ground_of(base, bare(base, one_level(base)))
+    assert with_own_labels(ground) is ground
+
+
+def test_a_reading_that_is_no_mode_is_left_out_of_folds():
+    base = noisy(np.random.default_rng(5), peaked)
+    ground = ground_of(base, bare(base, one_level(base)))
+    rows = base.rows.copy()
+    rows[2] = -1
+    without = replace(with_every(ground.hypotheses[0]), members=("a",))
+    ground = replace(ground, hypotheses=(ground.hypotheses[0], without.labelled(base, rows)))
+    folded = nested(ground, base.residual[None, :], -np.inf)
+    assert np.isnan(folded.after[0]).tolist() == [False, False, True, False, False, False]
+    kept = np.arange(6) != 2
+    rms = [np.sqrt(np.mean(part[0, kept] ** 2)) for part in (folded.after, folded.before)]
+    assert folded.ratio[0] == pytest.approx(rms[0] / rms[1])
+    gains = log_score_gains(ground, base.residual, np.array([0, 0, 1, 0, 0, 0]))
+    alone = np.log(6 * SPURIOUS) + base.residual[2] + base.log_frequency[2] - (base.residual + base.log_frequency).max()
+    own = log_score_gains(ground, base.residual, np.array([0, 0, 0, 0, 0, 0]))
+    assert own[2] == 0.0
+    expected = log_score_of(ground, 2)
+    assert gains[2] == pytest.approx(alone - expected)
+
+
+def log_score_of(ground, mode):
+    """Density of one reading given the others without an effect: normal about the fit to the others."""
+    base = ground.baseline
+    others = np.arange(6) != mode
+    x = base.slopes
+    precision = x[others].T @ x[others] / NOISE**2
+    fitted = np.linalg.solve(precision, x[others].T @ base.residual[others] / NOISE**2)
+    variance = NOISE**2 + x[mode] @ np.linalg.solve(precision, x[mode])
+    off = base.residual[mode] - x[mode] @ fitted
+    return -0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+
+
+@pytest.mark.parametrize("confidence", [0.0, 0.9])
+def test_labels_are_exchanged_only_where_all_are_certain(confidence):
+    """Elsewhere the sum over assignments does it, and two exchanges would be one explanation."""
+    near = baseline(np.random.default_rng(3), N_EVERY, spacing=0.05, parities=[(i % 2, 0) for i in range(N_EVERY)])
+    assert len(confusable(near)) > 1
+    doubted = peaked(np.random.default_rng(3), near.log_frequency[READ], confidence=confidence, spacing=0.05)
+    assert not confusable(doubted)
+
+
+def test_the_sum_counts_sure_readings_once():
+    """Readings whose label is certain enter with their own density, the others by their assignments."""
+    base = noisy(np.random.default_rng(5), peaked)
+    (setup,) = base.board.setups
+    noise = np.full((3, 1), NOISE)
+    there = base.every.log_frequency + 0.003 * np.random.default_rng(2).standard_normal((3, N_EVERY))
+    total = log_summed(base, there, noise)
+    assert total == pytest.approx(base.every.peaks[0].log_likelihood(there, noise[:, 0]))
+    assert len(setup.readings) == 6

@@ -1,0 +1,77 @@
+"""A reading that is simply wrong is named with its numbers; one that may be another, or none, is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_searches import NOISE, bare, baseline, ground_of, with_modes, with_residual
+
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.readings import suspects, wrong_reading
+from bayesplate.diagnosis.search import Found, search
+
+
+def found_of(residual, n_modes=8, noise=(NOISE,)) -> Found:
+    base = baseline(np.random.default_rng(1), n_modes, noise=noise)
+    base = with_residual(base, residual)
+    return search(ground_of(base, bare(base, noise_grid(base.board))))
+
+
+@pytest.mark.parametrize("mode", range(8))
+@pytest.mark.parametrize("size", [0.2, -0.2])
+def test_the_reading_that_is_wrong_is_named(mode, size):
+    """Noise of half a per cent, one reading a fifth off: whatever reading it is."""
+    noise = 0.3 * NOISE * np.random.default_rng(2).standard_normal(8)
+    found = found_of(noise + size * np.eye(8)[mode])
+    label, hertz = found.ground.baseline.board.setups[0].labels[mode], 60.0 * np.exp(0.3 * mode)
+    sentence = wrong_reading(found)
+    assert sentence.startswith(f"Read {label} again: without it the other readings agree with the model (p = ")
+    assert f"read as {hertz:.6g} Hz" in sentence
+    assert ("above" if size > 0 else "below") in sentence
+    assert suspects(found)[0].off == pytest.approx(size, rel=0.2)
+    assert f"the {hertz * np.exp(-suspects(found)[0].off):.4g} Hz that they let expect" in sentence
+
+
+def test_two_wrong_readings_are_not_one():
+    found = found_of(0.2 * (np.eye(8)[1] - np.eye(8)[4]))
+    assert suspects(found) == ()
+    assert wrong_reading(found) == ""
+
+
+def test_where_several_readings_may_be_the_wrong_one_none_is_named():
+    """Two rows alike: the constants cannot tell which of the two is off."""
+    base = baseline(np.random.default_rng(1), 6)
+    slopes = base.slopes.copy()
+    slopes[:2], slopes[2:] = np.eye(3)[0], np.eye(3)[[1, 1, 2, 2]]
+    base = with_residual(with_modes(base, slopes=0.5 * slopes), 0.2 * np.eye(6)[0])
+    found = search(ground_of(base, bare(base, noise_grid(base.board))))
+    told = suspects(found)
+    assert {one.index for one in told} == {0, 1}
+    assert told[0].log_weight - told[1].log_weight < np.log(3.0)
+    assert wrong_reading(found) == ""
+
+
+def test_of_two_the_one_that_is_clearly_less_expected_is_named():
+    found = found_of(0.045 * np.eye(6)[3], n_modes=6)
+    assert [one.index for one in suspects(found)] == [3, 0]
+    assert wrong_reading(found).startswith("Read (3,0) again")
+
+
+def test_no_reading_is_wrong_where_all_agree():
+    found = found_of(0.04 * np.eye(6)[0], n_modes=6)
+    assert found.p_value(0) > 0.05
+    assert suspects(found) == ()
+
+
+def test_the_setup_is_named_where_there_are_several():
+    found = found_of(0.2 * np.eye(8)[5], noise=(NOISE, NOISE))
+    assert wrong_reading(found).startswith("Read (5,0) in setup setup-1 again")
+
+
+def test_four_readings_cannot_tell():
+    assert suspects(found_of(0.2 * np.eye(4)[0], n_modes=4)) == ()
+
+
+@pytest.mark.parametrize("mode", range(5))
+def test_five_readings_can_tell(mode):
+    assert wrong_reading(found_of(0.2 * np.eye(5)[mode], n_modes=5)).startswith(f"Read ({mode},0) again")

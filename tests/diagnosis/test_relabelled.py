@@ -1,0 +1,40 @@
+"""The sentence on peaks that are other modes once an effect has been added."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from made_boards import setup_of
+
+from bayesplate.diagnosis.told import relabelled_sentence
+from bayesplate.plate.board import made_board
+from bayesplate.quantities import Quantity
+
+FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
+INPUTS = {"thickness": Quantity.exact(3e-3)}
+
+
+def board_of(labels, name="free"):
+    return made_board("made", INPUTS, (setup_of(FREE, labels, name=name),))
+
+
+def test_only_labels_that_changed_are_told():
+    before = board_of({(1, 1): 60.0, (3, 0): 199.67, (3, 2): 421.75, (6, 0): 930.0})
+    after = board_of({(1, 1): 60.0, (1, 2): 199.67, (0, 3): 421.75, (5, 2): 862.0})
+    told = relabelled_sentence(before, after, "transverse shear")
+    assert told == (
+        "With transverse shear some peaks are other modes: 199.67 Hz is (1,2) (it was (3,0)), 421.75 Hz is (0,3) (it "
+        "was (3,2)), 862 Hz is (5,2) (it had no likely mode) and 930 Hz is no likely mode (it was (6,0))."
+    )
+
+
+def test_nothing_is_told_where_nothing_changed():
+    board = board_of({(1, 1): 60.0, (3, 0): 199.67})
+    assert relabelled_sentence(board, board, "fluid loading") == ""
+
+
+def test_the_setup_is_told_where_there_are_several():
+    one, other = ({(1, 1): 60.0, label: 199.67} for label in ((3, 0), (1, 2)))
+    second = board_of({(2, 0): 70.0}, "clamped").setups
+    before, after = (replace(each, setups=(*each.setups, *second)) for each in (board_of(one), board_of(other)))
+    assert "199.67 Hz in setup free is (1,2)" in relabelled_sentence(before, after, "shear")

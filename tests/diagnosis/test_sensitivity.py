@@ -1,0 +1,231 @@
+"""Prior widths, constants as the search sees them, null control, and the size that a refit must find clear of zero."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_searches import bare, baseline, candidate, ground_of, one_level, visible_of
+from scipy.stats import binom
+
+from bayesplate.diagnosis.constants import draw_constants
+from bayesplate.diagnosis.folds import ALWAYS, nested
+from bayesplate.diagnosis.hypotheses import Hypothesis
+from bayesplate.diagnosis.noise_grid import noise_grid
+from bayesplate.diagnosis.null_control import (
+    FALSE_ALARMS,
+    NullControl,
+    _share,
+    made_to_choose,
+    null_control,
+)
+from bayesplate.diagnosis.search import Found, noise_of_board, search
+from bayesplate.diagnosis.sensitivity import under_exact_law, variants, varied
+from bayesplate.diagnosis.terms import Terms
+from bayesplate.quantities import Quantity
+
+
+@pytest.fixture
+def small():
+    """A board of six readings with one effect whose shift is a direction times a half-normal size."""
+    base = baseline(np.random.default_rng(1))
+    direction = 0.02 * np.linalg.qr(np.random.default_rng(2).standard_normal((6, 6)))[0][0]
+    one = candidate(base, "a", direction)
+    levels = noise_grid(base.board)
+    ground = ground_of(base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels, base), candidates={"a": one})
+    return ground, one
+
+
+def test_a_width_of_one_changes_nothing(finnish_few):
+    found = search(finnish_few.ground)
+    same = varied(found, width=1.0)
+    assert same.none == pytest.approx(found.none, rel=1e-9)
+    for name in finnish_few.ground.candidates:
+        assert same.inclusion(name) == pytest.approx(found.inclusion(name), rel=1e-9)
+
+
+def test_twice_the_width_halves_the_density_at_zero(small):
+    """A size that the readings put at zero loses log 2 of evidence; one far out gains what the wider prior gives it."""
+    ground, one = small
+    for z, wanted in ((0.0, -np.log(2.0)), (2.0, -np.log(2.0) + 0.5 * 2.0**2 * (1 - 1 / 4))):
+        sharp = Terms(one.fine, ground.baseline, one_level(ground.baseline, 1e-4))
+        cell = int(np.argmin(np.abs(one.fine.z[:, 0] - z)))
+        residual = one.fine.shift[cell]
+        found = Found(ground, residual, np.zeros(2), np.array([0.5, 0.5]))
+        narrow, wide = (varied(found, width=width) for width in (1.0, 2.0))
+        odds = np.log(wide.inclusion("a") / wide.none) - np.log(narrow.inclusion("a") / narrow.none)
+        assert sharp.log_evidence(residual[None, :]).size == 1
+        at = float(one.fine.z[cell, 0])
+        assert odds == pytest.approx(wanted, abs=0.25 + 0.75 * abs(at - z))
+
+
+@pytest.mark.slow
+def test_poisson_ratio_is_not_named_with_twice_its_width_either(finnish):
+    """Among all candidates."""
+    doubled = varied(search(finnish.ground), width=2.0)
+    assert doubled.none > 0.1
+    assert doubled.inclusion("poisson_ratio") < 0.5
+
+
+def test_constants_are_those_of_a_direct_regression():
+    """One cell and one level: generalised least squares with the place in the cell and the input as unknowns."""
+    rng = np.random.default_rng(3)
+    base = baseline(rng, n_inputs=1, resolution=1.0)
+    thickness = Quantity.from_mean(3e-3, 3e-5)
+    base = replace(base, board=base.board.with_priors({"thickness": thickness}))
+    prior = Quantity.from_mean(0.0, 1.0, "normal")
+    one = candidate(base, "a", 0.02 * rng.standard_normal(6), prior, n_cells=1)
+    ground = ground_of(base, Hypothesis(("a",), 1.0, one.fine, one_level(base), base), candidates={"a": one})
+    residual = 0.01 * rng.standard_normal(6)
+    n = 40_000
+    drawn = draw_constants(Found(ground, residual, np.zeros(1), np.ones(1)), rng, n)
+
+    weights = 1.0 / (one_level(base).sd[0, 0] ** 2 + base.own_variance)
+    columns = np.hstack([base.slopes, one.fine.slopes[0], base.input_slopes])
+    spread = np.linalg.inv(columns.T @ (weights[:, None] * columns) + np.diag([0, 0, 0, 1, 1]))
+    middle = spread @ (columns.T @ (weights * (residual - one.fine.shift[0])))
+    reach = np.hstack([np.eye(3), one.fine.moved_slopes[0], np.zeros((3, 1))])
+    mean = base.log_rigidities + one.fine.moved[0] + reach @ middle
+    sd = np.sqrt(np.diagonal(reach @ spread @ reach.T))
+    logs = np.log([drawn[name] for name in ("D_x", "D_y", "D_s")])
+    assert np.abs((logs.mean(axis=1) - mean) / sd).max() < 4.0 / np.sqrt(n)
+    assert np.abs(logs.std(axis=1) / sd - 1.0).max() < 4.0 / np.sqrt(2 * n)
+
+    # G_xy = 3 D_s / h^3: the thickness is drawn along with D_s, not kept
+    row = reach[2] - 3.0 * thickness.log_sd * np.eye(5)[4]
+    found = np.log(drawn["G_xy"])
+    assert found.std() == pytest.approx(np.sqrt(row @ spread @ row), rel=4.0 / np.sqrt(2 * n))
+    assert abs(np.sqrt(row @ spread @ row) / sd[2] - 1.0) > 0.05
+
+
+def test_simulated_nulls_have_the_noise_of_its_prior(small):
+    """Log-normal: ln of the mean square over a set is far wider than where the noise is known."""
+    ground, _ = small
+    (setup,) = ground.baseline.board.setups
+    n_sets = 20_000
+    simulated = noise_of_board(ground.baseline, np.random.default_rng(5), n_sets)
+    squares = np.log(np.mean(simulated**2, axis=1))
+    known = np.log(np.mean(np.random.default_rng(6).standard_normal((n_sets, 6)) ** 2, axis=1))
+    variance = known.var() + (2.0 * setup.noise.log_sd) ** 2
+    assert squares.var() == pytest.approx(variance, rel=5.0 * np.sqrt(2.0 / n_sets))
+    assert known.var() < 0.7 * variance  # control
+    expected = setup.noise.median**2 * np.exp(2.0 * setup.noise.log_sd**2)
+    assert np.abs(simulated.mean(axis=0)).max() < 4.0 * np.sqrt(expected / n_sets)
+
+
+def test_the_null_control_finds_little_where_there_is_nothing_and_sees_what_there_is(small):
+    ground, one = small
+    rng = np.random.default_rng(6)
+    calm = null_control(ground, rng, 1000)
+    assert calm.against.shape == (1000,)
+    assert calm.ratio is None
+    assert calm.flagged <= FALSE_ALARMS
+    there = search(ground, 1.5 * visible_of(one) + 0.001 * rng.standard_normal(6))
+    assert there.against_none == pytest.approx(np.log(there.probability[1] / there.probability[0]))
+    assert calm.percentile_of(there.against_none) > 95.0
+    assert calm.percentile_of(-np.inf) == 0.0
+
+
+def test_what_is_needed_begins_at_the_false_alarm_rate_or_at_certainty():
+    """Of a hundred null sets two lie above; a control full of alarms does not ask for more than a tenth's odds."""
+    even = NullControl(np.linspace(-3.0, 0.0, 101), None)
+    assert np.sum(even.against > even.needed_from) == 2
+    assert NullControl(np.full(100, 9.0), None).needed_from == pytest.approx(np.log(9.0))
+
+
+def test_fewer_null_sets_are_made_where_chance_is_certain(small):
+    """Odds at the middle of the null are judged by the first hundred; what may be needed asks for all of them."""
+    ground, _ = small
+    whole = null_control(ground, np.random.default_rng(8), 500)
+    middle, top = np.quantile(whole.against, [0.5, 0.99])
+    few = null_control(ground, np.random.default_rng(8), 500, middle)
+    assert few.against.size == len(few.residuals) == 100
+    np.testing.assert_array_equal(few.against, whole.against[:100])
+    assert middle < few.needed_from
+    assert null_control(ground, np.random.default_rng(8), 500, top).against.size == 500
+    assert null_control(ground, np.random.default_rng(8), 250).against.size == 250
+
+
+@pytest.mark.parametrize(("larger", "stops"), [(6, False), (7, True)])
+def test_chance_is_certain_from_the_lower_bound_of_the_share_on(larger, stops):
+    """Of a hundred sets: the bound of 99 % is 0.0180 with six above, 0.0238 with seven."""
+    low, _ = _share(np.arange(100) < larger)
+    assert (low > FALSE_ALARMS) is stops
+
+
+def test_bounds_of_a_share_are_those_of_the_binomial_distribution():
+    low, high = _share(np.arange(100) < 5)
+    assert binom.sf(4, 100, low) == pytest.approx(0.01)
+    assert binom.cdf(5, 100, high) == pytest.approx(0.01)
+    assert _share(np.zeros(100, dtype=bool)) == (0.0, pytest.approx(1.0 - 0.01**0.01))
+    assert _share(np.ones(100, dtype=bool)) == (pytest.approx(0.01**0.01), 1.0)
+
+
+@pytest.mark.parametrize(("place", "n"), [(0.0, 100), (0.5, 100), (0.05, 300)])
+def test_fewer_sets_are_made_to_choose_where_the_threshold_is_clearly_passed_or_missed(small, place, n):
+    """Below all of them or in their middle a hundred are enough; at the threshold itself all are needed."""
+    ground, _ = small
+    control = null_control(ground, np.random.default_rng(8), 300)
+    whole = made_to_choose(ground, control)
+    board = np.quantile(whole.ratio, place) if place else 0.9 * whole.ratio.min()
+    found = made_to_choose(ground, control, float(board))
+    assert found.ratio.size == n
+    np.testing.assert_array_equal(found.ratio, whole.ratio[:n])
+    if place != 0.05:
+        assert (board < found.ratio_to_beat) == (board < whole.ratio_to_beat) == (place == 0.0)
+
+
+def test_null_sets_are_made_to_choose(small):
+    """Else hardly any would, and the ratio of those that choose nothing is one."""
+    ground, _ = small
+    residuals = noise_of_board(ground.baseline, np.random.default_rng(7), 100)
+    forced, free = nested(ground, residuals, ALWAYS), nested(ground, residuals)
+    assert np.all(forced.chosen == 1)
+    assert np.mean(free.chosen == 0) > 0.8
+    control = made_to_choose(ground, null_control(ground, np.random.default_rng(7), 100))
+    np.testing.assert_allclose(control.ratio, forced.ratio)
+    assert control.ratio_to_beat < 1.0 < np.quantile(control.ratio, 0.95)
+    assert control.ratio_to_beat == pytest.approx(np.quantile(forced.ratio, 0.05))
+    assert control.place_of(control.ratio_to_beat) == pytest.approx(95.0, abs=1.1)
+
+
+@pytest.mark.parametrize(("change", "prior"), [({"width": 0.5}, "width"), ({"width": 2.0}, "width"),
+                                               ({"noise": 1.5}, "noise")])  # fmt: skip
+def test_a_variant_is_the_search_with_that_prior(change, prior):
+    """The same as a search whose candidate was made with the other prior, or whose card has another noise."""
+    base = baseline(np.random.default_rng(1))
+    direction = 0.03 * np.random.default_rng(2).standard_normal(6)
+    residual = 0.02 * np.random.default_rng(3).standard_normal(6)
+
+    def searched(sd: float, noise: float):
+        one = candidate(base, "a", direction, Quantity.from_mean(0.0, sd, "normal"), n_cells=99)
+        levels = noise_grid(base.board)
+        levels = replace(levels, sd=noise * levels.sd)
+        ground = ground_of(
+            base, bare(base, levels), Hypothesis(("a",), 0.4, one.fine, levels, base), candidates={"a": one}
+        )
+        return search(ground, residual)
+
+    usual = searched(1.0, 1.0)
+    wanted = searched(change.get("width", 1.0), change.get("noise", 1.0))
+    found = varied(usual, **change)
+    assert found.none == pytest.approx(wanted.none, rel=0.02)
+    np.testing.assert_allclose(found.log_evidence, wanted.log_evidence, atol=0.05)
+    assert np.abs(found.log_evidence - usual.log_evidence).max() > 0.2  # control: the prior matters
+
+
+def test_a_name_has_to_survive_widths_and_noises(small):
+    ground, _ = small
+    found = search(ground, 0.01 * np.random.default_rng(3).standard_normal(6))
+    told = list(variants(found))
+    assert [words for words, _ in told] == [
+        "with the priors of the sizes halved", "with the priors of the sizes doubled",
+        "if the noise is 1.5 times smaller", "if the noise is 1.5 times larger", "under the exact law",
+    ]  # fmt: skip
+    usual = [
+        varied(found, **change).none for change in ({"width": 0.5}, {"width": 2.0}, {"noise": 2 / 3}, {"noise": 1.5})
+    ]
+    assert [other.none for _, other in told[:-1]] == pytest.approx(usual)
+    assert told[-1][1] is under_exact_law(found)
+    assert len({round(other.none, 6) for _, other in told[:-1]} | {round(found.none, 6)}) == 5

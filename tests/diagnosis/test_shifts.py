@@ -1,0 +1,217 @@
+"""Tables of shifts against boards that are solved in full and fitted again, at sizes that are no points of the grid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from full_refits import full_refit
+from made_searches import baseline
+
+from bayesplate.diagnosis.baseline import baseline_of
+from bayesplate.diagnosis.forms import forms, with_forms
+from bayesplate.diagnosis.laws import FormLaw, form_law
+from bayesplate.diagnosis.search import prepare_search, search
+from bayesplate.diagnosis.shifts import refitted, tabulate
+from bayesplate.diagnosis.signatures import Signature, signature, signatures
+from bayesplate.frequencies.laws import cents
+from bayesplate.workflow.problem import Problem
+
+CENT = 1.0
+FAR = 0.7
+"""Change of ln D up to which the reduced law of a form holds: it is trained within three sd of the fit."""
+_LIKELY = 2.0
+
+
+def random_place(form, rng):
+    """Standard coordinates of the free parameters: (1, n_parameters) array, within two sd and the bounds."""
+    place = []
+    for free in form.free:
+        bounds = (free.prior.standard(bound) for bound in (free.prior.lower, free.prior.upper))
+        low, high = (np.clip(float(bound), -_LIKELY, _LIKELY) for bound in bounds)
+        place.append(rng.uniform(low, high))
+    return np.array(place).reshape(1, -1)
+
+
+def values_at(form, z):
+    return {free.name: float(free.prior.value(z[0, i])) for i, free in enumerate(form.free)}
+
+
+def on_tangent(table, index, form, z):
+    """The table's shift at a place: from the nearest cell along its tangents, whose unit is half a cell."""
+    own = np.flatnonzero(table.form == index)
+    n = len(form.free)
+    at = table.z[own][:, :n]
+    nearest = int(np.argmin(((at - z) ** 2).sum(axis=1)))
+    half = [0.5 * np.min(np.diff(np.unique(at[:, i]))) for i in range(n)]
+    steps = (z[0] - at[nearest]) / half
+    return table.shift[own[nearest]] + table.slopes[own[nearest], :, :n] @ steps
+
+
+def compared(ground, rng, n_forms):
+    """Name, error of the table in cents, and how far the constants went, for one random size of each form."""
+    base = ground.baseline
+    for name, one in ground.candidates.items():
+        for index, law in enumerate(one.laws[:n_forms]):
+            z = random_place(law.form, rng)
+            exact, moved = full_refit(base, law.form.board, values_at(law.form, z), 1 / base.scales)
+            found = on_tangent(one.fine, index, law.form, z)
+            yield name, float(np.abs(cents(found - exact)).max()), float(np.abs(moved).max()), exact
+
+
+def test_every_effect_on_the_cantilever_is_as_full_solves_have_it(finnish):
+    shown = 0
+    for name, error, moved, exact in compared(finnish.ground, np.random.default_rng(1), 1):
+        assert moved < FAR, name
+        assert error < CENT, name
+        shown += np.abs(cents(exact)).max() > 5.0 * CENT
+    assert shown >= 4  # else the comparison would say nothing
+
+
+class NoPlate(FormLaw):
+    """Frequencies of an effect that leaves no plate whatever its size, as a Poisson ratio beyond what D_y allows."""
+
+    def every_log_frequency(self, baseline, log_rigidities, values):
+        return np.full((len(log_rigidities), baseline.every.log_frequency.size), np.nan)
+
+
+def test_an_effect_that_leaves_no_plate_is_not_tried(finnish_few):
+    def solve(base, form):
+        law = form_law(base, form)
+        return NoPlate(form, law.models) if form.effect == "poisson_ratio" else law
+
+    pair = ("poisson_ratio", "density_gradient")
+    for tried, left in ((pair, ["density_gradient"]), (pair[:1], [])):
+        found = search(prepare_search(finnish_few.ground.baseline, solve, tried=tried))
+        assert list(found.ground.candidates) == left
+        assert found.probability.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_every_effect_on_the_clamped_board_is_as_full_solves_have_it(fiemme):
+    """An effect that needs the constants to change by a factor of two leaves the region for which its law is made."""
+    near = [
+        (name, error) for name, error, moved, _ in compared(fiemme.ground, np.random.default_rng(2), 2) if moved < FAR
+    ]
+    assert len(near) >= 8
+    assert all(error < CENT for _, error in near), near
+
+
+def test_another_size_is_not_within_a_cent(finnish):
+    """Negative control: the comparison sees a change of the size by a tenth of its prior."""
+    (law,) = finnish.ground.candidates["fluid_loading"].laws
+    z = np.zeros((1, 1))
+    base = finnish.ground.baseline
+    exact, _ = full_refit(base, law.form.board, values_at(law.form, z + 0.3), 1 / base.scales)
+    shift, _ = refitted(base, law, z)
+    assert np.abs(cents(shift - exact)).max() > CENT
+
+
+def test_the_constants_absorb_nothing_of_what_is_tabulated(finnish):
+    """To a cent, at sizes up to one sd; beyond, the step that serves the bare board may not settle."""
+    base = finnish.ground.baseline
+    for one in finnish.ground.candidates.values():
+        kept = np.abs(one.fine.z).max(axis=1, initial=0.0) <= 1.0
+        assert np.abs(cents(one.fine.shift[kept] @ base.absorbing.T)).max() < CENT
+        assert one.fine.weights.sum() == pytest.approx(1.0)
+        assert one.coarse.weights.sum() == pytest.approx(1.0)
+
+
+def test_the_cells_hold_the_prior(finnish):
+    """Mean of the size over cells is the prior's, at the accuracy of the middle rule and of a reach of three sd."""
+    one = finnish.ground.candidates["clamp_translation"]
+    (free,) = one.laws[0].form.free
+    mean = float(one.fine.weights @ free.prior.value(one.fine.z[:, 0]))
+    assert mean == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.01)
+    coarse = float(one.coarse.weights @ free.prior.value(one.coarse.z[:, 0]))
+    assert coarse == pytest.approx(free.prior.sd * np.sqrt(2 / np.pi), rel=0.02)
+
+
+def test_two_effects_add_on_the_cantilever(finnish):
+    """At nominal sizes, against the joint full solve: to a tenth of the noise there."""
+    ground, base = finnish.ground, finnish.ground.baseline
+    assert len(ground.paired) >= 2
+    for names in combinations(ground.paired, 2):
+        laws = [ground.candidates[name].laws[0] for name in names]
+        total, at = np.zeros(base.n_modes), {}
+        for law in laws:
+            z = np.array([[float(free.prior.standard(free.nominal)) for free in law.form.free]]).reshape(1, -1)
+            total = total + refitted(base, law, z)[0][0]
+            at |= values_at(law.form, z)
+        exact, _ = full_refit(base, with_forms(base.board, [law.form for law in laws]), at, 1 / base.scales)
+        assert np.abs((total - exact) / base.scales).max() < 0.1, names
+        alone = refitted(base, laws[0], np.zeros((1, len(laws[0].form.free))))[0][0]
+        assert np.abs((alone - exact) / base.scales).max() > 0.1, names
+
+
+@pytest.mark.parametrize("name", ["fluid_loading", "thickness_profile", "grain_angle"])
+def test_a_law_made_for_another_board_serves_once_its_modes_are_placed(finnish, name):
+    """The same sizes, constants half as large again: made there with a wide region, placed here."""
+    base = finnish.ground.baseline
+    elsewhere = base.log_rigidities + np.array([0.3, -0.2, 0.1])
+    values = {**base.values, **dict(zip(("D_x", "D_y", "D_s"), np.exp(elsewhere), strict=True))}
+    far = replace(base, log_rigidities=elsewhere, values=values)
+    form = finnish.ground.candidates[name].laws[0].form
+    placed = form_law(far, form, half_width=0.8).placed(base)
+    own = finnish.ground.candidates[name].laws[0]
+    assert tabulate(base, [placed]).shift == pytest.approx(tabulate(base, [own]).shift, abs=CENT * np.log(2) / 1200)
+
+
+def test_signatures_and_tables_tell_the_same_of_every_effect(finnish):
+    """`check` and `diagnose` show the same numbers, from full solves and from reduced models."""
+    ground, problem = finnish.ground, finnish.problem
+    for name, one in ground.candidates.items():
+        if name == "attached_mass":  # the card names no item: the search tries places that signatures do not know
+            continue
+        if name == "warp":  # the search tries curvatures and a twist apart, a signature is that of all together
+            continue
+        (here,) = signatures(problem, [name])
+        assert one.signature.raw == pytest.approx(here.raw, abs=0.3), name
+        assert one.signature.visible == pytest.approx(here.visible, abs=0.3), name
+        assert one.signature.bias_percent == pytest.approx(here.bias_percent, abs=0.1), name
+        assert one.signature.detection_limit_cents == pytest.approx(here.detection_limit_cents), name
+
+
+@pytest.mark.parametrize("weights", [(1.0,) * 6, (8.0, 4.0, 1.0, 1.0, 1.0, 0.5)])
+def test_a_visible_part_is_never_larger_than_the_whole_shift(weights):
+    """In the weights of the fit. By plain squares it can be: who weighs by them sees the fit make things worse."""
+    base = baseline(np.random.default_rng(1))
+    scales = base.scales * np.array(weights)
+    base.__dict__["scales"] = scales  # as a card with an uncertain reading has them
+    shifts = 0.02 * np.random.default_rng(2).standard_normal((200, 6))
+    parts = [base.refitted_to(shift)[0] for shift in shifts]
+
+    seen = [Signature("", {}, a, b, {}, scales) for a, b in zip(shifts, parts, strict=True)]
+    assert all(one.visible_rms <= one.raw_rms for one in seen)
+    plain = [np.linalg.norm(b) > np.linalg.norm(a) for a, b in zip(shifts, parts, strict=True)]
+    assert any(plain) is (len(set(weights)) > 1)
+    two = Signature("", {}, np.array([3.0, 1.0]), np.zeros(2), {}, np.array([1.0, 2.0]))
+    assert two.raw_rms == pytest.approx(np.sqrt((9 + 0.25) / 1.25))
+
+
+@pytest.fixture(scope="module")
+def uneven():
+    """A measured board of uneven thickness."""
+    return Problem.from_card("spruce-free-3L").posed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["grain_angle", "support_stiffness"])
+def test_on_a_measured_board_of_uneven_thickness_an_effect_shows_less_than_it_shifts(uneven, name):
+    """Near a veering, where a few steps of a linear refit leave more than the shift; and on a bed that lifts the board.
+
+    The bed resists the rigid motions, which an uneven board mixes into its modes: no rigid motion is taken for a mode.
+    """
+    base = baseline_of(uneven)
+    law = form_law(base, forms(base.board)[name][0]).placed(base)
+    nominal = {one.name: np.array([one.nominal]) for one in law.form.free}
+    there = law.log_frequencies(base, base.log_rigidities[None, :], nominal)[0]
+    found = signature(base, name, law.form.free, there)
+    (told,) = signatures(uneven, [name])
+
+    assert 0.5 < found.visible_rms / found.raw_rms < 1.0
+    assert told.visible_rms < told.raw_rms
+    assert found.raw == pytest.approx(told.raw, abs=0.3)
+    assert found.visible == pytest.approx(told.visible, abs=0.3)

@@ -1,0 +1,364 @@
+"""What is said of a diagnosis: one word list for terminal, page, figures and files, and JSON as the contract has it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import fields, replace
+from typing import get_args
+
+import pytest
+from diagnoses import AFTER, AIR, BEFORE, DIAGNOSES, EXCHANGE, GRAIN, NEXT, TENSION, candidate
+from read_pages import Read
+
+from bayesplate.diagnosis.candidates import Amplitude
+from bayesplate.diagnosis.result import Errors, diagnosis_json
+from bayesplate.diagnosis.tables import (
+    answers_table,
+    averaged_table,
+    before_after_table,
+    candidates_table,
+    errors_table,
+    shift_table,
+    sizes_table,
+)
+from bayesplate.diagnosis.told import (
+    alike_sentence,
+    headline_sentence,
+    known_sentences,
+    remarks,
+    shown_model,
+    verdict_sentence,
+    verdict_sentences,
+    warnings,
+)
+from bayesplate.diagnosis.verdict import Word
+from bayesplate.diagnosis.words import MERITS, VERDICTS, claim_sentence, meaning
+from bayesplate.results.tables import render
+from bayesplate.workflow.shown import show_diagnosis
+
+KEYS = [
+    "format", "name", "seed", "card_sha256", "verdict", "claim", "conditions", "effects", "refitted", "reason",
+    "sentences", "declared", "known", "stated_claims", "probability_of_none", "probability_of_none_with_halved_priors",
+    "probability_of_none_with_doubled_priors", "p_value", "before", "after", "gain_null_percentile", "null_control",
+    "elastic_shift", "finalists", "elastic_averaged", "answers", "candidates", "recommendation", "notes",
+    "named_in_part", "carrying_modes",
+]  # fmt: skip
+ERRORS = [
+    "in_sample_rms_cents", "leave_one_out_rms_cents", "nested_leave_one_out_rms_cents", "log_score", "hits_90",
+]  # fmt: skip
+EFFECT = [
+    "name", "setup", "raw_rms_cents", "visible_rms_cents", "visible_cents", "below_detection_limit", "bias_percent",
+    "inclusion_probability", "inclusion_probability_with_doubled_priors", "log_bayes_factor", "ockham_log_factor",
+    "p_value", "amplitude", "learnt_bits", "look_alikes", "rejected_because",
+]  # fmt: skip
+EXCHANGED = [
+    "name", "setup", "labels", "raw_rms_cents", "visible_rms_cents", "bias_percent", "inclusion_probability",
+    "log_bayes_factor", "amplitude", "look_alikes", "rejected_because",
+]  # fmt: skip
+NAMED = replace(DIAGNOSES["named"], candidates=(TENSION, AIR, GRAIN, EXCHANGE))
+
+
+def test_the_json_has_the_names_and_the_order_of_the_contract():
+    """Files of this format are read by others: a name that is changed here breaks their scripts."""
+    content = diagnosis_json(NAMED)
+
+    assert list(content) == KEYS
+    assert list(content["before"]) == list(content["after"]) == ERRORS
+    assert [list(one) for one in content["candidates"]] == [EFFECT, EFFECT, EFFECT, EXCHANGED]
+    assert list(content["candidates"][0]["amplitude"]) == ["parameter", "form", "q05", "q50", "q95", "unit"]
+    assert [list(one) for one in content["known"]] == 5 * [
+        [
+            "effects", "without", "in_sample_rms_cents", "leave_one_out_rms_cents", "change_percent", "combination",
+            "n_left_out", "n_readings",
+        ]
+    ]  # fmt: skip
+    assert [list(one) for one in content["stated_claims"]] == [[
+        "effects", "predicts", "before_rms_cents", "after_rms_cents", "log_score_gain", "standard_error", "n_modes",
+        "holds",
+    ]]  # fmt: skip
+    assert list(content["known"][0]["change_percent"]) == ["E_x", "E_y", "G_xy"]
+    assert list(content["p_value"]) == ["before", "after"]
+    assert list(content["null_control"]) == [
+        "n_sets",
+        "flagged_percent",
+        "log_odds",
+        "log_odds_needed",
+        "log_odds_of_sets",
+        "nested_ratio",
+        "nested_ratio_to_beat",
+        "nested_ratio_percentile",
+        "nested_ratio_of_sets",
+    ]
+    assert list(content["elastic_shift"]["E_x"]) == ["before", "after", "shift_in_sd"]
+    spread = ["mean", "sd", "q05", "q25", "q50", "q75", "q95", "unit"]
+    assert list(content["elastic_averaged"]["G_xy"]) == spread
+    assert list(content["answers"][0]) == ["effects", "probability"]
+    (finalist,) = content["finalists"]
+    assert list(finalist) == [
+        "effects", "probability", "in_sample_rms_cents", "leave_one_out_rms_cents", "elastic", "sizes",
+    ]  # fmt: skip
+    assert list(finalist["sizes"]["clamped"]["membrane_tension"]["tension"]) == spread
+
+
+def test_the_json_has_the_values_and_nothing_that_json_lacks():
+    content = diagnosis_json(NAMED)
+
+    assert json.loads(json.dumps(content, allow_nan=False)) == content
+    assert content["format"] == 1
+    assert content["effects"] == ["membrane_tension"]
+    assert content["before"]["log_score"] == -24.75
+    assert content["candidates"][3]["labels"] == ["(1,0)", "(0,1)"]
+    assert content["candidates"][3]["bias_percent"] is None
+
+
+def test_every_word_of_the_verdict_and_every_error_has_its_words():
+    assert set(VERDICTS) == set(get_args(Word))
+    read = [one.of(Errors(**{name: i for i, name in enumerate(ERRORS)})) for one in MERITS]
+    assert read == list(range(len(fields(Errors))))
+
+
+@pytest.mark.parametrize(
+    ("word", "words"),
+    [
+        ("none needed", "no more than their noise would make them"),
+        ("named", "point to membrane tension. The reason: the reason of it. The error of the prediction is reduced: "
+         "the left-out error fell from 46 to 12 cents, and every condition of that claim is met."),
+        ("indistinguishable group", "cannot tell which: membrane tension or fluid loading."),
+        ("unexplained", "no effect that was tried explains it"),
+        ("undetectable", "could not show them even if they were there"),
+    ],
+)  # fmt: skip
+def test_the_terminal_and_the_page_tell_the_same(word, words):
+    one = DIAGNOSES[word]
+    closing = verdict_sentence(one)
+
+    assert closing.startswith(f"Verdict: {word}. {verdict_sentences(one)[0]}")
+    assert words in closing
+    assert ("reduced" in closing) is one.claim
+    assert ("No improvement is claimed" in closing) is (one.is_refitted and not one.claim)
+    assert verdict_sentences(one)[-1] == closing[-len(verdict_sentences(one)[-1]) :] or not one.is_refitted
+
+
+def test_the_page_says_what_its_constants_are():
+    assert remarks(replace(NAMED, notes=("mind this",))) == ["The reason: the reason of it.", "mind this"]
+    assert shown_model(NAMED).endswith("averaged ones; all else below is of the model with membrane tension.")
+    assert "only one of the explanations. Quote the averaged" in shown_model(DIAGNOSES["indistinguishable group"])
+    assert shown_model(DIAGNOSES["none needed"]) == shown_model(DIAGNOSES["unexplained"]) == ""
+    for word, one in DIAGNOSES.items():
+        assert ("averaged" in headline_sentence(one)) is (word != "unexplained")
+        assert ("averaged" in averaged_table(one).title) is (word != "unexplained")
+        assert ("too narrow" in " ".join(warnings(one))) is (word == "unexplained")
+        assert show_diagnosis(one).tables[0] == averaged_table(one)
+        assert warnings(replace(one, notes=("mind this",)))[-1] == "mind this"
+    assert show_diagnosis(DIAGNOSES["unexplained"]).warnings == tuple(warnings(DIAGNOSES["unexplained"]))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        (53.2, 61.4, "The left-out error rose from 53 to 61 cents. No improvement is claimed."),
+        (53.2, 53.4, "The left-out error stayed at 53 cents. No improvement is claimed."),
+        (5.2, 5.44, "The left-out error rose from 5.2 to 5.4 cents. No improvement is claimed."),
+        (61.4, 53.2, "The left-out error fell from 61 to 53 cents. No improvement is claimed: the readings left out "
+         "are not predicted better beyond two standard errors."),
+    ],
+)  # fmt: skip
+def test_an_error_that_rises_is_said_to_rise(before, after, words):
+    one = replace(
+        DIAGNOSES["indistinguishable group"],
+        before=replace(BEFORE, nested_leave_one_out_rms_cents=before),
+        after=replace(AFTER, nested_leave_one_out_rms_cents=after),
+    )
+    assert claim_sentence(one) == words
+
+
+def test_with_too_few_readings_the_error_that_both_models_have_is_told():
+    few = {"nested_leave_one_out_rms_cents": None}
+    one = replace(DIAGNOSES["indistinguishable group"], before=replace(BEFORE, **few), after=replace(AFTER, **few))
+    assert claim_sentence(one).startswith("The left-out error fell from 46.5 to 9.5 cents")
+    fewer = few | {"leave_one_out_rms_cents": None}
+    one = replace(one, before=replace(BEFORE, **fewer), after=replace(AFTER, **fewer))
+    assert claim_sentence(one).startswith("The error in the fit fell from 21.2 to 4.2 cents")
+
+
+def test_conditions_that_too_few_readings_leave_open_are_not_said_to_fail():
+    """Nothing was chosen anew without a reading, and so nothing is known of what that would have given."""
+    group = DIAGNOSES["indistinguishable group"]
+    unjudged = {"chance selection", "log score"}
+    few = [replace(c, value=None, limit=None, is_met=False) if c.name in unjudged else c for c in group.conditions]
+    assert claim_sentence(replace(group, conditions=tuple(few))).endswith(
+        "No improvement is claimed: the readings are too few to choose anew without each of them."
+    )
+
+
+def test_the_probabilities_sum_to_one_as_they_are_printed():
+    table = answers_table(NAMED)
+    assert (table.columns, table.texts) == (
+        ("explanation", "probability"),
+        (("nothing is lacking", "0.020"), ("membrane tension", "0.970"), ("any of 2 others", "0.010")),
+    )
+    thirds = [replace(NAMED.answers[0], probability=share, words=f"{i}") for i, share in enumerate((1 / 3, 1 / 3))]
+    shares = [row[1] for row in answers_table(replace(NAMED, probability_of_none=1 / 3, answers=tuple(thirds))).texts]
+    assert sorted(shares) == ["0.333", "0.333", "0.334"]
+
+
+def test_what_looks_like_the_named_effect_is_told():
+    alike = replace(TENSION, look_alikes=("fluid_loading", "attached_mass"))
+    one = replace(NAMED, candidates=(alike, AIR))
+    assert alike_sentence(one).startswith(
+        "Fluid loading and attached mass would look much the same (likeness above 0.95)"
+    )
+    assert alike_sentence(one) in verdict_sentences(one)
+    assert alike_sentence(one) in show_diagnosis(one).remarks
+    both = replace(one, effects=("membrane_tension", "fluid_loading"), candidates=(alike, AIR))
+    assert alike_sentence(both).startswith("Attached mass would look")  # a member of the verdict is no rival
+    assert alike_sentence(NAMED) == alike_sentence(replace(one, verdict="indistinguishable group")) == ""
+
+
+@pytest.mark.parametrize(
+    ("unit", "sizes", "shown"),
+    [
+        ("kg", (1e-4, 8e-4, 1.8e-3), "mass 0.8 g (0.1 to 1.8)"),
+        ("rad", (0.01745329, 0.03490659, 0.05235988), "mass 2 degrees (1 to 3)"),
+        ("Pa", (6.2e8, 6.2e8, 6.2e8), "mass 0.62 GPa (fixed)"),
+        ("m", (1e-4, 2e-4, 3e-4), "mass 0.2 mm (0.1 to 0.3)"),
+        ("1", (0.1, 0.2, 0.3), "mass 0.2 (0.1 to 0.3)"),
+        ("kg", (2.5, 8.3, 44.5), "mass 8300 g (2500 to 44500)"),
+        ("1", (-0.1, 1e-9, 0.1), "mass 0 (-0.1 to 0.1)"),
+    ],
+)
+def test_sizes_have_the_units_of_people(unit, sizes, shown):
+    low, middle, high = sizes
+    size = Amplitude(parameter="mass", form="", q05=low, q50=middle, q95=high, unit=unit)
+    one = replace(NAMED, candidates=(replace(TENSION, amplitude=size),))
+    for narrow in (False, True):
+        table = candidates_table(one, narrow=narrow)
+        assert dict(zip(table.columns, table.texts[0], strict=True))["size (90 %)"] == shown
+
+
+def test_the_sizes_of_what_was_fitted_again():
+    assert sizes_table(NAMED).texts == (("membrane tension, clamped", "tension", "120 ± 12 N/m", "102 to 138 N/m"),)
+    assert sizes_table(DIAGNOSES["none needed"]) is None
+
+
+def test_where_two_explanations_were_fitted_each_size_says_in_which_it_was():
+    """The same effect alone and beside another has two sizes, which nobody could tell apart otherwise."""
+    (alone,) = NAMED.finalists
+    both = replace(alone, effects=(*alone.effects, "fluid_loading"))
+    table = sizes_table(replace(NAMED, finalists=(both, alone)))
+
+    assert table.columns[:2] == ("fitted with", "effect")
+    assert [row[0] for row in table.texts] == ["membrane tension and fluid loading", "membrane tension"]
+    assert {row[1] for row in table.texts} == {"membrane tension, clamped"}
+
+
+def test_errors_before_and_after_or_as_they_are():
+    both, alone = errors_table(NAMED), errors_table(DIAGNOSES["none needed"])
+
+    assert (both.title, both.columns) == ("Error before and after: a-board", ("", "before", "after: membrane tension"))
+    assert both.texts == (
+        ("error in the fit, rms cents", "21.2", "4.2"),
+        ("error of a mode left out, rms cents", "46.5", "9.5"),
+        ("error left out, search and all, rms cents", "46.5", "12.5"),
+        ("log score", "-24.75", "-15.50"),
+        ("readings inside their 90 % intervals", "50 %", "100 %"),
+    )
+    assert (alone.title, alone.columns) == ("Error: a-board", ("", "as it is"))
+    assert [row[1] for row in alone.texts] == [row[1] for row in both.texts]
+    unknown = replace(DIAGNOSES["none needed"], before=replace(BEFORE, leave_one_out_rms_cents=None))
+    assert errors_table(unknown).texts[1][1] == "–"
+
+
+def test_constants_shift_only_where_something_was_added():
+    assert shift_table(NAMED).texts[0] == ("E_x, along grain", "10.25", "11.50", "+2.5")
+    assert shift_table(DIAGNOSES["none needed"]) is None
+    assert averaged_table(NAMED).texts[0] == ("E_x, along grain", "10.2 ± 1.0", "8.7 to 11.8")
+
+
+def test_candidates_stand_in_the_order_of_their_probability():
+    wide, narrow = candidates_table(NAMED), candidates_table(NAMED, narrow=True)
+    by_name = {row[0]: dict(zip(wide.columns, row, strict=True)) for row in wide.texts}
+
+    assert list(by_name) == ["membrane tension", "relabelling (1,0) and (0,1)", "fluid loading", "grain angle"]
+    assert by_name["membrane tension"] == {
+        "effect": "membrane tension", "shift": "45.0", "visible": "12.5", "inclusion probability": "0.970",
+        "E_x / E_y / G_xy off by, %": "+1.5 / -2.5 / +0.5", "size (90 %)": "tension 120 N/m (10 to 230)",
+        "looks like": "–", "rejected because": "–",
+    }  # fmt: skip
+    assert by_name["fluid loading"]["looks like"] == "attached mass"
+    assert by_name["fluid loading"]["size (90 %)"] == by_name["relabelling (1,0) and (0,1)"]["shift"] == "–"
+    assert narrow.texts[0][-2:] == ("tension 120 N/m (10 to 230)", "in the verdict")
+    assert not any("probab" in column for column in narrow.columns)
+    assert [row[-1] for row in narrow.texts] == ["in the verdict", "less probable", "not detectable", "less probable"]
+    assert candidates_table(DIAGNOSES["undetectable"]) is None
+
+
+def test_an_exchange_of_labels_that_is_out_of_the_question_is_not_shown():
+    """Any two neighbours are a candidate: from one per cent on they are shown."""
+    for share, shown in ((0.0099, False), (0.01, True)):
+        one = replace(NAMED, candidates=(TENSION, replace(EXCHANGE, inclusion_probability=share)))
+        assert (len(candidates_table(one).texts) == 2) is shown
+
+
+def test_a_setup_is_named_where_there_are_several():
+    several = replace(NAMED, candidates=(candidate("fluid_loading", "one"), candidate("fluid_loading", "two")))
+    assert [row[0] for row in candidates_table(several).texts] == ["fluid loading, one", "fluid loading, two"]
+
+
+def test_the_terminal_shows_only_tables_that_there_are():
+    shown, bare = show_diagnosis(NAMED), show_diagnosis(DIAGNOSES["undetectable"])
+    assert [table.title.partition(":")[0] for table in shown.tables] == [
+        "The constants, averaged over all explanations by their probability, GPa",
+        "What physics knows, computed and not fitted", "What may be the case", "Error before and after",
+        "May a lower error be claimed? Only if every condition is met",
+        "Shift of the constants by membrane tension, GPa", "Sizes of what was fitted again",
+        "Candidates at their usual size",
+    ]  # fmt: skip
+    assert [table.title for table in bare.tables[1:]] == ["What may be the case", "Error: a-board"]
+    assert shown.remarks == (*known_sentences(NAMED), *NAMED.sentences, NEXT)
+    assert bare.remarks == (NEXT,)
+
+
+def test_before_and_after_in_one_csv():
+    header, *rows = csv.reader(io.StringIO(render(before_after_table(DIAGNOSES["named"]), "csv")))
+    by_name = {row[0]: dict(zip(header, row, strict=True)) for row in rows}
+
+    assert by_name["error in the fit, rms cents"] | {"quantity": ""} == {
+        "quantity": "", "before": "21.25", "after": "4.25", "shift_in_sd": "", "averaged": "", "averaged_sd": "",
+    }  # fmt: skip
+    assert float(by_name["E_x, GPa"]["averaged"]) == pytest.approx(10.25)
+    assert float(by_name["E_x, GPa"]["averaged_sd"]) == pytest.approx(1.025)
+    assert by_name["membrane tension tension, clamped, N/m"]["after"] == "120.0"
+    assert float(by_name["E_x, GPa"]["before"]) == pytest.approx(10.25)
+    assert float(by_name["E_x, GPa"]["shift_in_sd"]) == 2.5
+
+
+def test_the_latex_by_hand():
+    undetectable = before_after_table(replace(DIAGNOSES["undetectable"], before=replace(BEFORE, log_score=None)))
+    named = render(before_after_table(NAMED), "latex")
+
+    assert "after" not in render(undetectable, "latex").partition("\n")[2]
+    assert render(undetectable, "csv").splitlines()[0] == "quantity,before,averaged,averaged_sd"
+    assert r"$E_{x}$, GPa & 10.25 & 11.50 & $+2.5$ & 10.2 $\pm$ 1.0 \\" in named
+    assert r"membrane tension tension, clamped, N/m & -- & 120 & -- & -- \\" in named
+    assert r"log score & -- & -- \\" in render(undetectable, "latex")
+
+
+def test_it_shows_itself():
+    assert repr(NAMED) == "<Diagnosis of a-board, named: membrane_tension, error reduced>"
+    assert repr(DIAGNOSES["none needed"]) == "<Diagnosis of a-board, none needed>"
+    page = Read(NAMED._repr_html_())
+    assert len(page.all("table")) == 8
+    assert all(sentence in page.text for sentence in known_sentences(NAMED))
+    for words in ("An effect was found", "point to membrane tension", "46.5", f"{AFTER.leave_one_out_rms_cents}", NEXT):
+        assert words in page.text
+
+
+def test_a_plate_with_declared_effects_is_not_called_ideal():
+    calm = DIAGNOSES["none needed"]
+    assert meaning(calm).startswith("The readings differ from those of an ideal plate by no more than their noise")
+    told = meaning(replace(calm, declared=("grain_angle", "fluid_loading")))
+    assert "those of a plate with grain angle and fluid loading by no more than" in told
+    assert "No further effect is needed" in told
