@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bayesplate.cards import load_board
+from bayesplate.board.board_card import load_board
 
 EDGES = '{ x0 = "clamped", x1 = "clamped", y0 = "clamped", y1 = "clamped" }'
 HERTZ = {"(0,0)": 57.0, "(0,1)": 100.0, "(1,0)": 130.0, "(1,1)": 162.0, "(0,2)": 170.0, "(1,2)": 224.0}

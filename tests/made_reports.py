@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bayesplate.cards import BoardCard
+from bayesplate.board.board_card import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws

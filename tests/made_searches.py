@@ -8,6 +8,11 @@ from dataclasses import replace
 import numpy as np
 from made_boards import setup_of
 
+from bayesplate.board.board import made_board
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Reading
+from bayesplate.board.setup import Setup
 from bayesplate.diagnosis.decision.verdict import Verdict, decide
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid
@@ -20,10 +25,6 @@ from bayesplate.diagnosis.shifts.laws import FormLaw
 from bayesplate.diagnosis.shifts.tables import Table, nothing
 from bayesplate.labels import Label
 from bayesplate.modes.naming import Place
-from bayesplate.plate.board import made_board
-from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.plate.setup import Reading, Setup
-from bayesplate.quantities import Quantity
 
 FREE = {"x0": "free", "x1": "free", "y0": "free", "y1": "free"}
 NOISE = 0.005

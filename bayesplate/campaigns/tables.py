@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.campaigns.checking import CampaignCheck
 from bayesplate.campaigns.common import CommonResidual
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, words_of
 from bayesplate.campaigns.summary import CampaignSummary, PopulationSummary, SharedNumber
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.contract import Spread
 from bayesplate.results.tables import Table
 from bayesplate.results.words import GPA, MISSING, interval, narrow_name, number, percent, plus_minus

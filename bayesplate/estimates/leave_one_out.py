@@ -14,11 +14,11 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import effect_name, joined
 from bayesplate.estimates.refit import Bounds, Misfit, Predict, has_come_to_rest, n_constants, sensitivities
 from bayesplate.estimates.side_by_side import most_likely_of_each
-from bayesplate.plate.board import Board
 
 HIGH_LEVERAGE = 0.9
 """Share of a mode in its own prediction above which it alone carries a constant or a size."""

@@ -14,7 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.material import moduli
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.reading import Reading
+from bayesplate.board.reading_errors import reading_sd
+from bayesplate.board.setup import Setup
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
@@ -23,10 +28,6 @@ from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import HIGHEST_INDEX, Label
 from bayesplate.modes.beams import is_rigid
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import moduli
-from bayesplate.plate.readings import reading_sd
-from bayesplate.plate.setup import Reading, Setup
 
 Floats = NDArray[np.float64]
 Assignment = tuple[Label | None, ...]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values
 from bayesplate.effects import Effect
 from bayesplate.effects.attached_items import fractions_on, places_on
 from bayesplate.estimates.sheet import NUMBERS_OF_MODES, Sheet, points, sheet
@@ -27,7 +28,6 @@ from bayesplate.planning.plan import (
 from bayesplate.planning.proposals import Proposal, score
 from bayesplate.planning.station_laws import BareLaw
 from bayesplate.planning.stations import SEARCHED, Station
-from bayesplate.plate.board import Board, Values
 
 Floats = NDArray[np.float64]
 

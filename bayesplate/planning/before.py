@@ -7,7 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.errors import BayesplateError
 from bayesplate.frequencies.prior_bands import prior_medians, with_rigidities
 from bayesplate.planning.beliefs import N_TERMS, NOTHING_LACKS, Beliefs, Explanation, moduli_at
@@ -15,9 +18,6 @@ from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import levels
 from bayesplate.planning.station_laws import BareLaw, bare_law
 from bayesplate.planning.stations import Station
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI, RIGIDITIES
-from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]

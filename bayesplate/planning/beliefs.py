@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, RIGIDITIES, moduli
 from bayesplate.diagnosis.decision.verdict import Answer, answer_words
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.terms import Terms, normalised
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, RIGIDITIES, moduli
 from bayesplate.posterior.parameters import Parameters
 
 Floats = NDArray[np.float64]

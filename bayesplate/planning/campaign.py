@@ -9,16 +9,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, RIGIDITIES
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.setup import AttachedItem
 from bayesplate.campaigns.shared import Shared
-from bayesplate.cards import PriorCard
 from bayesplate.planning.assembled import BAND, KNOWN_NOW, MOST_BENCHES, Bench, bench_of
 from bayesplate.planning.inputs_read import WEIGHED_TO, measurements
 from bayesplate.planning.joint import BoardInJoint, Joint, board_in_joint, held_elsewhere
 from bayesplate.planning.plan import GainEntry, ProposalEntry, SequenceEntry
 from bayesplate.planning.proposals import CONSTANTS, FAINT, Costs
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, RIGIDITIES
-from bayesplate.plate.setup import AttachedItem
 
 Floats = NDArray[np.float64]
 

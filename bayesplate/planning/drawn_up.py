@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.decision.readings import wrong_reading
 from bayesplate.diagnosis.decision.verdict import Answer, answers
 from bayesplate.diagnosis.evidence.predictive import PASSES
@@ -18,7 +19,6 @@ from bayesplate.planning.gains import Gain
 from bayesplate.planning.proposals import Costs, Proposal, prior_proposals, proposals, sequences
 from bayesplate.planning.survivors import survivors
 from bayesplate.planning.words import first_line
-from bayesplate.plate.board import Board, Values
 
 _LINE = 17
 UNEXPLAINED = (

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.evidence.terms import log_sum, normalised
 from bayesplate.planning.beliefs import Beliefs, Explanation
-from bayesplate.plate.material import MODULI
 
 Floats = NDArray[np.float64]
 

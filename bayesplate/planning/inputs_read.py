@@ -10,12 +10,12 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.random_field import conditioned, sd_after, thickness_readings, width_readings
 from bayesplate.planning.beliefs import Beliefs
 from bayesplate.planning.gains import Readings
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter
-from bayesplate.plate.random_field import conditioned, sd_after, thickness_readings, width_readings
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

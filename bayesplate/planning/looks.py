@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.tables import Table
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.inputs_read import GRID, WEIGHED_TO
-from bayesplate.plate.board import Board
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

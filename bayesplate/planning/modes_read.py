@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading_errors import ReadingErrors
+from bayesplate.board.sessions import shared_share, unknown_discrepancies
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
@@ -15,9 +18,6 @@ from bayesplate.planning.looks import members_of
 from bayesplate.planning.shifts import EffectShift, Nodes, form_shift
 from bayesplate.planning.station_laws import BareLaw
 from bayesplate.planning.stations import Station
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import shared_share, unknown_discrepancies
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Effects = Mapping[str, EffectShift]

@@ -7,7 +7,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board, Values
+from bayesplate.board.material import MODULI
+from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.planning.before import prior_laws, prior_readings
 from bayesplate.planning.beliefs import Beliefs
@@ -18,8 +20,6 @@ from bayesplate.planning.modes_read import StationReadings, effect_shifts, stati
 from bayesplate.planning.shifts import nodes_of
 from bayesplate.planning.station_laws import BareLaw, bare_law, known_mass
 from bayesplate.planning.stations import Station, stations
-from bayesplate.plate.board import Board, Values
-from bayesplate.plate.material import MODULI
 
 EXPLANATIONS, CONSTANTS = "explanations", "constants"
 GOALS = (*MODULI, CONSTANTS, EXPLANATIONS)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from bayesplate.board.material import MODULI
 from bayesplate.effects.words import joined
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Gain
 from bayesplate.planning.plan import ProposalEntry
 from bayesplate.planning.proposals import CONSTANTS, EXPLANATIONS
-from bayesplate.plate.material import MODULI
 
 WORTH = 0.05
 """A gain below this, nats, is no reason to measure: an interval would shrink by less than a twentieth."""

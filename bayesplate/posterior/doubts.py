@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
 from bayesplate.posterior.slips import DECIMALS, OCTAVES, Slip, SlipSearch
 from bayesplate.posterior.target import Posterior
 

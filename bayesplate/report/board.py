@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board, Values, vibrating_lengths
+from bayesplate.board.setup import EDGES, Setup
 from bayesplate.frequencies.system import System, system_of
-from bayesplate.plate.board import Board, Values, vibrating_lengths
-from bayesplate.plate.setup import EDGES, Setup
 from bayesplate.report.colours import DARK, GREY, LIGHT, VERMILLION
 from bayesplate.report.style import SMALL, WIDTH, WORDS, Picture, placed, short
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from bayesplate.board.material import MODULI
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.campaigns.common import CommonResidual, clear_of_zero
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import shared_name
-from bayesplate.plate.material import MODULI
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.report.colours import BLUE, DARK, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis, claim_sentence
 from bayesplate.campaigns.summary import CampaignSummary
 from bayesplate.campaigns.tables import (
@@ -15,7 +16,6 @@ from bayesplate.campaigns.tables import (
     shared_table,
     taught_table,
 )
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.report.campaign_figures import every_picture, pooled_rms_cents
 from bayesplate.report.page import from_template, save_page
 from bayesplate.report.saving import drawing

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.material import MODULI
+from bayesplate.board.material import MODULI
 from bayesplate.report.colours import PAPER, POSTERIOR, WEIGHTED
 from bayesplate.report.style import WORDS, Picture, heading, hump, legend_below, limits, plain_axes, stacked
 from bayesplate.report.symbols import in_figure

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.parameter import Parameter, unit_of_people
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.words import effect_name, joined
-from bayesplate.plate.board import Board
-from bayesplate.plate.parameter import Parameter, unit_of_people
 from bayesplate.posterior.convergence import Gate
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
-from bayesplate.quantities import Quantity
 from bayesplate.report.priors import input_words
 from bayesplate.report.words import effect_sentence
 from bayesplate.results.budget import budget, row_words

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values, vibrating_lengths
 from bayesplate.estimates.shapes import N_POINTS, labelled_shapes
 from bayesplate.estimates.sheet import points
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.plate.board import Values, vibrating_lengths
 from bayesplate.posterior.draws import Draws, posterior_mean_values
 from bayesplate.posterior.inference import Inference
 from bayesplate.report.chladni import board_panel, caption, draw_sand

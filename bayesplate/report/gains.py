@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayesplate.board.material import MODULI
 from bayesplate.planning.plan import Plan, ProposalEntry
 from bayesplate.planning.words import shared_words
-from bayesplate.plate.material import MODULI
 from bayesplate.report.colours import BLUE, DARK, GREEN, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.style import SMALL, Picture, drawable, heading, legend_below, placed
 from bayesplate.report.symbols import in_figure

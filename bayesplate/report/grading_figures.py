@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.material import MODULI
+from bayesplate.board.material import MODULI
 from bayesplate.report.colours import BLUE, DARK, GREEN, GREY, LIGHT, ORANGE, SKY, VERMILLION
 from bayesplate.report.constants import modulus_title
 from bayesplate.report.style import (

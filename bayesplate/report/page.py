@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from bayesplate.cards import BoardCard
+from bayesplate.board.board_card import BoardCard
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.exports import write_before_after, write_known
 from bayesplate.files import make_folder, write_text

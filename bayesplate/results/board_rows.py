@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.results.contract import Spread, as_json
 from bayesplate.results.joint import JOINT, Joint
 from bayesplate.results.summary import Summary

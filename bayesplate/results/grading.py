@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.material import MODULI
+from bayesplate.board.material import MODULI
 from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.log_figures import FIGURES, LogFigure, covariance_along, target_thickness, triangle
 from bayesplate.results.normal_box import box_probability

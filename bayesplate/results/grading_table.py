@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from bayesplate.board.material import MODULI
 from bayesplate.files import whole_file, writing
-from bayesplate.plate.material import MODULI
 from bayesplate.results.board_table import write_rows
 from bayesplate.results.exports import Cell
 from bayesplate.results.grading import Grading

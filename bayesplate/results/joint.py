@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.plate.material import MODULI, RIGIDITIES
+from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.posterior.draws import Draws
 
 JOINT = (*MODULI, *RIGIDITIES, "density")

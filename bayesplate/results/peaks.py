@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.setup import Setup
 from bayesplate.frequencies.peaks import PeakLikelihood
 from bayesplate.labels import Label
-from bayesplate.plate.setup import Setup
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.likely_labels import MOST_DRAWS_OF_LABELS
 from bayesplate.posterior.posing import PosedProblem

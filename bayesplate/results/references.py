@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesplate.cards import BoardCard, PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.board_card import BoardCard
+from bayesplate.board.prior import PriorCard
 from bayesplate.effects import effects_of
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
 
 PAPER = (
     "M. Ducceschi, S. Duran, H. Tahvanainen, L. Ausiello: A method to estimate the rectangular "

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from bayesplate.board.board import Board
 from bayesplate.estimates.proposals import Proposal, probabilities
 from bayesplate.estimates.sheet import Sheet, SheetMode
-from bayesplate.plate.board import Board
 
 
 @dataclass(frozen=True)

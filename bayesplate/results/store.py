@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.cards import StatedPrior
+from bayesplate.board.prior import StatedPrior
 from bayesplate.posterior.draws import Draws
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.archive import Archive, write_archive

@@ -11,14 +11,16 @@ from typing import TypeGuard, get_args
 
 import numpy as np
 
-from bayesplate.cards import BoardCard, CampaignCard, PriorCard
-from bayesplate.cards.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
+from bayesplate.board.board import Board
+from bayesplate.board.board_card import BoardCard
+from bayesplate.board.campaign import CampaignCard
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
 from bayesplate.diagnosis.evidence.null_control import BY_CHANCE, FALSE_ALARMS
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import CoefficientSource
 from bayesplate.frequencies.laws import LawName
 from bayesplate.planning.proposals import GOALS, Costs
-from bayesplate.plate.board import Board
 from bayesplate.recordings.reading import CHANNELS
 from bayesplate.recordings.signals import MOTIONS
 from bayesplate.results.board_table import TableKind

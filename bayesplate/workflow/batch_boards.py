@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from bayesplate.cards import BoardCard, Columns, Template, load_board_in, plain
-from bayesplate.cards.cells import Cell, is_empty
-from bayesplate.cards.csv_table import csv_table
-from bayesplate.cards.reading import read_file, read_table
-from bayesplate.errors import Fault, InputError
+from bayesplate.board.board_card import BoardCard, load_board_in
+from bayesplate.board.cells import Cell, is_empty
+from bayesplate.board.csv_table import csv_table
+from bayesplate.board.rows import Columns
+from bayesplate.board.template import Template
+from bayesplate.board.toml import read_file, read_table
+from bayesplate.errors import Fault, InputError, plain
 from bayesplate.results.board_table import parquet_library
 
 LARGEST_TABLE = 100_000_000

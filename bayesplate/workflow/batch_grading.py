@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bayesplate.cards.words import did_you_mean, quoted
+from bayesplate.board.material import MODULI
+from bayesplate.board.words import did_you_mean, quoted
 from bayesplate.errors import Fault, InputError, plain
-from bayesplate.plate.material import MODULI
 from bayesplate.results.grading import GradingRequest
 from bayesplate.results.log_figures import FIGURES
 from bayesplate.results.normal_box import MOST

@@ -13,7 +13,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from bayesplate.cards import load_named, readings_sha256
+from bayesplate.board.copies import readings_sha256
+from bayesplate.board.named import load_named
 from bayesplate.errors import (
     BayesplateError,
     InputError,

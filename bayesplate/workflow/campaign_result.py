@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesplate.board.prior import PriorCard
 from bayesplate.campaigns.archive import shared_archive
 from bayesplate.campaigns.diagnosis import CampaignDiagnosis
 from bayesplate.campaigns.learning import Learnt
@@ -18,7 +19,6 @@ from bayesplate.campaigns.population import Population, prior_of
 from bayesplate.campaigns.summary import (
     CampaignSummary,
 )
-from bayesplate.cards import PriorCard
 from bayesplate.errors import Fault, InputError
 from bayesplate.files import make_folder, write_text, writing
 from bayesplate.report.plots import CampaignPlots

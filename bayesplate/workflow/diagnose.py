@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.cards import PriorCard
+from bayesplate.board.material import MODULI
+from bayesplate.board.prior import PriorCard
 from bayesplate.diagnosis.decision.claim import Claim, judge_claim, nested_of
 from bayesplate.diagnosis.decision.in_part import named_in_part
 from bayesplate.diagnosis.decision.readings import wrong_reading
@@ -34,7 +35,6 @@ from bayesplate.estimates.leave_one_out import CarryingMode, carrying_modes, ind
 from bayesplate.files import make_folder, write_text
 from bayesplate.planning.drawn_up import drawn_up
 from bayesplate.planning.survivors import survivors
-from bayesplate.plate.material import MODULI
 from bayesplate.posterior.inference import Inference
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import DiagnosePlots

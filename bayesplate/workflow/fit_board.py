@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bayesplate.cards import BoardCard, CoefficientCard, NamedCards, PriorCard
+from bayesplate.board.board import Board
+from bayesplate.board.board_card import BoardCard
+from bayesplate.board.coefficients import CoefficientCard
+from bayesplate.board.named import NamedCards
+from bayesplate.board.prior import PriorCard
 from bayesplate.errors import Fault, NotConvergedError
 from bayesplate.frequencies.laws import LawName
-from bayesplate.plate.board import Board
 from bayesplate.posterior.inference import Inference
 from bayesplate.results.summary import Summary
 from bayesplate.workflow.arguments import require_arguments

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from bayesplate.board.board import Board
 from bayesplate.errors import CheckpointError, NotConvergedError
-from bayesplate.plate.board import Board
 from bayesplate.posterior.assessment import assess
 from bayesplate.posterior.checkpoint import Checkpoint
 from bayesplate.posterior.convergence import Convergence

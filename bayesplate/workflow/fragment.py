@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from bayesplate.cards.writing import array, number, table, text
+from bayesplate.board.writing import array, number, table, text
 from bayesplate.recordings.contract import PickedRow, spurious_share
 
 if TYPE_CHECKING:

@@ -6,16 +6,18 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from bayesplate.cards import EDGE_NAMES, load_prior, physical_faults, read_board_text
-from bayesplate.cards.setup import EdgeWord, edge_words
-from bayesplate.cards.starter import HALF_TOP, Starter, starter_text
-from bayesplate.cards.values import Number, Refusal
-from bayesplate.cards.words import did_you_mean, name_complaint, shown
+from bayesplate.board.board_card import read_board_text
+from bayesplate.board.from_card import board_from_card
+from bayesplate.board.physical import physical_faults
+from bayesplate.board.prior import load_prior
+from bayesplate.board.setup_card import EdgeWord, edge_words
+from bayesplate.board.starter import HALF_TOP, Starter, starter_text
+from bayesplate.board.values import Number, Refusal
+from bayesplate.board.words import EDGE_NAMES, did_you_mean, name_complaint, shown
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.files import write_text, writing
 from bayesplate.frequencies.labels import label_faults, lowest_labels
 from bayesplate.labels import Label
-from bayesplate.plate.from_card import board_from_card
 
 _EDGES_WANTED = (
     '"free", "cantilever", "clamped", "supported", or four letters of C, S and F for x0, y0, x1, y1, like "CFFF"'

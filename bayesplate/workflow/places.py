@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesplate.cards import BoardCard, off_the_board, plate_mass_g, too_heavy
+from bayesplate.board.board_card import BoardCard
+from bayesplate.board.physical import off_the_board, plate_mass_g, too_heavy
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING
 from bayesplate.errors import Fault, InputError
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from bayesplate.cards import is_campaign
-from bayesplate.cards.words import EFFECT_NAMES, effect_named
+from bayesplate.board.board import Board
+from bayesplate.board.campaign import is_campaign
+from bayesplate.board.words import EFFECT_NAMES, effect_named
 from bayesplate.diagnosis.decision.verdict import WITHIN, Answer
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING
 from bayesplate.diagnosis.evidence.joint import full_search
@@ -32,7 +33,6 @@ from bayesplate.planning.drawn_up import DrawnUp, begun, drawn_up
 from bayesplate.planning.plan import FORMAT, Plan
 from bayesplate.planning.proposals import EXPLANATIONS, Costs
 from bayesplate.planning.survivors import asked, surviving
-from bayesplate.plate.board import Board
 from bayesplate.posterior.sampling import Progress
 from bayesplate.report.plots import PlanPlots
 from bayesplate.results.contract import json_text

@@ -9,29 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesplate.cards import (
-    BoardCard,
-    NamedCards,
-    PriorCard,
-    is_campaign,
-    load_board,
-    load_named,
-    load_prior,
-    physical_faults,
-    read_board_text,
-    remarks,
-)
-from bayesplate.cards.shelf import find
-from bayesplate.cards.words import effect_named
+from bayesplate.board.board import Board
+from bayesplate.board.board_card import BoardCard, load_board, read_board_text
+from bayesplate.board.board_text import card_text
+from bayesplate.board.campaign import is_campaign
+from bayesplate.board.from_card import board_from_card
+from bayesplate.board.named import NamedCards, load_named
+from bayesplate.board.physical import physical_faults
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.remarks import remarks
+from bayesplate.board.sessions import notes as session_notes
+from bayesplate.board.shelf import find
+from bayesplate.board.words import effect_named
 from bayesplate.effects import declare, effect_faults, implied_effects, notes
 from bayesplate.errors import Fault, InputError
 from bayesplate.estimates.coefficients import coefficient_faults, require_sides
 from bayesplate.estimates.plausibility import require_plausible
 from bayesplate.frequencies.labels import label_faults
-from bayesplate.plate.board import Board
-from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.sessions import notes as session_notes
-from bayesplate.plate.writing import card_text
 
 Card = str | os.PathLike[str] | Board
 """Name of a shipped card, the path of a card, or a board made in Python."""

@@ -16,7 +16,9 @@ import ritz
 from made_campaigns import MASS, write_campaign
 from numpy.typing import NDArray
 
-from bayesplate.cards import load_named, read_board_text
+from bayesplate.board.board_card import read_board_text
+from bayesplate.board.named import load_named
+from bayesplate.board.setup import Ends
 from bayesplate.diagnosis.evidence.joint import full_search
 from bayesplate.diagnosis.shifts.baseline import baseline_of
 from bayesplate.frequencies.laws import LawName
@@ -27,7 +29,6 @@ from bayesplate.modes.mesh import mesh
 from bayesplate.modes.solve import solve, solve_classes
 from bayesplate.modes.terms import Weights
 from bayesplate.modes.thin import thin_plate
-from bayesplate.plate.setup import Ends
 from bayesplate.posterior.convergence import autocorrelation_times, burn_in_steps
 from bayesplate.posterior.inference import infer
 from bayesplate.posterior.posing import PosedProblem, pose

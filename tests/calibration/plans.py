@@ -30,7 +30,9 @@ from generator.recipes import RECIPES
 from trial.cells import KINDS, SENSORS, UNKNOWN
 from trial.shared import baseline_of_card, median_baseline, shared_law
 
-from bayesplate.cards import load_prior
+from bayesplate.board.board import Board
+from bayesplate.board.prior import load_prior
+from bayesplate.board.sessions import shared_share
 from bayesplate.diagnosis.decision.verdict import WITHIN
 from bayesplate.diagnosis.evidence.hypotheses import NONE, ONE, Hypothesis
 from bayesplate.diagnosis.evidence.search import Found, Ground, prepare_search, search
@@ -44,8 +46,6 @@ from bayesplate.planning.modes_read import REPEATED
 from bayesplate.planning.proposals import EXPLANATIONS, Costs, Proposal, proposals
 from bayesplate.planning.station_laws import known_mass
 from bayesplate.planning.survivors import survivors
-from bayesplate.plate.board import Board
-from bayesplate.plate.sessions import shared_share
 
 Record = dict[str, Any]
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import bayesplate
+from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.scatter import expected_width
 from bayesplate.planning.campaign import Reading, benches, joint_of, readings
 from bayesplate.planning.joint import board_in_joint
 from bayesplate.planning.proposals import Costs
-from bayesplate.quantities import Quantity
 
 SHARED = "attached_mass.mass"
 

@@ -18,13 +18,13 @@ from effect_plates import SETUP, setup_of
 from generator.known_boards import FIEMME, FREE
 from made_boards import board_of
 
-from bayesplate.cards import read_board_text
+from bayesplate.board.board_card import read_board_text
+from bayesplate.board.from_card import board_from_card
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import AttachedItem
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.attached_items import item_on_board
-from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.setup import AttachedItem
-from bayesplate.quantities import Quantity
 
 HALF = (0.0, inf)
 ANY = (-inf, inf)

@@ -13,6 +13,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from scipy import optimize
 
+from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import prediction_errors
 from bayesplate.estimates.refit import (
@@ -25,7 +26,6 @@ from bayesplate.estimates.refit import (
 )
 from bayesplate.estimates.side_by_side import most_likely_of_each
 from bayesplate.modes.terms import Weights
-from bayesplate.plate.readings import ReadingErrors
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare

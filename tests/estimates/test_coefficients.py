@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.cards import load_prior
-from bayesplate.cards.shelf import shelf_folder
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
+from bayesplate.board.setup import AttachedItem
+from bayesplate.board.shelf import shelf_folder
 from bayesplate.errors import InputError
 from bayesplate.estimates.coefficients import coefficient_faults
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.paper import paper_system
 from bayesplate.estimates.percentile import percentile_estimate
 from bayesplate.labels import Label
-from bayesplate.plate.measured import Peak
-from bayesplate.plate.setup import AttachedItem
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.results.references import references
 from bayesplate.workflow.prepare import prepare
 

@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 import ritz
 
-from bayesplate.cards import PriorCard, card_names, load_board, load_prior
+from bayesplate.board.board import Board, density, made_board
+from bayesplate.board.board_card import load_board
+from bayesplate.board.from_card import board_from_card
+from bayesplate.board.parameter import BOARD
+from bayesplate.board.prior import PriorCard, load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.shelf import card_names
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.plausibility import (
     _SLACK,
@@ -23,10 +29,6 @@ from bayesplate.estimates.plausibility import (
 )
 from bayesplate.estimates.unusual import HEAVIEST_FIBRES, LIGHTEST_WOOD, MOST_ORTHOTROPIC, unusual
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board, density, made_board
-from bayesplate.plate.from_card import board_from_card
-from bayesplate.plate.parameter import BOARD
-from bayesplate.quantities import Quantity
 
 PRIORS = ("spruce", "weakly-informative")
 LABELS = made_boards.FREE_LABELS[:6]

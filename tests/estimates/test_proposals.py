@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 import ritz
 
-from bayesplate.cards import load_prior
+from bayesplate.board.board import Board
+from bayesplate.board.material import moduli
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import Peak
 from bayesplate.estimates import proposals as proposed
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.estimates.proposals import UNUSUAL, probabilities, proposals
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import moduli
-from bayesplate.plate.setup import Peak
-from bayesplate.quantities import Quantity
 
 PLATE = ritz.Plate.from_moduli(10e9, 0.8e9, 0.75e9, 0.4, rho=430.0, h=3e-3, L_x=0.55, L_y=0.2, edges=ritz.ALL_FREE)
 LABELS = ((1, 1), (2, 0), (2, 1), (0, 2), (1, 2), (3, 0), (3, 1), (2, 2))

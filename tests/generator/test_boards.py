@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesplate.cards import physical_faults, read_board_text
+from bayesplate.board.board_card import read_board_text
+from bayesplate.board.physical import physical_faults
 from generator.__main__ import main
 from generator.boards import plant
 from generator.card import told

@@ -10,14 +10,14 @@ import pytest
 import ritz
 from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
+from bayesplate.board.parameter import Owner
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading_errors import ReadingErrors
+from bayesplate.board.sessions import shared_share
+from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.diagnosis.evidence.hypotheses import Swap
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import REPEATED, _as_read, _given_first
-from bayesplate.plate.parameter import Owner
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import shared_share
-from bayesplate.plate.setup import DEFAULT_NOISE
-from bayesplate.quantities import Quantity
 
 HERTZ = dict(zip(CANTILEVER_LABELS, (50.0, 98.0, 310.0, 340.0, 480.0, 700.0), strict=True))
 SETUP = setup_of(ritz.CANTILEVER, HERTZ, resolution=1.0, noise=Quantity.from_median(0.004, 1.6))

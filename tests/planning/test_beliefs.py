@@ -8,13 +8,13 @@ import made_searches as made
 import numpy as np
 import pytest
 
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.search import search
 from bayesplate.planning.beliefs import believed
 from bayesplate.planning.gains import Readings, probabilities_after
 from bayesplate.planning.survivors import asked, survivors
-from bayesplate.plate.material import RIGIDITIES
 
 N_READ, N_MODES = 6, 9
 NAMES = ("first", "second")

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import ORTHOTROPIC
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings, expected_gain, probabilities_after, together
-from bayesplate.plate.material import ORTHOTROPIC
 
 SIGMA = 0.3
 

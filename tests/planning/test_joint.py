@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesplate.board.material import ORTHOTROPIC
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.planning import joint as home
 from bayesplate.planning.joint import BoardInJoint, Joint
-from bayesplate.plate.material import ORTHOTROPIC
-from bayesplate.plate.setup import DEFAULT_NOISE
-from bayesplate.quantities import Quantity
 
 SD = 0.5
 

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from bayesplate.board.material import ORTHOTROPIC
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings, expected_gain
 from bayesplate.planning.proposals import Proposal, sequences
-from bayesplate.plate.material import ORTHOTROPIC
 
 NOW = Explanation(
     members=(), words="made", probability=1.0, mean=np.zeros((1, 3)), covariance=np.eye(3)[None],

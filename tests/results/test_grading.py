@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.plate.material import derived_quantities, moduli
+from bayesplate.board.material import derived_quantities, moduli
 from bayesplate.results.board_rows import BoardRow
 from bayesplate.results.grading import GradingRequest, grade
 from bayesplate.results.grading_table import MOST_ON_TERMINAL, doubts_sentence, grading_tables, write_grading

@@ -10,10 +10,10 @@ from generator.boards import PlantedBoard
 from generator.designs import POISSON, Design
 from numpy.typing import NDArray
 
+from bayesplate.board.material import rigidities
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.decision.verdict import Verdict, size_posterior
 from bayesplate.diagnosis.evidence.search import Found
-from bayesplate.plate.material import rigidities
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Read = Callable[[Mapping[str, Any], float, float], float]

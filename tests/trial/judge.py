@@ -16,6 +16,7 @@ from trial.amplitudes import recovered
 from trial.cells import KINDS, SENSORS, Cell
 from trial.shared import control_of, ground_of, shared_law
 
+from bayesplate.board.material import MODULI
 from bayesplate.diagnosis.decision.claim import judge_claim
 from bayesplate.diagnosis.decision.constants import ConstantDraws, draw_constants
 from bayesplate.diagnosis.decision.in_part import named_in_part
@@ -23,7 +24,6 @@ from bayesplate.diagnosis.decision.verdict import Verdict, alternatives, answers
 from bayesplate.diagnosis.evidence.null_control import NullControl
 from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.errors import BayesplateError
-from bayesplate.plate.material import MODULI
 
 Record = dict[str, Any]
 

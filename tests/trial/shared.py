@@ -19,6 +19,8 @@ from generator.designs import MEDIANS
 from numpy.typing import NDArray
 from trial.cells import KINDS, SENSORS, UNKNOWN, Setting
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.evidence.null_control import NullControl, made_to_choose, null_control
 from bayesplate.diagnosis.evidence.search import Ground, prepare_search
 from bayesplate.diagnosis.shifts.baseline import Baseline, baseline_at
@@ -28,8 +30,6 @@ from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.refit import Predict
 from bayesplate.frequencies.laws import ExactLaw
 from bayesplate.frequencies.model import SetupModel
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.workflow.prepare import prepare

@@ -26,7 +26,9 @@ from made_summaries import SUMMARY
 from runs import files_in
 
 import bayesplate
-from bayesplate.cards import load_named, load_prior, read_board_text
+from bayesplate.board.board_card import read_board_text
+from bayesplate.board.named import load_named
+from bayesplate.board.prior import load_prior
 from bayesplate.cli import main
 from bayesplate.errors import BatchError, CheckpointError, InputError
 from bayesplate.results.contract import json_text

@@ -13,8 +13,10 @@ import ritz
 from runs import Run, read_json
 
 import bayesplate
-from bayesplate.cards import card_names, load_board, load_prior
-from bayesplate.plate.from_card import board_from_card
+from bayesplate.board.board_card import load_board
+from bayesplate.board.from_card import board_from_card
+from bayesplate.board.prior import load_prior
+from bayesplate.board.shelf import card_names
 from bayesplate.results.contract import as_json
 
 QUANTILES = ("q05", "q25", "q50", "q75", "q95")

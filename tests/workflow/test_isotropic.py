@@ -12,13 +12,13 @@ from scipy.stats import binom
 
 import bayesplate
 from bayesplate import Board, Quantity, Setup
+from bayesplate.board.material import isotropic_moduli, moduli, rigidities
 from bayesplate.diagnosis.evidence.known import known_fit
 from bayesplate.errors import InputError, NotIdentifiableError
 from bayesplate.estimates.least_squares import weighted_least_squares
 from bayesplate.frequencies.laws import cents
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.gains import Readings, expected_gain
-from bayesplate.plate.material import isotropic_moduli, moduli, rigidities
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import as_json
 

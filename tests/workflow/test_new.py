@@ -8,11 +8,11 @@ import pytest
 from click.testing import CliRunner
 
 import bayesplate
-from bayesplate.cards import load_board, read_board_text
+from bayesplate.board.board_card import load_board, read_board_text
+from bayesplate.board.from_card import board_from_card
 from bayesplate.cli import main
 from bayesplate.frequencies.labels import label_faults
 from bayesplate.labels import Label
-from bayesplate.plate.from_card import board_from_card
 from bayesplate.workflow.new import new
 
 ANSWERS = ["", "550", "2,0", "200", "2.8", "125", "", "spruce", "35", "50", "111", "86", "", "", "", "", "Küche, 21 °C"]

@@ -12,8 +12,8 @@ from runs import files_in
 from scipy import stats
 
 import bayesplate
-from bayesplate.cards import load_board
-from bayesplate.plate.material import moduli
+from bayesplate.board.board_card import load_board
+from bayesplate.board.material import moduli
 
 BOARD = "fiemme-spruce-clamped"
 UNCERTAIN = "spruce-free-2R"

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.diagnosis.evidence.draws import TermDraws, members_of, sizes_of
 from bayesplate.diagnosis.evidence.exact import draw_exact, under_exact_law
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.baseline import Baseline
-from bayesplate.plate.material import MODULI, moduli
 
 Floats = NDArray[np.float64]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.decision.verdict import size_posterior
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.forms import Form, with_forms, with_labels_exchanged
-from bayesplate.plate.board import Board
 
 
 def likely_forms(found: Found, index: int) -> tuple[Form, ...]:

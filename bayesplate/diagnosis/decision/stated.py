@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.sessions import same_modes
 from bayesplate.diagnosis.decision.claim import STANDARD_ERRORS, score_gain
 from bayesplate.diagnosis.evidence.combinations import acting_at_known_size, stated_effects
 from bayesplate.diagnosis.evidence.known import KnownFit, predicted_errors
 from bayesplate.diagnosis.evidence.scores import scores_given
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.board import Board
-from bayesplate.plate.sessions import same_modes
 from bayesplate.posterior.posing import PosedProblem
 from bayesplate.results.contract import rms
 

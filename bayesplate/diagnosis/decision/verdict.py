@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.parameter import unit_of_people
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.evidence.draws import draw_terms, members_of, standard_sizes_of
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, are_stated
 from bayesplate.diagnosis.evidence.null_control import NullControl
@@ -17,8 +19,6 @@ from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import Variant, variants
 from bayesplate.diagnosis.evidence.terms import normalised
 from bayesplate.effects.words import effect_name, effect_names, joined
-from bayesplate.plate.parameter import unit_of_people
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 Word = Literal["none needed", "named", "indistinguishable group", "unexplained", "undetectable"]

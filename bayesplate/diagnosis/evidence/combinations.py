@@ -9,9 +9,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects import EFFECTS, Effect
-from bayesplate.plate.board import Board
-from bayesplate.quantities import Quantity
 
 MOST_TOGETHER = 3
 """Known effects that are computed together, at most."""

@@ -9,13 +9,13 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.evidence.noise_grid import NoiseGrid, noise_grid, reach_of
 from bayesplate.diagnosis.evidence.terms import Fold, Terms, log_sum, normalised
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.forms import with_readings_exchanged
 from bayesplate.diagnosis.shifts.tables import Table, nothing, together
 from bayesplate.effects import EFFECTS
-from bayesplate.plate.board import Board
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

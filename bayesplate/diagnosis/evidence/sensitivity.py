@@ -9,11 +9,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.evidence.exact import under_exact_law
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis, log_evidences, probabilities
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.shifts.tables import Table
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

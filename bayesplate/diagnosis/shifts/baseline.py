@@ -19,15 +19,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.reading_errors import ReadingErrors
+from bayesplate.board.sessions import same_modes, under_prior_scales
 from bayesplate.diagnosis.shifts.spectrum import Spectrum
 from bayesplate.estimates.least_squares import Estimate, log_measured, reading_scales
 from bayesplate.estimates.refit import Predict, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.modes.naming import Place
-from bayesplate.plate.board import Board
-from bayesplate.plate.readings import ReadingErrors
-from bayesplate.plate.sessions import same_modes, under_prior_scales
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.parameters import Parameters
 from bayesplate.posterior.posing import PosedProblem

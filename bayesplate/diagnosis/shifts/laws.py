@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Values
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.shifts.baseline import Baseline, symmetry_of
 from bayesplate.diagnosis.shifts.following import Following
 from bayesplate.diagnosis.shifts.forms import Form
@@ -17,8 +19,6 @@ from bayesplate.frequencies.model import OtherMode, SetupModel, setup_model
 from bayesplate.frequencies.system import system_of
 from bayesplate.modes.naming import Place
 from bayesplate.modes.terms import Parity
-from bayesplate.plate.board import Values
-from bayesplate.plate.material import RIGIDITIES
 from bayesplate.posterior.laplace import exact_models
 from bayesplate.posterior.parameters import Parameters
 

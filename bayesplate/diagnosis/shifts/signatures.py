@@ -13,6 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.board import Board
+from bayesplate.board.material import MODULI, Moduli, moduli
+from bayesplate.board.parameter import Parameter
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.shifts.baseline import weighted_rms
 from bayesplate.effects import EFFECTS, declare, effects_of
 from bayesplate.estimates.refit import refit
@@ -20,12 +24,8 @@ from bayesplate.frequencies.laws import cents
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
 from bayesplate.frequencies.system import system_of
-from bayesplate.plate.board import Board
-from bayesplate.plate.material import MODULI, Moduli, moduli
-from bayesplate.plate.parameter import Parameter
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import PosedProblem
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

@@ -38,7 +38,7 @@ class Spectrum:
     predict : callable, optional
         ln f (Hz) of all of them as a function of x, without an effect; by default linear.
     discrepancy : (n_every,) array or 0
-        ln f of the board less that of its plate, at the estimate: `bayesplate.plate.sessions`.
+        ln f of the board less that of its plate, at the estimate: `bayesplate.board.sessions`.
     """
 
     log_frequency: Floats

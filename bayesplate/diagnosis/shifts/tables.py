@@ -15,9 +15,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.diagnosis.shifts.laws import FormLaw
-from bayesplate.quantities import Quantity
 
 Floats = NDArray[np.float64]
 

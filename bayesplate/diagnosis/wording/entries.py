@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.material import MODULI, moduli
 from bayesplate.diagnosis.decision.refits import likely_form
 from bayesplate.diagnosis.decision.verdict import Answer, Verdict, size_posterior
 from bayesplate.diagnosis.evidence.search import Candidate, Found
@@ -15,7 +16,6 @@ from bayesplate.diagnosis.wording.candidates import Amplitude, EffectEntry, Exch
 from bayesplate.diagnosis.wording.fates import fate_of, fate_of_exchange
 from bayesplate.effects import EFFECTS, effects_of
 from bayesplate.frequencies.laws import cents
-from bayesplate.plate.material import MODULI, moduli
 from bayesplate.results.contract import finite
 
 Floats = NDArray[np.float64]

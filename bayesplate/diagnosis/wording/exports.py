@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from bayesplate.board.material import MODULI
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import KnownModel, known_table, known_titles
 from bayesplate.diagnosis.wording.words import MERITS
 from bayesplate.effects.words import effect_name
 from bayesplate.files import write_text
-from bayesplate.plate.material import MODULI
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.exports import Cell, csv_text, latex, tabular
 from bayesplate.results.folder import BEFORE_AFTER, KNOWN_EFFECTS
 from bayesplate.results.words import MISSING

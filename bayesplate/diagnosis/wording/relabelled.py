@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from bayesplate.board.board import Board
+from bayesplate.board.quantity import Quantity
 from bayesplate.effects.words import joined
 from bayesplate.labels import Label
-from bayesplate.plate.board import Board
-from bayesplate.quantities import Quantity
 
 
 def relabelled_sentence(before: Board, after: Board, words: str) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from bayesplate.board.parameter import unit_of_people
 from bayesplate.diagnosis.wording.candidates import Amplitude, CandidateEntry
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.known import known_table
 from bayesplate.diagnosis.wording.words import CONDITIONS, MERITS, MISSING, Merit, names_of, worth_showing
 from bayesplate.effects.words import effect_name
-from bayesplate.plate.parameter import unit_of_people
 from bayesplate.results.tables import Table
 from bayesplate.results.words import GPA, decimals, interval, is_isotropic, narrow_name, number, plus_minus
 

@@ -11,12 +11,13 @@ import numpy as np
 
 import bayesplate
 from bayesplate import errors
+from bayesplate.board.setup import CLAMPED_NOISE, DEFAULT_NOISE
+from bayesplate.board.shelf import card_names
 from bayesplate.campaigns import diagnosis as of_campaigns
 from bayesplate.campaigns import evidence, likelihood, population, scatter
 from bayesplate.campaigns.agreement import p_value
 from bayesplate.campaigns.search import OF_TWO
 from bayesplate.campaigns.search import PRIOR as WAYS_BEFORE
-from bayesplate.cards.shelf import card_names
 from bayesplate.diagnosis.decision.claim import IMPROBABLE, STANDARD_ERRORS
 from bayesplate.diagnosis.decision.verdict import AT_LIMIT, CLEARLY, WITHIN
 from bayesplate.diagnosis.evidence.folds import NEEDED
@@ -28,7 +29,6 @@ from bayesplate.diagnosis.shifts.signatures import LOOK_ALIKE
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.words import joined
 from bayesplate.planning import gains, places
-from bayesplate.plate.setup import CLAMPED_NOISE, DEFAULT_NOISE
 from bayesplate.posterior.convergence import Gate
 from bayesplate.results import references as cited
 from bayesplate.workflow.prepare import prepare

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_searches import CERTAIN, bare, baseline, candidate, decided, ground_of
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.decision import in_part
 from bayesplate.diagnosis.decision.claim import nested_of
 from bayesplate.diagnosis.decision.in_part import named_in_part
@@ -17,7 +18,6 @@ from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import Variant
-from bayesplate.quantities import Quantity
 
 N_MODES = 8
 SIZE = Quantity.from_median(1.0, 1.5)

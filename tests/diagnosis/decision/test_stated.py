@@ -11,15 +11,15 @@ from generator.boards import plant
 from scipy import stats
 
 from bayesplate import Board, Setup
-from bayesplate.cards import load_prior
+from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import DeclaredFluid
 from bayesplate.diagnosis.decision.stated import judge_stated, stated_claims
 from bayesplate.diagnosis.evidence.combinations import stated_effects
 from bayesplate.diagnosis.evidence.known import known_fit
 from bayesplate.diagnosis.evidence.scores import scores_given
 from bayesplate.diagnosis.wording.stated import stated_sentences
-from bayesplate.plate.setup import DeclaredFluid
 from bayesplate.posterior.posing import pose
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.problem import Problem
 
 CENTS = np.log(2.0) / 1200.0

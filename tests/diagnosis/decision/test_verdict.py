@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, decided, ground_of
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, alternatives, answers, at_limit, size_posterior
 from bayesplate.diagnosis.evidence.hypotheses import RELABELLING, Hypothesis, Swap
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid
@@ -16,7 +17,6 @@ from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.evidence.sensitivity import Variant
 from bayesplate.diagnosis.shifts.tables import nothing, together
-from bayesplate.quantities import Quantity
 
 WORDS = {"none needed", "named", "indistinguishable group", "unexplained", "undetectable"}
 NAMES = ("a", "b", "c")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level
 
+from bayesplate.board.material import RIGIDITIES
 from bayesplate.diagnosis.decision import constants
 from bayesplate.diagnosis.decision.constants import draw_constants
 from bayesplate.diagnosis.evidence.draws import draw_terms
@@ -16,7 +17,6 @@ from bayesplate.diagnosis.evidence.exact import draw_exact, exact_log_frequencie
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import search
 from bayesplate.diagnosis.shifts.tables import together
-from bayesplate.plate.material import RIGIDITIES
 
 NOISE = 0.01
 BEND = 4.0

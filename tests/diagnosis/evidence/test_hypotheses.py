@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from made_searches import NOISE, bare, baseline, ground_of, one_level, table, with_readings
 
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup import AttachedItem
 from bayesplate.diagnosis.evidence.folds import left_out, nested
 from bayesplate.diagnosis.evidence.hypotheses import (
     RELABELLING,
@@ -23,8 +25,6 @@ from bayesplate.diagnosis.evidence.noise_grid import noise_grid
 from bayesplate.diagnosis.evidence.terms import Fold
 from bayesplate.diagnosis.shifts.forms import with_labels_exchanged, with_readings_exchanged
 from bayesplate.diagnosis.shifts.tables import nothing, together
-from bayesplate.plate.setup import AttachedItem
-from bayesplate.quantities import Quantity
 from bayesplate.workflow.prepare import prepare
 
 CLOSE_PAIR = [(0, 0), (1, 1), (0, 0), (0, 0), (1, 1), (0, 0)]

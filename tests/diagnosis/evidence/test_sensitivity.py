@@ -9,6 +9,7 @@ import pytest
 from made_searches import bare, baseline, candidate, ground_of, one_level
 from scipy.stats import binom
 
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.decision.constants import draw_constants
 from bayesplate.diagnosis.evidence.folds import ALWAYS, nested
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
@@ -24,7 +25,6 @@ from bayesplate.diagnosis.evidence.predictive import noise_of_board
 from bayesplate.diagnosis.evidence.search import Found, search
 from bayesplate.diagnosis.evidence.sensitivity import inclusion_with_width, variants, varied
 from bayesplate.diagnosis.evidence.terms import Fold, Terms
-from bayesplate.quantities import Quantity
 
 
 @pytest.fixture

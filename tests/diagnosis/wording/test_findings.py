@@ -11,6 +11,9 @@ from diagnoses import spread
 from made_searches import NOISE, bare, baseline, candidate, decided, ground_of
 from made_summaries import SUMMARY, mode
 
+from bayesplate.board.material import RIGIDITIES, moduli
+from bayesplate.board.parameter import BOARD, Parameter
+from bayesplate.board.quantity import Quantity
 from bayesplate.diagnosis.decision.claim import Claim, Condition
 from bayesplate.diagnosis.decision.verdict import NOTHING_LEFT, Answer, answers
 from bayesplate.diagnosis.evidence.folds import Nested, log_score, nested
@@ -28,9 +31,6 @@ from bayesplate.diagnosis.wording.findings import Case, Side, _nearest_sentence,
 from bayesplate.diagnosis.wording.told import verdict_sentence, verdict_sentences, warnings
 from bayesplate.effects import EFFECTS
 from bayesplate.estimates.leave_one_out import CarryingMode, indices_of
-from bayesplate.plate.material import RIGIDITIES, moduli
-from bayesplate.plate.parameter import BOARD, Parameter
-from bayesplate.quantities import Quantity
 from bayesplate.report.verdict import diagnosis_section, quoted
 from bayesplate.results.contract import Elastic, json_text
 from bayesplate.workflow.shown import show_diagnosis

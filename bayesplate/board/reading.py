@@ -1,0 +1,146 @@
+"""What was read of one mode: a reading, whose label is stated, or a peak, which has none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.stated import quantity_of
+from bayesplate.errors import Fault, InputError
+from bayesplate.labels import Label
+
+NO_OFFSET = Label(0, 0)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A measured frequency of a named mode.
+
+    Attributes
+    ----------
+    label : Label
+        This laboratory's label.
+    beams : tuple of int
+        Orders of the beam functions along x and y, from 0: the label less `Setup.first_label`.
+    frequency : Quantity, Hz
+    sign : str
+        Sign of the residue between hammer and sensor, "+" or "-"; empty if not known.
+    confidence : float
+        Probability, before the fit, that the label is right; 0 for a label that the program proposes for a bare peak.
+    stated : Label or None
+        The label on the card, where another is proposed.
+    amplitude, damping : float or None
+        Of the peak: see `Peak`.
+    """
+
+    label: Label
+    beams: tuple[int, int]
+    frequency: Quantity
+    sign: str = ""
+    confidence: float = 1.0
+    stated: Label | None = None
+    amplitude: float | None = None
+    damping: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frequency", quantity_of(self.frequency, f"frequency of {self.label}", "in Hz"))
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the label cannot be wrong."""
+        return self.confidence >= 1.0
+
+    @classmethod
+    def of(
+        cls,
+        label: str | tuple[int, int],
+        frequency: Quantity | ArrayLike,
+        sign: str = "",
+        first_label: tuple[int, int] = NO_OFFSET,
+    ) -> Reading:
+        """A reading from numbers.
+
+        Parameters
+        ----------
+        label : str or tuple of int
+            "(1,0)" or (1, 0).
+        frequency : Quantity, number or array of readings, Hz
+            A number is rounded to the resolution of its setup, an array holds repeated readings of one mode.
+        sign : str
+        first_label : tuple of int
+            The laboratory's label of the lowest beam functions.
+
+        Returns
+        -------
+        Reading
+
+        Raises
+        ------
+        InputError
+            If the label cannot be read, or the frequency is no number.
+        """
+        read = Label.parse(label_text(label))
+        quantity = quantity_of(frequency, f"frequency of {read}", "in Hz")
+        return cls(read, (read.m - first_label[0], read.n - first_label[1]), quantity, sign)
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A peak of the spectrum without a label.
+
+    Attributes
+    ----------
+    frequency : Quantity, Hz
+    sign : str
+        Sign of the residue between hammer and sensor, "+" or "-"; empty if not known.
+    amplitude : float or None
+        Height relative to other peaks of the same setup; None if not known.
+    damping : float or None
+        Damping ratio, 1; None if not known.
+    """
+
+    frequency: Quantity
+    sign: str = ""
+    amplitude: float | None = None
+    damping: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frequency", quantity_of(self.frequency, "frequency of a peak", "in Hz"))
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing but its frequency is known."""
+        return not self.sign and self.amplitude is None and self.damping is None
+
+
+def peaks_of(stated: Sequence[Peak | Quantity | ArrayLike], name: str) -> tuple[tuple[Peak, ...], list[Fault]]:
+    """Peaks from what somebody stated of them, and what cannot be one.
+
+    Parameters
+    ----------
+    stated : sequence of Peak, Quantity, number or array of readings, Hz
+    name : str
+        Of the setup, for the faults.
+
+    Returns
+    -------
+    peaks : tuple of Peak
+    faults : list of Fault
+    """
+    peaks: list[Peak] = []
+    faults: list[Fault] = []
+    for number, one in enumerate(stated, start=1):
+        place = f"{name} unlabelled {number}"
+        try:
+            peaks.append(one if isinstance(one, Peak) else Peak(quantity_of(one, place, "in Hz, or a Peak")))
+        except InputError as error:
+            faults += error.faults
+    return tuple(peaks), faults
+
+
+def label_text(label: str | tuple[int, int]) -> str:
+    """A label as a card writes it."""
+    return f"({','.join(map(str, label))})" if isinstance(label, tuple) else str(label)

@@ -1,0 +1,153 @@
+"""A table is held against a model, and everything that does not fit becomes a fault with its place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from bayesplate.board.values import Complaint, Refusal
+from bayesplate.board.words import did_you_mean, quoted, shown
+from bayesplate.errors import Fault, InputError
+
+MOST_FAULTS = 50
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,60}")
+Keys = tuple[str, ...]
+
+
+class Section(BaseModel):
+    """A part of a card: frozen, and unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+CardModel = TypeVar("CardModel", bound=Section)
+
+
+def validated(
+    model: type[CardModel],
+    table: dict[str, Any],
+    file: str,
+    context: Mapping[str, Any] | None = None,
+    faults: Sequence[Fault] = (),
+) -> CardModel:
+    """A card from the table of its file.
+
+    Parameters
+    ----------
+    model : subclass of Section
+    table : dict
+        What the TOML reader returned.
+    file : str
+        The file's name, as messages show it.
+    context : mapping, optional
+        Handed to the model: where the card comes from.
+    faults : sequence of Fault
+        Faults already found, reported together with those found here.
+
+    Raises
+    ------
+    InputError
+        With every fault of the card at once, the first fifty written out.
+    """
+    found = list(faults)
+    try:
+        card = model.model_validate(table, context=dict(context or {}))
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        found += [fault for detail in details[:MOST_FAULTS] for fault in _faults(model, table, file, detail)]
+        more = len(details) - MOST_FAULTS
+    else:
+        if not found:
+            return card
+        more = 0
+    more = max(more, 0) + len(found[MOST_FAULTS:])
+    listed = found[:MOST_FAULTS]
+    if more:
+        listed.append(Fault(file, "a card without faults", f"{more} more faults, not listed"))
+    raise InputError(listed)
+
+
+def place(file: str, table: Mapping[str, Any], inside: Sequence[str | int]) -> str:
+    """Where a value stands: 'my-board.toml [plate] thickness_mm', 'my-board.toml [[setup]] 2 "free" edges.x0'."""
+    if not inside:
+        return file
+    head, *rest = inside
+    value = table.get(str(head))
+    number = rest[0] if rest else None
+    if isinstance(value, list) and isinstance(number, int) and any(isinstance(entry, dict) for entry in value):
+        rest = rest[1:]
+        entry = value[number] if number < len(value) else None
+        name = entry.get("name") if isinstance(entry, dict) else None
+        text = f"{file} [[{head}]] {number + 1}" + (f" {quoted(name)}" if isinstance(name, str) else "")
+    elif isinstance(value, dict):
+        rest = rest[1:] if rest and isinstance(rest[0], int) else rest
+        text = f"{file} [{_key(str(head))}]"
+    else:
+        text = f"{file} {_key(str(head))}"
+    separator = " "
+    for part in rest:
+        text += f" {part + 1}" if isinstance(part, int) else separator + _key(part)
+        separator = " " if isinstance(part, int) else "."
+    return text
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else quoted(key)
+
+
+def _faults(model: type[Section], table: Mapping[str, Any], file: str, detail: Any) -> Iterator[Fault]:
+    """The faults behind one error of pydantic."""
+    inside: tuple[str | int, ...] = detail["loc"]
+    for one in _complaints(model, inside, detail):
+        yield Fault(place(file, table, (*inside, *one.inside)), one.wanted, one.got, one.remedy)
+
+
+def _complaints(model: type[Section], inside: tuple[str | int, ...], detail: Any) -> Sequence[Complaint]:
+    error = detail.get("ctx", {}).get("error")
+    if isinstance(error, Refusal):
+        return error.complaints
+    sections = sections_of(model)
+    keys = tuple(part for part in inside if isinstance(part, str))
+    if detail["type"] == "extra_forbidden":
+        return (_unknown_key(keys, sections),)
+    if detail["type"] == "missing":
+        return (Complaint(sections[keys[:-1]][keys[-1]], "nothing"),)
+    if detail["type"] == "too_long":
+        return (Complaint(f"at most {detail['ctx']['max_length']} tables", str(len(detail["input"]))),)
+    several = detail["type"] in ("tuple_type", "list_type")
+    wanted = f"tables below [[{'.'.join(keys)}]], in double brackets" if several else "a table"
+    return (Complaint(wanted, shown(detail["input"])),)
+
+
+def _unknown_key(keys: Keys, sections: Mapping[Keys, Mapping[str, str]]) -> Complaint:
+    *outer, key = keys
+    known = sections[tuple(outer)]
+    remedy = did_you_mean(key, known)
+    home = next((place for place, others in sections.items() if key in others), None)
+    if not remedy and home is not None:
+        remedy = f"it belongs in [{'.'.join(home)}]" if home else "it belongs above the first table"
+    return Complaint(f"one of {', '.join(known)}", "an unknown key", remedy)
+
+
+@cache
+def sections_of(model: type[BaseModel]) -> dict[Keys, dict[str, str]]:
+    """The sections of a card model: key path to known keys, each with a description of what is wanted."""
+    found: dict[Keys, dict[str, str]] = {(): {}}
+    for name, field in model.model_fields.items():
+        key = field.alias or name
+        found[()][key] = field.description or "a value"
+        for inner in _models_in(field.annotation):
+            for path, keys in sections_of(inner).items():
+                found[(key, *path)] = keys
+    return found
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)

@@ -1,0 +1,351 @@
+"""One setup: how the board is held, and what was read there; SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from numbers import Real
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesplate.board.coefficients import CoefficientCard
+from bayesplate.board.parameter import Owner, Parameter, shown_name
+from bayesplate.board.prior import PriorCard
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.reading import NO_OFFSET, Peak, Reading, label_text, peaks_of
+from bayesplate.board.setup_card import MISSED, SPURIOUS
+from bayesplate.board.stated import are, is_place, quantity_of, wrong_types
+from bayesplate.errors import Fault, InputError
+from bayesplate.labels import Label
+
+__all__ = [
+    "CLAMPED_NOISE", "DEFAULT_NOISE", "EDGES", "NOISE_WANTED", "NO_OFFSET",
+    "AttachedItem", "DeclaredFluid", "End", "Ends", "Peak", "Reading", "Setup", "assumed_noise",
+]  # fmt: skip
+
+End = Literal["clamped", "supported", "free"]
+Ends = tuple[End, End]
+EDGES = ("x0", "x1", "y0", "y1")
+DEFAULT_NOISE = Quantity.from_median(0.003, np.exp(0.5))
+CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
+"""Relative noise of a frequency: free boards settle at 0.24-0.30 %; re-clamping one board spreads it by 1-2.4 %."""
+NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
+
+
+def _is_noise(value: object) -> bool:
+    return isinstance(value, Quantity) and not value.is_exact
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quantity:
+    """The relative noise where none is stated, that of the prior or else of such edges: an object of its own."""
+    if prior is not None and prior.noise_percent is not None:
+        return prior.noise_percent.scaled(1e-2)
+    return replace(CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE)
+
+
+@dataclass(frozen=True)
+class AttachedItem:
+    """Something fixed to the board.
+
+    Attributes
+    ----------
+    kind : str
+        "accelerometer", "exciter", "shaker" or "weight"; an exciter is a coil on the board and a magnet on a spring.
+    places : tuple of (float, float), m
+        From the corner x = y = 0; several if it roved, none if nobody knows.
+    mass : Quantity or None, kg
+        Of the whole; None if not known, and so are those below, which an exciter alone has.
+    coil : Quantity or None, kg
+    suspension : Quantity or None, N/m
+        Stiffness of the spring that holds the magnet.
+    resonance : Quantity or None, Hz
+        Of the magnet on that spring, in place of the suspension.
+    magnet : str
+        "free", or "held" by something else than the board.
+    """
+
+    kind: str
+    places: tuple[tuple[float, float], ...] = ()
+    mass: Quantity | None = None
+    coil: Quantity | None = None
+    suspension: Quantity | None = None
+    resonance: Quantity | None = None
+    magnet: str = "free"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.places, list | tuple) or not all(map(is_place, self.places)):
+            raise InputError(wrong_types(str(self.kind), [("places", self.places, False, "((x, y), ...) in m")]))
+        for name, unit in (("mass", "kg"), ("coil", "kg"), ("suspension", "N/m"), ("resonance", "Hz")):
+            stated = getattr(self, name)
+            if stated is not None:
+                object.__setattr__(self, name, quantity_of(stated, f"{self.kind} {name}", f"in {unit}"))
+
+
+@dataclass(frozen=True)
+class DeclaredFluid:
+    """Air or water around the board: density in kg m^-3 and baffle ("none" or "full"), each None if not stated."""
+
+    density: Quantity | None = None
+    baffle: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.density is not None:
+            object.__setattr__(self, "density", quantity_of(self.density, "fluid density", "in kg/m^3"))
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How the board is held, and what was read.
+
+    Attributes
+    ----------
+    name : str
+    ends_x, ends_y : tuple of str
+        Conditions at (x0, x1) and (y0, y1).
+    clamped : dict of Quantity, m
+        What a clamp covers, by edge.
+    readings : tuple of Reading
+    resolution : float, Hz
+        Readings that are plain numbers are rounded to this; 0 if not rounded.
+    peaks : tuple of Peak
+        Those without a label.
+    missed : float
+        Probability that a mode below the highest peak left no peak.
+    spurious : float
+        Probability that a peak is no mode.
+    noise : Quantity
+        Relative noise of a frequency (log-normal).
+    first_label : Label
+    published_coefficients : CoefficientCard or None
+        Table of the paper's least squares and percentile method, and of nothing else.
+    attached : tuple of AttachedItem
+    hammer : tuple of float or None, m
+    fluid : DeclaredFluid or None
+        The air or the water around the board; None: not declared.
+    bounce : Quantity or None, Hz
+        Frequency at which a free board moves as a whole on its support; None: not stated.
+    group : Owner or None
+        The group of sessions that the setup is one of (`bayesplate.board.sessions`).
+    assumed : Quantity or None
+        The noise that was taken because nobody stated one; see `is_noise_assumed`.
+    """
+
+    name: str
+    ends_x: Ends
+    ends_y: Ends
+    readings: tuple[Reading, ...]
+    noise: Quantity
+    clamped: Mapping[str, Quantity] = field(default_factory=dict)
+    resolution: float = 0.0
+    peaks: tuple[Peak, ...] = ()
+    missed: float = MISSED
+    spurious: float = SPURIOUS
+    first_label: Label = NO_OFFSET
+    published_coefficients: CoefficientCard | None = None
+    attached: tuple[AttachedItem, ...] = ()
+    hammer: tuple[float, float] | None = None
+    fluid: DeclaredFluid | None = None
+    bounce: Quantity | None = None
+    group: Owner | None = None
+    assumed: Quantity | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "noise", quantity_of(self.noise, f"{self.name} noise", "relative"))
+        covered = {edge: quantity_of(one, f"{self.name} clamped {edge}", "in m") for edge, one in self.clamped.items()}
+        object.__setattr__(self, "clamped", covered)
+        if self.bounce is not None:
+            object.__setattr__(self, "bounce", quantity_of(self.bounce, f"{self.name} bounce", "in Hz"))
+
+    @classmethod
+    def from_frequencies(
+        cls,
+        frequencies: Mapping[str | tuple[int, int], Quantity | ArrayLike],
+        *,
+        edges: str | Mapping[str, str],
+        name: str = "setup",
+        resolution: float = 0.0,
+        noise: Quantity | None = None,
+        first_label: tuple[int, int] = NO_OFFSET,
+        clamped: Mapping[str, Quantity | ArrayLike] | None = None,
+        signs: Mapping[str | tuple[int, int], str] | None = None,
+        unlabelled: Sequence[Peak | Quantity | ArrayLike] = (),
+        attached: Sequence[AttachedItem] = (),
+        hammer: tuple[float, float] | None = None,
+        fluid: DeclaredFluid | None = None,
+        bounce: Quantity | ArrayLike | None = None,
+        published_coefficients: CoefficientCard | None = None,
+    ) -> Setup:
+        """A setup from numbers and arrays.
+
+        What is wrong with them beyond the names of edges and labels is said with the place on a card, when a board
+        with this setup is used.
+
+        Parameters
+        ----------
+        frequencies : dict of Quantity, number or array of readings, Hz
+            By label, "(1,0)" or (1, 0).
+        edges : str or dict of str
+            "clamped", "supported" or "free": one word for all four edges, or one per edge x0, x1, y0, y1.
+        name : str
+        resolution : float, Hz
+            Step to which plain numbers are rounded; 0 if they are not.
+        noise : Quantity, optional
+            Relative, log-normal: 0.005 is half a per cent. By default that of the prior that the board is used with,
+            or else of the edges, as on a card.
+        first_label : tuple of int
+        clamped : dict of Quantity, number or array of readings, m
+            What a clamp covers, by edge.
+        signs : dict of str, optional
+            "+" or "-", by label.
+        unlabelled : sequence of Peak, Quantity, number or array of readings, Hz
+            Peaks without a label.
+        attached : sequence of AttachedItem
+        hammer : tuple of float, optional, m
+        fluid : DeclaredFluid, optional
+            The air or the water around the board.
+        bounce : Quantity, number or array of readings, optional, Hz
+            At which the free board moves as a whole on its support.
+        published_coefficients : CoefficientCard, optional
+
+        Returns
+        -------
+        Setup
+
+        Raises
+        ------
+        InputError
+            With every label, frequency, peak and name of an edge that cannot be read.
+        """
+        faults = list(wrong_types(str(name), (
+            ("name", name, isinstance(name, str), "a text"),
+            ("frequencies", frequencies, isinstance(frequencies, Mapping), "a dict of frequencies by label"),
+            ("edges", edges, isinstance(edges, str | Mapping), "a word, or a dict of words by edge"),
+            ("noise", noise, noise is None or _is_noise(noise), NOISE_WANTED),
+            ("resolution", resolution, _is_number(resolution), "a number, in Hz"),
+            ("first_label", first_label, is_place(first_label), "a pair of whole numbers"),
+            ("clamped", clamped, isinstance(clamped, Mapping | None), "a dict of lengths by edge"),
+            ("signs", signs, isinstance(signs, Mapping | None), "a dict of signs by label"),
+            ("unlabelled", unlabelled, isinstance(unlabelled, list | tuple | np.ndarray), "a list of peaks"),
+            ("attached", attached, are(attached, AttachedItem), "a list of AttachedItem"),
+            ("hammer", hammer, hammer is None or is_place(hammer), "a place (x, y) in m"),
+            ("fluid", fluid, isinstance(fluid, DeclaredFluid | None), "a DeclaredFluid"),
+            ("published_coefficients", published_coefficients,
+             isinstance(published_coefficients, CoefficientCard | None), "a CoefficientCard"),
+        )))  # fmt: skip
+        if faults:
+            raise InputError(faults)
+        if not isinstance(edges, str) and set(edges) != set(EDGES):
+            faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
+        words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
+        told = {Label.parse(label_text(label)): sign for label, sign in (signs or {}).items()}
+        readings = []
+        for label, frequency in frequencies.items():
+            try:
+                one = Reading.of(label, frequency, first_label=first_label)
+                readings.append(replace(one, sign=told.pop(one.label, "")))
+            except InputError as error:
+                faults += [replace(fault, place=f"{name} {fault.place}") for fault in error.faults]
+        faults += [Fault(f"{name} signs", "a label among the frequencies", str(label)) for label in told]
+        covered: dict[str, Quantity] = {}
+        for edge, length in (clamped or {}).items():
+            if edge not in EDGES:
+                faults.append(Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(edge)))
+            try:
+                covered[edge] = quantity_of(length, f"{name} clamped {edge}", "in m")
+            except InputError as error:
+                faults += error.faults
+        peaks, no_peaks = peaks_of(unlabelled, name)
+        faults += no_peaks
+        if faults:
+            raise InputError(faults)
+        made = cls(
+            name=name,
+            ends_x=(cast(End, words["x0"]), cast(End, words["x1"])),
+            ends_y=(cast(End, words["y0"]), cast(End, words["y1"])),
+            readings=tuple(readings),
+            noise=DEFAULT_NOISE if noise is None else noise,
+            clamped=covered,
+            resolution=float(resolution),
+            peaks=peaks,
+            first_label=Label(*first_label),
+            published_coefficients=published_coefficients,
+            attached=tuple(attached),
+            hammer=hammer,
+            fluid=fluid,
+            bounce=None if bounce is None else quantity_of(bounce, f"{name} bounce", "in Hz"),
+        )
+        return made.assuming_noise() if noise is None else made
+
+    def assuming_noise(self, prior: PriorCard | None = None) -> Setup:
+        """The setup with the noise of a prior, or else of its edges, in place of any that it has."""
+        noise = assumed_noise(self.ends_x + self.ends_y, prior)
+        return replace(self, noise=noise, assumed=noise)
+
+    @property
+    def is_noise_assumed(self) -> bool:
+        """Whether the noise is still the very object that was assumed: whoever states another one replaces it."""
+        return self.noise is self.assumed
+
+    @property
+    def edges(self) -> dict[str, str]:
+        """Condition of each edge."""
+        return dict(zip(EDGES, self.ends_x + self.ends_y, strict=True))
+
+    @property
+    def labels(self) -> tuple[Label, ...]:
+        """Labels of the readings, in their order."""
+        return tuple(reading.label for reading in self.readings)
+
+    @property
+    def unlabelled(self) -> tuple[float, ...]:
+        """Mean frequencies of the peaks without a label, Hz, in their order."""
+        return tuple(peak.frequency.mean for peak in self.peaks)
+
+    @property
+    def measured(self) -> NDArray[np.float64]:
+        """Measured frequencies: (n_modes,) array, Hz."""
+        return np.array([reading.frequency.mean for reading in self.readings])
+
+    @property
+    def relative_sd(self) -> NDArray[np.float64]:
+        """Relative uncertainty of each reading itself, apart from the noise: (n_modes,) array."""
+        return np.array([reading.frequency.sd / reading.frequency.mean for reading in self.readings])
+
+    @property
+    def owner(self) -> Owner:
+        """The owner of the setup's parameters."""
+        return Owner("setup", self.name)
+
+    @property
+    def sensor(self) -> tuple[float, float] | None:
+        """Where the one accelerometer stands, m; None where there is none, there are several, or it roved."""
+        fixed = [item for item in self.attached if item.kind == "accelerometer" and len(item.places) == 1]
+        return fixed[0].places[0] if len(fixed) == 1 else None
+
+    @property
+    def is_free(self) -> bool:
+        """Whether no edge is held."""
+        return {*self.ends_x, *self.ends_y} == {"free"}
+
+    @property
+    def noise_parameter(self) -> Parameter:
+        """The relative noise of a frequency as a parameter."""
+        return Parameter("noise", self.owner, self.noise, "1", words="noise")
+
+    @property
+    def clamped_parameters(self) -> tuple[Parameter, ...]:
+        """What the clamps cover, one parameter per clamped edge for which the card states it."""
+        return tuple(
+            Parameter(f"clamped_{edge}", self.owner, length, "m", words=f"covered by the clamp on {edge}")
+            for edge, length in self.clamped.items()
+        )
+
+    def input_name(self, edge: str) -> str:
+        """Name of the clamped length of an edge among the board's inputs."""
+        return shown_name(f"clamped_{edge}", self.owner)
