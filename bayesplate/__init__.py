@@ -38,11 +38,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from bayesplate.board.attached import AttachedItem, DeclaredFluid
     from bayesplate.board.board import Board
     from bayesplate.board.prior import PriorCard
     from bayesplate.board.quantity import Quantity
     from bayesplate.board.reading import Peak, Reading
-    from bayesplate.board.setup import AttachedItem, DeclaredFluid, Setup
+    from bayesplate.board.setup import Setup
     from bayesplate.campaigns.checking import CampaignCheck
     from bayesplate.campaigns.diagnosis import CampaignDiagnosis
     from bayesplate.campaigns.summary import CampaignSummary
@@ -136,7 +137,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "AttachedItem": "bayesplate.board.setup",
+    "AttachedItem": "bayesplate.board.attached",
     "BatchError": "bayesplate.errors",
     "BatchResult": "bayesplate.workflow.batch",
     "BayesplateError": "bayesplate.errors",
@@ -152,7 +153,7 @@ _HOMES = {
     "CheckpointError": "bayesplate.errors",
     "CompareResult": "bayesplate.workflow.compare",
     "Comparison": "bayesplate.results.comparison",
-    "DeclaredFluid": "bayesplate.board.setup",
+    "DeclaredFluid": "bayesplate.board.attached",
     "DiagnoseResult": "bayesplate.workflow.diagnose",
     "Diagnosis": "bayesplate.diagnosis.wording.diagnosis",
     "Fault": "bayesplate.errors",

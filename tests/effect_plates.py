@@ -12,9 +12,10 @@ from generator.effects import TransverseShear as GeneratorShear
 from generator.plate import EDGES, Plate
 from generator.plate import solve as solve_generator
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.parameter import Owner, shown_name
 from bayesplate.board.reading import Reading
-from bayesplate.board.setup import AttachedItem, Setup
+from bayesplate.board.setup import Setup
 from bayesplate.effects import EFFECTS, Effect, declare
 from bayesplate.effects.transverse_shear import TransverseShear
 from bayesplate.frequencies.system import System

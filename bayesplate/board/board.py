@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.board.board_card import usual_poisson
+from bayesplate.board.board_keys import WARPS, BoardKeys, CardFile, MaterialKeys, PlateKeys, read_board
+from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.material import ISOTROPIC, ORTHOTROPIC, Symmetry
 from bayesplate.board.parameter import BOARD, Parameter
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Kind, Quantity
 from bayesplate.board.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
-from bayesplate.board.setup import Setup
-from bayesplate.board.stated import are, quantity_of, wrong_types
+from bayesplate.board.setup import NOISE_WANTED, Setup
+from bayesplate.board.shelf import find
+from bayesplate.board.stated import are, quantity_of, unstatable, wrong_types
+from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.words import did_you_mean, effect_named
-from bayesplate.board.writing import write_card
-from bayesplate.errors import Fault, InputError
+from bayesplate.board.writing import toml_text, write_card
+from bayesplate.errors import Fault, InputError, plain
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
@@ -36,16 +40,17 @@ INPUTS = {
     "poisson_xy": ("1", "Poisson ratio nu_xy"),
 }
 """What a card states of a board: unit, and what people call it."""
-WARPS = {"cup": 0.0, "bow": -math.inf, "twist": 0.0}
-"""How a board may not be flat, and from where on: all signs at once change nothing, nor does the twist's alone."""
+DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
+ISOTROPIC_POISSON = Quantity.from_mean(0.3, 0.06, "normal")
+"""Of an isotropic board: foams and glass lie near 0.2, most metals near 0.3, acrylic near 0.37."""
 
 
 @dataclass(frozen=True)
 class Board:
     """A board and its setups, in SI units.
 
-    `Board.from_numbers` makes one from numbers, `dataclasses.replace` and `with_priors` another one from it;
-    `bayesplate.board.from_card.board_from_card` takes a card to SI units.
+    `Board.from_toml` reads one from a card and `to_toml` writes one, `Board.from_numbers` makes one from numbers,
+    `dataclasses.replace` and `with_priors` make another one from it.
 
     Attributes
     ----------
@@ -74,6 +79,8 @@ class Board:
         One modulus in all directions: E_y = E_x = E and G_xy = E / (2 (1 + nu)), nu the input poisson_xy.
     notes : tuple of str
         What was assumed because the card does not say it.
+    card : CardFile or None
+        Where it was read; None if it was made in Python.
     """
 
     name: str
@@ -90,6 +97,7 @@ class Board:
     warp: Mapping[str, Quantity] = field(default_factory=dict)
     isotropic: bool = False
     notes: tuple[str, ...] = ()
+    card: CardFile | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(map(effect_named, self.effects)))
@@ -253,12 +261,11 @@ class Board:
             raise InputError([*faults, *unread])
         card = prior if isinstance(prior, PriorCard) else load_prior(prior)
         shear = {key: quantities.pop(key, None) for key in ("shear_xz", "shear_yz")}
-        held = (setups,) if isinstance(setups, Setup) else tuple(setups)
         return made_board(
             name,
             quantities,
-            [setup.assuming_noise(card) if setup.is_noise_assumed else setup for setup in held],
-            assumed_poisson=None if "poisson_xy" in quantities else card.poisson_xy or usual_poisson(isotropic),
+            (setups,) if isinstance(setups, Setup) else tuple(setups),
+            assumed_poisson=None if "poisson_xy" in quantities else usual_poisson(isotropic),
             prior=prior.name if isinstance(prior, PriorCard) else os.fspath(prior),
             effects=tuple(effects or ()),
             implies=effects is None or bool(effects),
@@ -267,9 +274,148 @@ class Board:
             source=source,
             warp=warps,
             **shear,
+        ).assuming(card)
+
+    @classmethod
+    def from_toml(
+        cls,
+        name_or_path: str | os.PathLike[str],
+        *,
+        may_lack_frequencies: bool = False,
+        setup: str | os.PathLike[str] | None = None,
+    ) -> Board:
+        """Read a board card; the cards that it names are not read.
+
+        Parameters
+        ----------
+        name_or_path : str or path
+            Name of a shipped card, or a path: it contains a separator or ends in .toml.
+        may_lack_frequencies : bool
+            Whether a board that was not measured yet will do.
+        setup : str or path, optional
+            A file with a table [setup] that takes the place of the card's, key by key.
+
+        Returns
+        -------
+        Board
+
+        Raises
+        ------
+        InputError
+            If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at
+            once.
+        """
+        path = find("boards", name_or_path)
+        return cls.from_bytes(read_file(path), path.stem, path.parent, may_lack_frequencies, setup)
+
+    @classmethod
+    def from_bytes(
+        cls,
+        content: bytes | str,
+        name: str,
+        folder: Path | None = None,
+        may_lack_frequencies: bool = False,
+        setup: str | os.PathLike[str] | None = None,
+    ) -> Board:
+        """The same from what stands, or might stand, in the file NAME.toml of a folder."""
+        data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
+        name = name.removesuffix(".toml")
+        file = plain(f"{name}.toml")
+        table = read_table(data, file)
+        return cls.from_table(CardFile(table, file, folder, data.decode("utf-8")), name, may_lack_frequencies, setup)
+
+    @classmethod
+    def from_table(
+        cls,
+        card: CardFile,
+        name: str,
+        may_lack_frequencies: bool = False,
+        setup: str | os.PathLike[str] | None = None,
+    ) -> Board:
+        """The same from the table of a card."""
+        keys, card = read_board(card, name, may_lack_frequencies, setup)
+        plate, material = keys.plate, keys.material
+        inputs = {**dict(plate), "poisson_xy": material.poisson_xy}
+        return made_board(
+            keys.name,
+            {key: inputs[key] for key in INPUTS if inputs[key] is not None},
+            [Setup.from_keys(one) for one in keys.setups],
+            assumed_poisson=usual_poisson(material.isotropic) if material.poisson_xy is None else None,
+            title=keys.title,
+            source=keys.source,
+            prior=material.prior,
+            effects=keys.effects or (),
+            implies=keys.effects != (),
+            shear_xz=material.shear_xz,
+            shear_yz=material.shear_yz,
+            warp=plate.warp,
+            isotropic=material.isotropic,
+            card=card,
         )
 
-    def to_card(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
+    def assuming(self, prior: PriorCard | None, tables: Mapping[str, CoefficientCard] | None = None) -> Board:
+        """The board with what nobody stated of it taken from a prior, as far as that states it.
+
+        Parameters
+        ----------
+        prior : PriorCard or None
+        tables : dict of CoefficientCard, optional
+            By setup, those that the card names.
+        """
+        poisson = (prior and prior.poisson_xy) or usual_poisson(self.isotropic)
+        setups = [one.assuming_noise(prior) if one.is_noise_assumed else one for one in self.setups]
+        if tables is not None:
+            setups = [replace(one, published_coefficients=tables.get(one.name), table_name="") for one in setups]
+        return replace(
+            self,
+            setups=tuple(setups),
+            parameters=tuple(
+                replace(one, prior=poisson, assumed=poisson) if one.is_assumed else one for one in self.parameters
+            ),
+        )
+
+    def table(self) -> dict[str, Any]:
+        """The table of its card; raises InputError if a quantity has a density that no card can state."""
+        own = [one for one in self.parameters if one.owner == BOARD and not one.is_of_effect and not one.is_assumed]
+        inputs = {one.name: one.prior for one in own}
+        faults = [*self._unstatable()]
+        if faults:
+            raise InputError(faults)
+        poisson_xy = inputs.pop("poisson_xy", None)
+        material = {name: getattr(self, name) for name in ("isotropic", "shear_xz", "shear_yz")}
+        keys = BoardKeys.model_construct(
+            format=1,
+            name=self.name,
+            title=self.title,
+            source=self.source,
+            effects=self.effects if self.effects or not self.implies else None,
+            plate=PlateKeys.model_construct(None, **inputs, warp=self.warp),
+            material=MaterialKeys.model_construct(poisson_xy=poisson_xy, **material, prior=self.prior),
+        )
+        setups = [one.table() for one in self.setups]
+        return {
+            **keys.model_dump(by_alias=True, exclude_defaults=True, exclude={"setups"}),
+            "setup": setups[0] if len(setups) == 1 else setups,
+        }
+
+    def _unstatable(self) -> Iterator[Fault]:
+        """Every quantity that a card cannot state."""
+        for one in self.parameters:
+            if not one.is_of_effect and one.owner.kind != "group":  # sessions are found again when the card is read
+                yield from unstatable(one.name, one.prior, "normal" if one.name == "poisson_xy" else "log-normal")
+        for name, modulus in (("shear_xz", self.shear_xz), ("shear_yz", self.shear_yz)):
+            if modulus is not None:
+                yield from unstatable(name, modulus)
+        for setup in self.setups:
+            for place, quantity in setup.uncertain_keys():
+                yield from unstatable(f"{setup.name} {place}", quantity)
+        for name, rise in self.warp.items():
+            yield from unstatable(f"warp {name}", rise, "normal", WARPS[name])
+        for setup in self.setups:
+            if setup.noise.is_exact:
+                yield Fault(f"{setup.name} noise", NOISE_WANTED, "an exact number")
+
+    def to_toml(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
         """The board as a card, in TOML.
 
         Parameters
@@ -289,12 +435,30 @@ class Board:
         InputError
             If a quantity has a density that no card can state, or the file cannot be written.
         """
-        from bayesplate.board.board_text import card_text
-
-        text = card_text(self)
+        text = toml_text(self.table())
         if path is not None:
             write_card(path, self.name, text, force=force)
         return text
+
+    @property
+    def file(self) -> str:
+        """The name of its card, as messages show it."""
+        return self.card.file if self.card is not None else f"{self.name}.toml"
+
+    @property
+    def folder(self) -> Path | None:
+        """Where cards that it names by a relative path are looked for; None for the working directory."""
+        return None if self.card is None else self.card.folder
+
+    @property
+    def text(self) -> str:
+        """Its card as it was read; that of a board made in Python is written."""
+        return self.to_toml() if self.card is None else self.card.text
+
+    @property
+    def sha256(self) -> str:
+        """Hexadecimal SHA-256 of its card."""
+        return (self.card or CardFile(self.table(), self.file)).sha256
 
     @property
     def reading_names(self) -> tuple[str, ...]:
@@ -352,6 +516,18 @@ def _named(place: str, name: str, among: Iterable[Named]) -> Named:
     if name not in by_name:
         raise InputError(_unknown(place, name, by_name))
     return by_name[name]
+
+
+def usual_poisson(is_isotropic: bool) -> Quantity:
+    """The Poisson ratio of a board of which nothing is known, of wood or isotropic: an object of its own."""
+    return replace(ISOTROPIC_POISSON if is_isotropic else DEFAULT_POISSON)
+
+
+def assumed_notes(board: Board) -> tuple[str, ...]:
+    """A sentence on the Poisson ratio that was assumed, where nobody stated one."""
+    nu = board.parameter("poisson_xy")
+    told = f"nu_xy = {nu.prior.mean:g} ± {nu.prior.sd:g} was assumed"
+    return (f"the card gives no Poisson ratio: {told}",) if nu.is_assumed else ()
 
 
 def made_board(

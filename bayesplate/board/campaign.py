@@ -8,19 +8,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PlainValidator, PrivateAttr
+from pydantic import BeforeValidator, Field, PrivateAttr
 
-from bayesplate.board.board_card import EffectNames, name_faults
-from bayesplate.board.schema import Section, place, validated
+from bayesplate.board.schema import Section, name_faults, place, validated
 from bayesplate.board.shelf import card_names, find
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.values import (
     Choice,
     Complaint,
+    Key,
     Number,
     Refusal,
     read_each,
     read_effect,
+    read_effects,
     read_format,
     read_list,
     read_name,
@@ -63,27 +64,27 @@ class SharedSection(Section):
         Scale of what the boards' own are believed to differ by from what they have in common; 0 if by nothing.
     """
 
-    effect: Annotated[str, PlainValidator(read_effect)] = Field(description="the name of an effect")
-    way: Annotated[Way, PlainValidator(Choice(WAYS))] = Field(default="value", alias="as")
-    scatter_percent: Annotated[float, PlainValidator(Number(0.1, 100, "%"))] = 0.0
+    effect: Annotated[str, Key(read_effect)] = Field(description="the name of an effect")
+    way: Annotated[Way, Key(Choice(WAYS))] = Field(default="value", alias="as")
+    scatter_percent: Annotated[float, Key(Number(0.1, 100, "%"))] = 0.0
 
 
 class PopulationSection(Section):
     """That the boards' constants share a distribution, and what is believed of it before measuring."""
 
-    prior: Annotated[str, PlainValidator(read_reference)] = Field(description="a card of models/priors")
+    prior: Annotated[str, Key(read_reference)] = Field(description="a card of models/priors")
 
 
 class CampaignCard(Section):
     """Boards and what they share. `load_campaign` makes one."""
 
-    format: Annotated[Literal[1], PlainValidator(read_format)] = Field(description="1")
-    name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, PlainValidator(read_text)] = ""
-    source: Annotated[str, PlainValidator(read_text)] = ""
-    notes: Annotated[str, PlainValidator(read_text)] = ""
-    boards: Annotated[tuple[str, ...], PlainValidator(_read_boards)] = Field(description="a list of board cards")
-    effects: EffectNames = ()
+    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
+    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, Key(read_text)] = ""
+    source: Annotated[str, Key(read_text)] = ""
+    notes: Annotated[str, Key(read_text)] = ""
+    boards: Annotated[tuple[str, ...], Key(_read_boards)] = Field(description="a list of board cards")
+    effects: Annotated[tuple[str, ...], Key(read_effects)] = ()
     shared: Annotated[tuple[SharedSection, ...], BeforeValidator(_as_list)] = ()
     population: PopulationSection | None = None
     _path: Path = PrivateAttr(Path())

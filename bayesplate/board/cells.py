@@ -1,15 +1,10 @@
-"""Cells of a table as values of a card, and a card of such values as text."""
+"""Cells of a table as values of a card."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
 from typing import Any
 
-from bayesplate.board.writing import array, number, table, text, whole
-
 Cell = str | float | int | None
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def is_empty(cell: Cell) -> bool:
@@ -42,26 +37,3 @@ def _number(part: str) -> float | None:
         return None if "_" in part else float(part)
     except ValueError:
         return None
-
-
-def card_text(content: Mapping[str, Any]) -> str:
-    """A card as TOML, one line for each of its keys."""
-    return "".join(f"{_key(key)} = {_toml(value)}\n" for key, value in content.items())
-
-
-def _key(key: str) -> str:
-    return key if _BARE.fullmatch(key) else text(key)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, int):
-        return whole(value)
-    if isinstance(value, float):
-        return number(value)
-    if isinstance(value, Mapping):
-        return table({_key(key): _toml(one) for key, one in value.items()})
-    if isinstance(value, list | tuple):
-        return array([_toml(one) for one in value])
-    return text(value if isinstance(value, str) else str(value))

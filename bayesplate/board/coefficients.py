@@ -8,15 +8,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, PlainValidator
+from pydantic import Field
 
-from bayesplate.board.board_card import LARGEST_POISSON, name_faults
-from bayesplate.board.measures import read_by_label, read_first_label
-from bayesplate.board.schema import Section, validated
-from bayesplate.board.setup_card import Edges
+from bayesplate.board.measures import FIRST_LABEL, LARGEST_POISSON, by_label
+from bayesplate.board.reading import NO_OFFSET
+from bayesplate.board.schema import Section, name_faults, validated
+from bayesplate.board.setup_keys import Edges
 from bayesplate.board.shelf import find
 from bayesplate.board.toml import read_file, read_table
-from bayesplate.board.values import Complaint, Number, Refusal, read_each, read_format, read_list, read_name, read_text
+from bayesplate.board.values import (
+    Complaint,
+    Key,
+    Number,
+    Refusal,
+    read_each,
+    read_format,
+    read_list,
+    read_name,
+    read_text,
+)
 from bayesplate.board.values import read_table as read_entries
 from bayesplate.board.words import shown
 from bayesplate.errors import plain
@@ -25,9 +35,9 @@ from bayesplate.labels import Label
 Coefficients = tuple[float, float, float]
 _COEFFICIENT = Number(-1e9, 1e9)
 _PART = Number(1e-3, 1e5)
-_GPA = Annotated[float | None, PlainValidator(Number(1e-4, 1000, "GPa"))]
-_RATIO = Annotated[float | None, PlainValidator(Number(-LARGEST_POISSON, LARGEST_POISSON))]
-_SPAN = Annotated[float | None, PlainValidator(Number(1, 100_000, "mm"))]
+_GPA = Annotated[float | None, Key(Number(1e-4, 1000, "GPa"))]
+_RATIO = Annotated[float | None, Key(Number(-LARGEST_POISSON, LARGEST_POISSON))]
+_SPAN = Annotated[float | None, Key(Number(1, 100_000, "mm"))]
 
 
 def _read_aspect(value: object) -> float:
@@ -53,15 +63,14 @@ def _read_row(value: object) -> _Row:
     if not isinstance(value, dict):
         raise Refusal(Complaint("{ a, b, c, r_squared }", shown(value)))
     readers = {"a": _COEFFICIENT, "b": _COEFFICIENT, "c": _COEFFICIENT, "r_squared": Number(0, 1)}
-    read = read_entries(value, dict(readers))
-    missing = [key for key in ("a", "b", "c") if key not in read]
-    if missing:
-        raise Refusal(*(Complaint("a number", "nothing", inside=(key,)) for key in missing))
-    return _Row(**read)
+    return _Row(**read_entries(value, readers, needed=("a", "b", "c")))
+
+
+_ROWS = by_label(Key(_read_row))
 
 
 def _read_rows(value: object) -> dict[Label, _Row]:
-    rows = read_by_label(value, _read_row)
+    rows: dict[Label, _Row] = _ROWS.read(value)
     if not rows:
         raise Refusal(Complaint('a row for each mode, "(1,0)" = { a, b, c }', "no modes"))
     return rows
@@ -76,8 +85,8 @@ class TrainingSection(Section):
 
     length_x_mm: _SPAN = None
     length_y_mm: _SPAN = None
-    thickness_mm: Annotated[float | None, PlainValidator(Number(0.01, 1000, "mm"))] = None
-    density_kg_m3: Annotated[float | None, PlainValidator(Number(1, 30_000, "kg/m3"))] = None
+    thickness_mm: Annotated[float | None, Key(Number(0.01, 1000, "mm"))] = None
+    density_kg_m3: Annotated[float | None, Key(Number(1, 30_000, "kg/m3"))] = None
     E_x_gpa: _GPA = None
     E_y_gpa: _GPA = None
     E_z_gpa: _GPA = None
@@ -87,21 +96,21 @@ class TrainingSection(Section):
     nu_xy: _RATIO = None
     nu_xz: _RATIO = None
     nu_yz: _RATIO = None
-    steps: Annotated[tuple[float, ...], PlainValidator(_read_steps)] = ()
+    steps: Annotated[tuple[float, ...], Key(_read_steps)] = ()
 
 
 class CoefficientCard(Section):
     """A printed or computed table of a, b, c. `load_coefficients` makes one."""
 
-    format: Annotated[Literal[1], PlainValidator(read_format)] = Field(description="1")
-    name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, PlainValidator(read_text)] = ""
-    source: Annotated[str, PlainValidator(read_text)] = Field(description="where the numbers come from")
-    aspect_ratio: Annotated[float, PlainValidator(_read_aspect)] = Field(description="[L_x, L_y] or their ratio")
-    first_label: Annotated[Label, PlainValidator(read_first_label)] = Label(0, 0)
+    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
+    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, Key(read_text)] = ""
+    source: Annotated[str, Key(read_text)] = Field(description="where the numbers come from")
+    aspect_ratio: Annotated[float, Key(_read_aspect)] = Field(description="[L_x, L_y] or their ratio")
+    first_label: Annotated[Label, FIRST_LABEL] = NO_OFFSET
     edges: Edges = Field(description="how the four edges are held")
     training: TrainingSection = TrainingSection()
-    rows: Annotated[Mapping[Label, _Row], PlainValidator(_read_rows)] = Field(
+    rows: Annotated[Mapping[Label, _Row], Key(_read_rows)] = Field(
         alias="coefficients", description='a row for each mode, "(1,0)" = { a, b, c }'
     )
 

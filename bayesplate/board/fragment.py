@@ -7,18 +7,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bayesplate.board.setup_card import DEFAULT_SETUP_NAME, SetupSection
+from bayesplate.board.schema import sections_of
+from bayesplate.board.setup_keys import DEFAULT_SETUP_NAME, SetupKeys
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.words import did_you_mean, quoted, shown
-from bayesplate.board.writing import table_text
 from bayesplate.errors import Fault, InputError, plain
 
 _READINGS = ("frequencies_hz", "signs", "label_confidence", "unlabelled_hz", "peaks")
 """What was measured together: a fragment that has any of them replaces all that the card says of them."""
 
 
-def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]) -> tuple[str, str]:
-    """The text of a card with the keys of a fragment in one of its setups, and what to call it in messages.
+def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
+    """The table of a card with the keys of a fragment in one of its setups, and what to call it in messages.
 
     Parameters
     ----------
@@ -32,7 +32,8 @@ def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]
 
     Returns
     -------
-    text, name : str
+    table : dict
+    name : str
 
     Raises
     ------
@@ -46,7 +47,7 @@ def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]
     if not isinstance(own, dict):
         got = "several [[setup]]" if isinstance(own, list) else "none" if own is None else shown(own)
         raise InputError(Fault(named, "one table [setup]", got, "bayesplate pick writes one"))
-    known = list(SetupSection.model_fields)
+    known = list(sections_of(SetupKeys)[()])
     faults = [Fault(f"{named} {key}", "nothing but [setup]", "another key") for key in read if key != "setup"]
     faults += [
         Fault(f"{named} [setup] {key}", f"one of {', '.join(known)}", "an unknown key", did_you_mean(key, known))
@@ -65,7 +66,7 @@ def merged(table: Mapping[str, Any], file: str, fragment: str | os.PathLike[str]
         kept = {key: value for key, value in setups[at].items() if key not in dropped}
         setups[at] = kept | own
     whole = {**table, "setup": setups[0] if len(setups) == 1 else setups}
-    return table_text(whole), f"{file} with {named}"
+    return whole, f"{file} with {named}"
 
 
 def _which(setups: list[dict[str, Any]], own: Mapping[str, Any], named: str, file: str) -> int | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from bayesplate.board.board_card import BoardCard
+from bayesplate.board.board import Board
 from bayesplate.board.coefficients import CoefficientCard, load_coefficients
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.words import setup_places
@@ -36,13 +36,13 @@ class NamedCards:
 
 
 def load_named(
-    card: BoardCard, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] | None = None
+    board: Board, prior: PriorCard | None = None, tables: Mapping[str, CoefficientCard] | None = None
 ) -> NamedCards:
     """Read every card that a board card names and that is not given.
 
     Parameters
     ----------
-    card : BoardCard
+    board : Board
     prior : PriorCard, optional
         In place of the one that the card names.
     tables : dict of CoefficientCard, optional
@@ -52,21 +52,21 @@ def load_named(
     -------
     NamedCards
     """
-    file, beside = card.file, card.folder
+    file, beside = board.file, board.folder
     faults: list[Fault] = []
     where = f"{file} [material] prior"
     if prior is None:
-        prior = _read(load_prior, card.material.prior, beside, where, faults)
+        prior = _read(load_prior, board.prior, beside, where, faults)
     if prior is not None:
-        name, prior = prior.name, prior.for_board(card.material.isotropic)
-        faults += [] if prior is not None else [_of_another_symmetry(where, name, card.material.isotropic)]
+        name, prior = prior.name, prior.for_board(board.isotropic)
+        faults += [] if prior is not None else [_of_another_symmetry(where, name, board.isotropic)]
     if tables is not None:
         return NamedCards(prior, tables, tuple(faults))
     found: dict[str, CoefficientCard] = {}
-    for setup, where in zip(card.setups, setup_places(file, [setup.name for setup in card.setups]), strict=True):
-        if setup.published_coefficients is not None:
+    for setup, where in zip(board.setups, setup_places(file, [setup.name for setup in board.setups]), strict=True):
+        if setup.table_name:
             place = f"{where} published_coefficients"
-            table = _read(load_coefficients, setup.published_coefficients, beside, place, faults)
+            table = _read(load_coefficients, setup.table_name, beside, place, faults)
             found |= {} if table is None else {setup.name: table}
     return NamedCards(prior, found, tuple(faults))
 

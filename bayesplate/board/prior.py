@@ -4,22 +4,34 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator
+from pydantic import Field
 
-from bayesplate.board.board_card import LARGEST_POISSON, name_faults
-from bayesplate.board.measures import DENSITY, QuantityReader, read_factor, read_noise, read_whole_table
+from bayesplate.board.measures import DENSITY, POISSON, QuantityReader, read_factor, read_noise_percent, written_noise
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.schema import Section, validated
+from bayesplate.board.schema import Section, name_faults, validated
 from bayesplate.board.shelf import find
 from bayesplate.board.stated import wrong_types
-from bayesplate.board.toml import read_file, read_table
-from bayesplate.board.values import Choice, Complaint, Number, Refusal, read_format, read_name, read_text
+from bayesplate.board.toml import read_file
+from bayesplate.board.toml import read_table as read_toml
+from bayesplate.board.units import in_unit, median_and_factor
+from bayesplate.board.values import (
+    Choice,
+    Complaint,
+    Key,
+    Number,
+    Refusal,
+    read_format,
+    read_name,
+    read_table,
+    read_text,
+)
 from bayesplate.board.words import did_you_mean, shown
+from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import Fault, InputError, plain
 
 ELASTIC = ("E_x", "E_y", "G_xy")
@@ -39,54 +51,67 @@ class StatedPrior:
     source: str
 
 
+_DISTRIBUTIONS = ("log-normal", "log-uniform")
+
+
 @dataclass(frozen=True)
-class _ConstantReader:
+class _Constant:
     """Reads { distribution, median_gpa, factor, source } or { distribution, lower_gpa, upper_gpa, source }."""
 
     unit: Literal["gpa", "n_m"]
 
-    def __call__(self, value: object) -> StatedPrior:
-        distributions = ("log-normal", "log-uniform")
+    @property
+    def number(self) -> Number:
+        """What may stand in such a key."""
+        return Number(1e-6, 1e6, "GPa") if self.unit == "gpa" else Number(1e-9, 1e9, "N m")
+
+    def read(self, value: object) -> StatedPrior:
         if not isinstance(value, dict):
             raise Refusal(Complaint("a table with a distribution", shown(value)))
-        if value.get("distribution") not in distributions:
-            raise Refusal(_distribution_complaint(value.get("distribution"), distributions))
-        si, number = (1e9, Number(1e-6, 1e6, "GPa")) if self.unit == "gpa" else (1.0, Number(1e-9, 1e9, "N m"))
+        if value.get("distribution") not in _DISTRIBUTIONS:
+            read_table({"distribution": value.get("distribution")}, {"distribution": Choice(_DISTRIBUTIONS)})
+        number, si = self.number, self.number.si
         median, lower, upper = (f"{key}_{self.unit}" for key in ("median", "lower", "upper"))
-        common: dict[str, Any] = {"distribution": Choice(distributions), "source": read_text}
+        readers: dict[str, Any] = {"distribution": Choice(_DISTRIBUTIONS), "source": read_text}
         if value["distribution"] == "log-normal":
-            read = read_whole_table(value, {**common, median: number, "factor": read_factor})
+            readers |= {median: number, "factor": read_factor}
+            read = read_table(value, readers, needed=readers)
             return StatedPrior(Quantity.from_median(read[median] * si, read["factor"]), read["source"])
-        read = read_whole_table(value, {**common, lower: number, upper: number})
+        readers |= {lower: number, upper: number}
+        read = read_table(value, readers, needed=readers)
         if not read[lower] < read[upper]:
             both = f"{shown(value[lower])} and {shown(value[upper])}"
             raise Refusal(Complaint(f"{lower} below {upper}", both))
         return StatedPrior(Quantity.from_range(read[lower] * si, read[upper] * si), read["source"])
 
-
-def _distribution_complaint(value: object, distributions: tuple[str, ...]) -> Complaint:
-    try:
-        Choice(distributions)(value)
-    except Refusal as refusal:
-        (one,) = refusal.complaints
-        return Complaint(one.wanted, one.got, one.remedy, ("distribution",))
-    raise AssertionError("unreachable: the word was refused before")
-
-
-def _stated(value: object, read: Any) -> StatedPrior:
-    """Read a quantity whose table holds its source too."""
-    if not isinstance(value, dict):
-        raise Refusal(Complaint("a table with a source", shown(value)))
-    if "source" not in value:
-        raise Refusal(Complaint("where the numbers come from", "nothing", inside=("source",)))
-    quantity = read({key: entry for key, entry in value.items() if key != "source"})
-    return StatedPrior(quantity, read_text(value["source"]))
+    def write(self, stated: StatedPrior) -> dict[str, Any]:
+        one, si = stated.quantity, self.number.si
+        if one.kind == "log-uniform":
+            numbers = {f"lower_{self.unit}": in_unit(one.lower, si), f"upper_{self.unit}": in_unit(one.upper, si)}
+        else:
+            median, factor = median_and_factor(one, si, lambda m, f: Quantity.from_median(m * si, f))
+            numbers = {f"median_{self.unit}": median, "factor": factor}
+        return {"distribution": one.kind, **numbers, "source": stated.source}
 
 
-_Elastic = Annotated[StatedPrior | None, PlainValidator(_ConstantReader("gpa"))]
-_Rigidity = Annotated[StatedPrior | None, PlainValidator(_ConstantReader("n_m"))]
-_POISSON = QuantityReader(Number(-LARGEST_POISSON, LARGEST_POISSON), "normal")
-_DENSITY = QuantityReader(DENSITY)
+def _with_source(read: Callable[[Any], Quantity], write: Callable[[Quantity], dict[str, Any]]) -> Key:
+    """A key that holds a quantity in a table with its source."""
+
+    def read_both(value: object) -> StatedPrior:
+        if not isinstance(value, dict):
+            raise Refusal(Complaint("a table with a source", shown(value)))
+        if "source" not in value:
+            raise Refusal(Complaint("where the numbers come from", "nothing", inside=("source",)))
+        quantity = read({key: entry for key, entry in value.items() if key != "source"})
+        return StatedPrior(quantity, read_text(value["source"]))
+
+    return Key(read_both, lambda stated: write(stated.quantity) | {"source": stated.source})
+
+
+_ELASTIC, _RIGIDITY = (Key(one.read, one.write) for one in (_Constant("gpa"), _Constant("n_m")))
+_NOISE = _with_source(read_noise_percent, lambda one: written_noise(one, 1.0))
+_POISSON = _with_source(POISSON.read, POISSON.write)
+_DENSITY = _with_source(QuantityReader(DENSITY), QuantityReader(DENSITY).written)
 
 
 class PriorCard(Section):
@@ -95,25 +120,19 @@ class PriorCard(Section):
     `load_prior` makes one.
     """
 
-    format: Annotated[Literal[1], PlainValidator(read_format)] = Field(description="1")
-    name: Annotated[str, PlainValidator(read_name)] = Field(description="the name of the file without .toml")
-    title: Annotated[str, PlainValidator(read_text)] = ""
-    E_x: _Elastic = None
-    E_y: _Elastic = None
-    G_xy: _Elastic = None
-    D_x: _Rigidity = None
-    D_y: _Rigidity = None
-    D_s: _Rigidity = None
-    E: _Elastic = None
-    stated_noise: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, read_noise))] = Field(
-        default=None, alias="noise_percent"
-    )
-    stated_poisson: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, _POISSON))] = Field(
-        default=None, alias="poisson_xy"
-    )
-    stated_density: Annotated[StatedPrior | None, PlainValidator(lambda value: _stated(value, _DENSITY))] = Field(
-        default=None, alias="density_kg_m3"
-    )
+    format: Annotated[Literal[1], Key(read_format)] = Field(description="1")
+    name: Annotated[str, Key(read_name)] = Field(description="the name of the file without .toml")
+    title: Annotated[str, Key(read_text)] = ""
+    E_x: Annotated[StatedPrior | None, _ELASTIC] = None
+    E_y: Annotated[StatedPrior | None, _ELASTIC] = None
+    G_xy: Annotated[StatedPrior | None, _ELASTIC] = None
+    D_x: Annotated[StatedPrior | None, _RIGIDITY] = None
+    D_y: Annotated[StatedPrior | None, _RIGIDITY] = None
+    D_s: Annotated[StatedPrior | None, _RIGIDITY] = None
+    E: Annotated[StatedPrior | None, _ELASTIC] = None
+    stated_noise: Annotated[StatedPrior | None, _NOISE] = Field(default=None, alias="noise_percent")
+    stated_poisson: Annotated[StatedPrior | None, _POISSON] = Field(default=None, alias="poisson_xy")
+    stated_density: Annotated[StatedPrior | None, _DENSITY] = Field(default=None, alias="density_kg_m3")
 
     @classmethod
     def from_quantities(
@@ -154,8 +173,6 @@ class PriorCard(Section):
         InputError
             With everything that a prior card cannot hold, and its place on the card.
         """
-        from bayesplate.board.writing import prior_text
-
         faults = list(wrong_types(str(name), (
             ("name", name, isinstance(name, str), "a text"),
             ("title", title, isinstance(title, str), "a text"),
@@ -191,9 +208,14 @@ class PriorCard(Section):
             )
             for key, one in stated.items()
         }
-        return read_prior_text(prior_text(cls.model_construct(format=1, name=name, title=title, **priors)), name)
+        made = cls.model_construct(format=1, name=name, title=title, **priors)
+        return _read_prior(made.table(), f"{plain(name)}.toml", name)
 
-    def to_card(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
+    def table(self) -> dict[str, Any]:
+        """The table of the card."""
+        return self.model_dump(by_alias=True, exclude_defaults=True)
+
+    def to_toml(self, path: str | os.PathLike[str] | None = None, *, force: bool = False) -> str:
         """The prior as a card, in TOML.
 
         Parameters
@@ -213,9 +235,7 @@ class PriorCard(Section):
         InputError
             If the file cannot be written.
         """
-        from bayesplate.board.writing import prior_text, write_card
-
-        text = prior_text(self)
+        text = toml_text(self.table())
         if path is not None:
             write_card(path, self.name, text, force=force)
         return text
@@ -287,16 +307,17 @@ def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None)
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
     path = find("priors", name_or_path, beside)
-    return _read_prior(read_file(path), plain(path.name), path.stem)
+    file = plain(path.name)
+    return _read_prior(read_toml(read_file(path), file), file, path.stem)
 
 
 def read_prior_text(text: str, name: str) -> PriorCard:
     """Read a prior card from a text, as if it stood in NAME.toml; raises InputError like `load_prior`."""
-    return _read_prior(text.encode("utf-8", "surrogatepass"), f"{plain(name)}.toml", name)
+    file = f"{plain(name)}.toml"
+    return _read_prior(read_toml(text.encode("utf-8", "surrogatepass"), file), file, name)
 
 
-def _read_prior(data: bytes, file: str, stem: str) -> PriorCard:
-    table = read_table(data, file)
+def _read_prior(table: Mapping[str, Any], file: str, stem: str) -> PriorCard:
     return validated(PriorCard, table, file, faults=[*name_faults(table, file, stem), *_set_faults(table, file)])
 
 

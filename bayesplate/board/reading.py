@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from numpy.typing import ArrayLike
+from pydantic import ConfigDict, Field
 
+from bayesplate.board.measures import QuantityReader
 from bayesplate.board.quantity import Quantity
+from bayesplate.board.repeated import FURTHEST_FREQUENCIES
 from bayesplate.board.stated import quantity_of
+from bayesplate.board.values import Choice, Key, Number
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 
 NO_OFFSET = Label(0, 0)
+_HERTZ = Number(
+    0.1, 1e6, "Hz", "in Hz; the zero-frequency modes of a free board are not listed", "in Hz: 1 kHz is 1000 Hz"
+)
+FREQUENCY = QuantityReader(_HERTZ, furthest=FURTHEST_FREQUENCIES).key
+SIGN = Key(Choice(("+", "-")))
+_DAMPING = Number(1e-6, 100, "%", "the damping ratio in percent: half the loss factor").key
 
 
 @dataclass(frozen=True)
@@ -102,10 +113,12 @@ class Peak:
         Damping ratio, 1; None if not known.
     """
 
-    frequency: Quantity
-    sign: str = ""
-    amplitude: float | None = None
-    damping: float | None = None
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    frequency: Annotated[Quantity, Field(alias="hz", description="its frequency in Hz"), FREQUENCY]
+    sign: Annotated[str, SIGN] = ""
+    amplitude: Annotated[float | None, Number(1e-12, 1e12).key] = None
+    damping: Annotated[float | None, Field(alias="damping_percent"), _DAMPING] = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequency", quantity_of(self.frequency, "frequency of a peak", "in Hz"))

@@ -7,19 +7,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bayesplate.board.board_card import BoardCard, MaterialSection, PlateSection, read_board_text
-from bayesplate.board.cells import Cell, card_text, is_empty, value, word
+from bayesplate.board.board import Board
+from bayesplate.board.board_keys import BoardKeys, CardFile
+from bayesplate.board.cells import Cell, is_empty, value, word
+from bayesplate.board.schema import sections_of
 from bayesplate.board.template import Inside, Template
 from bayesplate.board.words import did_you_mean, quoted
-from bayesplate.errors import Fault, InputError
+from bayesplate.errors import Fault, InputError, plain
 
 _TEXTS = ("name", "title", "source", "notes")
 _WORDS = (*_TEXTS, "prior")
 """Keys whose values are texts, also where a cell looks like a number."""
-_SECTIONS = {
-    **dict.fromkeys(PlateSection.model_fields, "plate"),
-    **dict.fromkeys(MaterialSection.model_fields, "material"),
-}
+_SECTIONS = {key: section for section in ("plate", "material") for key in sections_of(BoardKeys)[(section,)]}
 _MODE = re.compile(r"(?:(?P<setup>[A-Za-z0-9._-]+) )?\((?P<m>\d{1,3}), ?(?P<n>\d{1,3})\)")
 _SD = " sd"
 _MOST_COLUMNS = 500
@@ -122,8 +121,8 @@ class Columns:
         at = self.names.index("name")
         return (word(row[at]) or "") if at < len(row) else ""
 
-    def card(self, row: Sequence[Cell]) -> BoardCard:
-        """The card of a row.
+    def board(self, row: Sequence[Cell]) -> Board:
+        """The board of a row.
 
         Parameters
         ----------
@@ -141,7 +140,8 @@ class Columns:
             faults.append(Fault("name", "a name", "an empty cell"))
         if faults:
             raise InputError(faults)
-        return read_board_text(card_text(self.template.filled(values)), name, beside=self.template.path.parent)
+        card = CardFile(self.template.filled(values), f"{plain(name)}.toml", self.template.path.parent)
+        return Board.from_table(card, name)
 
     def _values(self, row: Sequence[Cell]) -> tuple[dict[Inside, Any], list[Fault]]:
         """What a row says by the keys of a card, and what is wrong with its cells beside one another."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 
 from bayesplate.board.values import Complaint, Refusal
-from bayesplate.board.words import did_you_mean, quoted, shown
+from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError
 
 MOST_FAULTS = 50
@@ -29,7 +30,7 @@ CardModel = TypeVar("CardModel", bound=Section)
 
 def validated(
     model: type[CardModel],
-    table: dict[str, Any],
+    table: Mapping[str, Any],
     file: str,
     context: Mapping[str, Any] | None = None,
     faults: Sequence[Fault] = (),
@@ -112,7 +113,7 @@ def _complaints(model: type[Section], inside: tuple[str | int, ...], detail: Any
         return error.complaints
     sections = sections_of(model)
     keys = tuple(part for part in inside if isinstance(part, str))
-    if detail["type"] == "extra_forbidden":
+    if detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         return (_unknown_key(keys, sections),)
     if detail["type"] == "missing":
         return (Complaint(sections[keys[:-1]][keys[-1]], "nothing"),)
@@ -134,10 +135,10 @@ def _unknown_key(keys: Keys, sections: Mapping[Keys, Mapping[str, str]]) -> Comp
 
 
 @cache
-def sections_of(model: type[BaseModel]) -> dict[Keys, dict[str, str]]:
+def sections_of(model: Any) -> dict[Keys, dict[str, str]]:
     """The sections of a card model: key path to known keys, each with a description of what is wanted."""
     found: dict[Keys, dict[str, str]] = {(): {}}
-    for name, field in model.model_fields.items():
+    for name, field in _fields(model).items():
         key = field.alias or name
         found[()][key] = field.description or "a value"
         for inner in _models_in(field.annotation):
@@ -146,8 +147,28 @@ def sections_of(model: type[BaseModel]) -> dict[Keys, dict[str, str]]:
     return found
 
 
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _fields(model: Any) -> dict[str, FieldInfo]:
+    """The fields of a pydantic model, or of a dataclass that pydantic reads."""
+    if issubclass(model, BaseModel):
+        return model.model_fields
+    hints = get_type_hints(model, include_extras=True)
+    return {name: FieldInfo.from_annotation(hints[name]) for name in model.__dataclass_fields__}
+
+
+def _models_in(annotation: Any) -> Iterator[type]:
+    if hasattr(annotation, "__pydantic_config__") or hasattr(annotation, "model_fields"):
         yield annotation
     for part in get_args(annotation):
         yield from _models_in(part)
+
+
+def name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
+    """The name of a card must be the name of its file."""
+    name = table.get("name")
+    if not isinstance(name, str) or name == stem:
+        return []
+    complaint = name_complaint(stem)
+    if complaint:
+        remedy = "rename the file" + ("" if name_complaint(name) else f" to {name}.toml")
+        return [Fault(file, complaint, quoted(stem), remedy)]
+    return [Fault(f"{file} name", f"{quoted(stem)}, the name of the file", quoted(name))]

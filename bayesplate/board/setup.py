@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from numbers import Real
-from typing import Literal, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayesplate.board.attached import AttachedItem, DeclaredFluid
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.parameter import Owner, Parameter, shown_name
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading import NO_OFFSET, Peak, Reading, label_text, peaks_of
-from bayesplate.board.setup_card import MISSED, SPURIOUS
+from bayesplate.board.reading import FREQUENCY, NO_OFFSET, Peak, Reading, label_text, peaks_of
+from bayesplate.board.setup_keys import MISSED, SPURIOUS, Edges, End, HammerKeys, SetupKeys, SupportKeys
 from bayesplate.board.stated import are, is_place, quantity_of, wrong_types
+from bayesplate.board.words import EDGES
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 
-__all__ = [
-    "CLAMPED_NOISE", "DEFAULT_NOISE", "EDGES", "NOISE_WANTED", "NO_OFFSET",
-    "AttachedItem", "DeclaredFluid", "End", "Ends", "Peak", "Reading", "Setup", "assumed_noise",
-]  # fmt: skip
-
-End = Literal["clamped", "supported", "free"]
 Ends = tuple[End, End]
-EDGES = ("x0", "x1", "y0", "y1")
 DEFAULT_NOISE = Quantity.from_median(0.003, np.exp(0.5))
 CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 """Relative noise of a frequency: free boards settle at 0.24-0.30 %; re-clamping one board spreads it by 1-2.4 %."""
@@ -47,56 +43,6 @@ def assumed_noise(edges: Sequence[str], prior: PriorCard | None = None) -> Quant
     if prior is not None and prior.noise_percent is not None:
         return prior.noise_percent.scaled(1e-2)
     return replace(CLAMPED_NOISE if "clamped" in edges else DEFAULT_NOISE)
-
-
-@dataclass(frozen=True)
-class AttachedItem:
-    """Something fixed to the board.
-
-    Attributes
-    ----------
-    kind : str
-        "accelerometer", "exciter", "shaker" or "weight"; an exciter is a coil on the board and a magnet on a spring.
-    places : tuple of (float, float), m
-        From the corner x = y = 0; several if it roved, none if nobody knows.
-    mass : Quantity or None, kg
-        Of the whole; None if not known, and so are those below, which an exciter alone has.
-    coil : Quantity or None, kg
-    suspension : Quantity or None, N/m
-        Stiffness of the spring that holds the magnet.
-    resonance : Quantity or None, Hz
-        Of the magnet on that spring, in place of the suspension.
-    magnet : str
-        "free", or "held" by something else than the board.
-    """
-
-    kind: str
-    places: tuple[tuple[float, float], ...] = ()
-    mass: Quantity | None = None
-    coil: Quantity | None = None
-    suspension: Quantity | None = None
-    resonance: Quantity | None = None
-    magnet: str = "free"
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.places, list | tuple) or not all(map(is_place, self.places)):
-            raise InputError(wrong_types(str(self.kind), [("places", self.places, False, "((x, y), ...) in m")]))
-        for name, unit in (("mass", "kg"), ("coil", "kg"), ("suspension", "N/m"), ("resonance", "Hz")):
-            stated = getattr(self, name)
-            if stated is not None:
-                object.__setattr__(self, name, quantity_of(stated, f"{self.kind} {name}", f"in {unit}"))
-
-
-@dataclass(frozen=True)
-class DeclaredFluid:
-    """Air or water around the board: density in kg m^-3 and baffle ("none" or "full"), each None if not stated."""
-
-    density: Quantity | None = None
-    baffle: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.density is not None:
-            object.__setattr__(self, "density", quantity_of(self.density, "fluid density", "in kg/m^3"))
 
 
 @dataclass(frozen=True)
@@ -130,6 +76,8 @@ class Setup:
         The air or the water around the board; None: not declared.
     bounce : Quantity or None, Hz
         Frequency at which a free board moves as a whole on its support; None: not stated.
+    table_name : str
+        Of the published coefficients on a card, until they are read.
     group : Owner or None
         The group of sessions that the setup is one of (`bayesplate.board.sessions`).
     assumed : Quantity or None
@@ -152,6 +100,7 @@ class Setup:
     hammer: tuple[float, float] | None = None
     fluid: DeclaredFluid | None = None
     bounce: Quantity | None = None
+    table_name: str = ""
     group: Owner | None = None
     assumed: Quantity | None = field(default=None, compare=False, repr=False)
 
@@ -282,6 +231,91 @@ class Setup:
         )
         return made.assuming_noise() if noise is None else made
 
+    @classmethod
+    def from_keys(cls, keys: SetupKeys) -> Setup:
+        """The setup that a table [setup] of a card states; its published coefficients are still to be read."""
+        edges, first, around = keys.edges, keys.first_label, keys.fluid or keys.air
+        made = cls(
+            name=keys.name,
+            ends_x=(edges.x0, edges.x1),
+            ends_y=(edges.y0, edges.y1),
+            readings=tuple(
+                Reading(
+                    label,
+                    (label.m - first.m, label.n - first.n),
+                    _joined_with_rounding(frequency, keys.resolution),
+                    keys.signs.get(label, ""),
+                    keys.confidence_in(label),
+                )
+                for label, frequency in keys.frequencies.items()
+            ),
+            noise=DEFAULT_NOISE if keys.noise is None else keys.noise,
+            clamped=keys.clamped,
+            resolution=keys.resolution,
+            peaks=tuple(
+                replace(peak, frequency=_joined_with_rounding(peak.frequency, keys.resolution))
+                for peak in (*map(Peak, keys.unlabelled), *keys.peaks)
+            ),
+            missed=keys.missed,
+            spurious=keys.spurious,
+            first_label=first,
+            attached=keys.attached,
+            hammer=None if keys.hammer is None else keys.hammer.place,
+            fluid=around,
+            bounce=None if keys.support is None else keys.support.bounce,
+            table_name=keys.published_coefficients,
+        )
+        return made.assuming_noise() if keys.noise is None else made
+
+    def table(self) -> dict[str, Any]:
+        """The table [setup] of a card that states the setup.
+
+        A label that stands twice is written twice, the second time with a space, for the reader of the card to refuse.
+        """
+        frequencies: dict[str, Any] = {}
+        for reading in self.readings:
+            text = str(reading.label)
+            while text in frequencies:
+                text = text.replace(",", ", ", 1)
+            frequencies[text] = FREQUENCY.write(reading.frequency)
+        doubted = {reading.label: reading.confidence for reading in self.readings if reading.confidence != 1}
+        is_alike = len(doubted) == len(self.readings) and len({*doubted.values()}) == 1
+        bare = tuple(takewhile(lambda peak: peak.is_bare, self.peaks))
+        published = self.published_coefficients
+        keys = SetupKeys.model_construct(
+            edges=Edges.model_construct(None, **self.edges),
+            clamped=self.clamped,
+            first_label=self.first_label,
+            resolution=self.resolution,
+            published_coefficients=self.table_name if published is None else published.name,
+            noise=None if self.is_noise_assumed else self.noise,
+            unlabelled=tuple(peak.frequency for peak in bare),
+            peaks=self.peaks[len(bare) :],
+            missed=self.missed,
+            spurious=self.spurious,
+            signs={reading.label: reading.sign for reading in self.readings if reading.sign},
+            label_confidence=next(iter(doubted.values())) if is_alike else doubted or 1.0,
+            attached=self.attached,
+            hammer=None if self.hammer is None else HammerKeys.model_construct(place=self.hammer),
+            support=None if self.bounce is None else SupportKeys.model_construct(bounce=self.bounce),
+            fluid=self.fluid,
+        )
+        stated = keys.model_dump(by_alias=True, exclude_defaults=True)
+        return {"name": self.name, **stated, **({"frequencies_hz": frequencies} if frequencies else {})}
+
+    def uncertain_keys(self) -> Iterator[tuple[str, Quantity]]:
+        """Every log-normal quantity that a card states of the setup, with its place."""
+        yield "noise", self.noise
+        yield from ((str(reading.label), reading.frequency) for reading in self.readings)
+        yield from ((f"peak {i}", peak.frequency) for i, peak in enumerate(self.peaks, start=1))
+        for i, item in enumerate(self.attached, start=1):
+            stated = (item.mass, item.coil, item.suspension, item.resonance)
+            yield from ((f"attached {i}", one) for one in stated if one is not None)
+        if self.fluid is not None and self.fluid.density is not None:
+            yield "fluid", self.fluid.density
+        if self.bounce is not None:
+            yield "bounce", self.bounce
+
     def assuming_noise(self, prior: PriorCard | None = None) -> Setup:
         """The setup with the noise of a prior, or else of its edges, in place of any that it has."""
         noise = assumed_noise(self.ends_x + self.ends_y, prior)
@@ -349,3 +383,10 @@ class Setup:
     def input_name(self, edge: str) -> str:
         """Name of the clamped length of an edge among the board's inputs."""
         return shown_name(f"clamped_{edge}", self.owner)
+
+
+def _joined_with_rounding(frequency: Quantity, resolution: float) -> Quantity:
+    """A list of readings with their standard error joined with the rounding error; a single number stays as it is."""
+    if len(frequency.readings) < 2 or frequency.resolution or not resolution:
+        return frequency
+    return Quantity.from_readings(frequency.readings, resolution)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bayesplate.board.repeated import CALIPER
-from bayesplate.board.words import EDGE_NAMES
+from bayesplate.board.words import EDGES
 from bayesplate.labels import Label
 
 _EXAMPLE = "# an example: put yours here"
@@ -44,7 +44,7 @@ class Starter:
     title: str = ""
     notes: str = ""
     sizes: Mapping[str, float] = field(default_factory=dict)
-    edges: Mapping[str, str] = field(default_factory=lambda: dict.fromkeys(EDGE_NAMES, "free"))
+    edges: Mapping[str, str] = field(default_factory=lambda: dict.fromkeys(EDGES, "free"))
     prior: str = "weakly-informative"
     frequencies: Mapping[str, float] = field(default_factory=dict)
 
@@ -62,7 +62,7 @@ def starter_text(starter: Starter, examples: Sequence[Label]) -> str:
     -------
     str
     """
-    edges = ", ".join(f"{edge} = {_quoted(starter.edges[edge])}" for edge in EDGE_NAMES)
+    edges = ", ".join(f"{edge} = {_quoted(starter.edges[edge])}" for edge in EDGES)
     free_texts = {"title": starter.title, "notes": starter.notes}
     lines = [
         "format = 1",

@@ -1,13 +1,16 @@
-"""Readers of plain values: numbers in a range, words of a list, names, texts; each refuses with a complaint."""
+"""Keys of a card: how each value is read into SI units and written again; plain values are read here."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from pydantic_core import core_schema
+
+from bayesplate.board.units import OTHER_UNITS, SI, in_unit
 from bayesplate.board.words import EFFECT_NAMES, did_you_mean, effect_named, listed, name_complaint, quoted, shown
 
 T = TypeVar("T")
@@ -32,6 +35,30 @@ class Refusal(ValueError):
         self.complaints = complaints
 
 
+def _same(value: Any) -> Any:
+    return value
+
+
+@dataclass(frozen=True)
+class Key:
+    """How a value of a card is read into SI units, and how it is written again: the annotation of a field.
+
+    Attributes
+    ----------
+    read : callable
+        From what the TOML reader returned to the value; raises Refusal.
+    write : callable
+        From the value to what the TOML writer takes.
+    """
+
+    read: Callable[[Any], Any]
+    write: Callable[[Any], Any] = _same
+
+    def __get_pydantic_core_schema__(self, source: object, handler: object) -> core_schema.CoreSchema:
+        writing = core_schema.plain_serializer_function_ser_schema(self.write)
+        return core_schema.no_info_plain_validator_function(self.read, serialization=writing)
+
+
 def refuse(complaint: Complaint | None) -> None:
     """Raise what is wrong with a value, if anything is."""
     if complaint is not None:
@@ -52,7 +79,9 @@ def read_each(items: Iterable[tuple[str | int, Any]], read: Callable[[Any], T]) 
     return good
 
 
-def read_table(table: dict[str, Any], readers: dict[str, Callable[[object], Any]]) -> dict[str, Any]:
+def read_table(
+    table: dict[str, Any], readers: Mapping[str, Callable[[Any], Any]], needed: Iterable[str] = ()
+) -> dict[str, Any]:
     """Read each entry of a table with the reader of its key; unknown keys are refused with the nearest known one."""
     good: dict[str, Any] = {}
     bad: list[Complaint] = []
@@ -65,6 +94,7 @@ def read_table(table: dict[str, Any], readers: dict[str, Callable[[object], Any]
             good[key] = readers[key](value)
         except Refusal as refusal:
             bad.extend(replace(one, inside=(key, *one.inside)) for one in refusal.complaints)
+    bad += [Complaint("a value", "nothing", inside=(key,)) for key in needed if key not in table]
     if bad:
         raise Refusal(*bad)
     return good
@@ -97,7 +127,7 @@ class Number:
 
     def __call__(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise Refusal(Complaint("a number", shown(value), _number_hint(value)))
+            raise Refusal(Complaint("a number", shown(value), _number_hint(value, self.unit)))
         if isinstance(value, float) and not math.isfinite(value):
             raise Refusal(Complaint("a finite number", shown(value)))
         if value <= 0 < self.low:
@@ -108,19 +138,49 @@ class Number:
             raise Refusal(Complaint(limits, shown(value), hint or self.hint))
         return float(value)
 
+    @property
+    def si(self) -> float:
+        """One unit of the key in SI."""
+        return SI.get(self.unit, 1.0)
 
-def _number_hint(value: object) -> str:
+    @property
+    def key(self) -> Key:
+        """A key that holds such a number."""
+        return Key(lambda value: self(value) * self.si, lambda value: in_unit(value, self.si))
+
+
+def _number_hint(value: object, unit: str) -> str:
     """How to write the number that a text seems to mean."""
     if not isinstance(value, str):
         return ""
     text = value.strip()
+    if strange := strange_character(value):
+        return strange
     if re.fullmatch(r"[+-]?[0-9]{1,12},[0-9]{1,12}", text):
         return two_readings(text) or f"a decimal point and no quotes: {text.replace(',', '.')}"
     if re.fullmatch(r"[+-]?[0-9]{1,12}(\.[0-9]{0,12})?", text):
         return "no quotes around a number"
+    stated = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?) ?([A-Za-z/0-9%\"]{1,8})", text)
+    if stated and (factor := OTHER_UNITS.get(unit, {}).get(stated[2])):
+        meant = f"{float(stated[1]) * factor:.4g}"
+        return f"{text} are {meant} {unit}: write {meant} alone, the unit stands in the key"
     if re.fullmatch(r"[0-9.]{1,12} ?[A-Za-z/0-9%]{1,8}", text):
         return "the unit stands in the key: write the number alone"
     return ""
+
+
+_STRANGE = {
+    "\u2212": "a typographic minus: write the hyphen -, which is the minus sign of a card",
+    "\u2013": "a dash: write the hyphen -, which is the minus sign of a card",
+    "\u00a0": "a non-breaking space: write a plain one, or none",
+    "\u202f": "a narrow non-breaking space: write a plain one, or none",
+    "\u2009": "a thin space: write a plain one, or none",
+}
+
+
+def strange_character(text: str) -> str:
+    """What to write in place of a character that programs for texts put beside numbers; empty if there is none."""
+    return next((f"it holds {remedy}" for character, remedy in _STRANGE.items() if character in text), "")
 
 
 def two_readings(text: str) -> str:

@@ -9,7 +9,7 @@ from datetime import date, datetime, time
 
 from bayesplate.errors import plain
 
-EDGE_NAMES = ("x0", "x1", "y0", "y1")
+EDGES = ("x0", "x1", "y0", "y1")
 EDGE_WORDS = ("clamped", "supported", "free")
 ATTACHED_KINDS = ("accelerometer", "exciter", "shaker", "weight")
 BAFFLES = ("none", "full")

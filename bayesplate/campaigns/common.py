@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesplate.board.board import Board
-from bayesplate.board.setup_card import edge_letters
+from bayesplate.board.setup_keys import edge_letters
 from bayesplate.frequencies.laws import cents
 from bayesplate.labels import Label
 from bayesplate.results.modes import ModeRow

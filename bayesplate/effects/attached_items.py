@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board, density, vibrating_lengths
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import AttachedItem, Setup
+from bayesplate.board.setup import Setup
 from bayesplate.effects.base import Floats
 
 Fractions = tuple[tuple[float, float], ...]

@@ -10,9 +10,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board, Values, density, vibrating_lengths
 from bayesplate.board.parameter import Parameter
-from bayesplate.board.setup import AttachedItem, Setup
+from bayesplate.board.setup import Setup
 from bayesplate.effects.attached_items import (
     Fractions,
     Item,

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import AttachedItem, Ends, Setup
+from bayesplate.board.setup import Ends, Setup
 from bayesplate.effects.attached_items import Fractions, fractions_on
 from bayesplate.effects.base import Floats
 

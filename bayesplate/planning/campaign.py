@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.setup import AttachedItem
 from bayesplate.campaigns.shared import Shared
 from bayesplate.planning.assembled import BAND, KNOWN_NOW, MOST_BENCHES, Bench, bench_of
 from bayesplate.planning.inputs_read import WEIGHED_TO, measurements

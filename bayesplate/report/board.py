@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values, vibrating_lengths
-from bayesplate.board.setup import EDGES, Setup
+from bayesplate.board.setup import Setup
+from bayesplate.board.words import EDGES
 from bayesplate.frequencies.system import System, system_of
 from bayesplate.report.colours import DARK, GREY, LIGHT, VERMILLION
 from bayesplate.report.style import SMALL, WIDTH, WORDS, Picture, placed, short

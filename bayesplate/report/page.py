@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from bayesplate.board.board_card import BoardCard
+from bayesplate.board.board import Board
 from bayesplate.diagnosis.wording.diagnosis import Diagnosis
 from bayesplate.diagnosis.wording.exports import write_before_after, write_known
 from bayesplate.files import make_folder, write_text
@@ -68,7 +68,7 @@ def load_libraries() -> None:
 @drawing()
 def write_report(
     folder: Path,
-    card: BoardCard,
+    card: Board,
     inference: Inference,
     draws: Draws,
     summary: Summary,
@@ -80,7 +80,7 @@ def write_report(
     ----------
     folder : Path
         Made if it is not there; what it holds of an earlier report is replaced.
-    card : BoardCard
+    card : Board
     inference : Inference
         Of a run that has converged.
     draws : Draws
@@ -185,7 +185,7 @@ def _shown(picture: Picture, svg: bytes) -> Shown:
 
 
 def render(
-    card: BoardCard,
+    card: Board,
     inference: Inference,
     draws: Draws,
     summary: Summary,

@@ -12,7 +12,6 @@ from typing import TypeGuard, get_args
 import numpy as np
 
 from bayesplate.board.board import Board
-from bayesplate.board.board_card import BoardCard
 from bayesplate.board.campaign import CampaignCard
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.words import EFFECT_NAMES, OTHER_EFFECT_NAMES, did_you_mean, effect_named, quoted, shown
@@ -71,8 +70,8 @@ def _prior(name: str, value: object) -> Iterator[Fault]:
 
 
 def _board(name: str, value: object) -> Iterator[Fault]:
-    if not isinstance(value, Board | BoardCard):
-        yield Fault(name, "a Board or a BoardCard", _shown(value))
+    if not isinstance(value, Board):
+        yield Fault(name, "a Board", _shown(value))
 
 
 def _prior_card(name: str, value: object) -> Iterator[Fault]:

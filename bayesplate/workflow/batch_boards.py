@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from bayesplate.board.board_card import BoardCard, load_board_in
+from bayesplate.board.board import Board
 from bayesplate.board.cells import Cell, is_empty
 from bayesplate.board.csv_table import csv_table
 from bayesplate.board.rows import Columns
@@ -35,7 +35,7 @@ class Source(Protocol):
     aside: Sequence[str]
     """Files that were left aside, because they are cards of another kind."""
 
-    def card(self, at: int) -> BoardCard:
+    def card(self, at: int) -> Board:
         """The card of the board at a place among the names; raises InputError with all its faults."""
 
     def place(self, at: int) -> str:
@@ -80,13 +80,14 @@ class Folder:
         self.alike: Sequence[tuple[str, ...]] = alike
         self.aside: Sequence[str] = aside
 
-    def card(self, at: int) -> BoardCard:
+    def card(self, at: int) -> Board:
         """The card of a board; raises InputError with all its faults, or if it is a link that leads elsewhere."""
         file = self._strange.get(at, f"{self.names[at]}.toml")
         if not self._is_inside(file):
             wanted, remedy = "a card in the folder of the batch", "copy the card"
             raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
-        return load_board_in(self._path, file)
+        data = read_file(os.path.join(self._path, file))  # no Path: Python keeps every name that stood in one
+        return Board.from_bytes(data, os.path.splitext(file)[0], self._path)
 
     def place(self, at: int) -> str:
         """Nothing: the faults of a card name its file."""
@@ -131,9 +132,9 @@ class Table:
         self.aside: Sequence[str] = ()
         self._numbers = [number for _, number in named]
 
-    def card(self, at: int) -> BoardCard:
+    def card(self, at: int) -> Board:
         """The card of a row; raises InputError with all its faults."""
-        return self._columns.card(self._rows[self._numbers[at] - 1])
+        return self._columns.board(self._rows[self._numbers[at] - 1])
 
     def place(self, at: int) -> str:
         """The table and the number of the row, the first below the header being 1."""

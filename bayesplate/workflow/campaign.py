@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bayesplate.board.campaign import CampaignCard, is_campaign, load_campaign
-from bayesplate.board.copies import readings_sha256
+from bayesplate.board.checks import readings_sha256
 from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.campaigns.population import require_moduli
 from bayesplate.campaigns.shared import Shared, shared_by

@@ -103,7 +103,7 @@ class CampaignFitResult:
             make_folder(folder / BOARDS / name)
             write_fit(folder / BOARDS / name, one)
         if self.prior is not None:
-            write_text(folder / f"{self.prior.name}.toml", self.prior.to_card())
+            write_text(folder / f"{self.prior.name}.toml", self.prior.to_toml())
         if self.learnt is not None:
             write_archive(folder / ARCHIVE, shared_archive(self.learnt, self._attributes))
         write_text(folder / SUMMARY, json_text(self.summary))

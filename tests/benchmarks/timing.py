@@ -16,7 +16,7 @@ import ritz
 from made_campaigns import MASS, write_campaign
 from numpy.typing import NDArray
 
-from bayesplate.board.board_card import read_board_text
+from bayesplate.board.board import Board
 from bayesplate.board.named import load_named
 from bayesplate.board.setup import Ends
 from bayesplate.diagnosis.evidence.joint import full_search
@@ -187,7 +187,7 @@ def search(n_modes: int, tried: Sequence[str] | None = None) -> tuple[int, float
     from generator.designs import DESIGNS
 
     text = plant(np.random.default_rng(1), DESIGNS["free-12"], [], 1.0, 5.0, name="free").card_text()
-    card = read_board_text(text, "free")
+    card = Board.from_bytes(text, "free")
     prepared = prepared_card(card, load_named(card), [])
     (setup,) = prepared.board.setups
     board = replace(prepared.board, setups=(replace(setup, readings=setup.readings[:n_modes]),))

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from bayesplate.board.board_card import load_board
+from bayesplate.board.board import Board
 from bayesplate.board.campaign import is_campaign, load_campaign
-from bayesplate.board.shelf import card_names
+from bayesplate.board.shelf import card_names, shelf_folder
 from bayesplate.errors import InputError
 
 CAMPAIGN = """\
@@ -121,10 +121,10 @@ def test_a_campaign_is_told_from_a_board(tmp_path, monkeypatch):
     assert not is_campaign("spruce-free-2R")
     assert not is_campaign("nothing-of-that-name")
     assert not is_campaign("nothing.toml")
-    assert not is_campaign(load_board("spruce-free-2R").path)
+    assert not is_campaign(shelf_folder("boards") / "spruce-free-2R.toml")
     assert not is_campaign(3)
     with pytest.raises(InputError, match=r"^my-campaign.toml: wanted a board card, got a campaign \(check, fit,"):
-        load_board(path)
+        Board.from_toml(path)
 
 
 @pytest.mark.parametrize("name", card_names("campaigns"))
@@ -134,4 +134,4 @@ def test_a_shipped_campaign_names_boards_that_load(name):
     assert name not in card_names("boards")
     assert card.title
     for board in card.boards:
-        assert load_board(card.board_path(board)).name == board
+        assert Board.from_toml(card.board_path(board)).name == board

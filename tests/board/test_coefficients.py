@@ -71,7 +71,7 @@ def test_a_sound_table(tmp_path: Path) -> None:
     ("old", "new", "place", "wanted", "got"),
     [
         ("a = 3.21", "a = nan", '[coefficients] "(1,0)".a', "a finite number", "nan"),
-        ("a = 3.21, ", "", '[coefficients] "(1,0)".a', "a number", "nothing"),
+        ("a = 3.21, ", "", '[coefficients] "(1,0)".a', "a value", "nothing"),
         ("r_squared = 1.00", "r_squared = 1.1", '[coefficients] "(1,0)".r_squared', "a number from 0 to 1", "1.1"),
         ('"(1,1)"', '"( 1,0)"', "[coefficients]", "the label (1,0) once",
          '"(1,0)" = a table with a, b, c, r_squared and'),

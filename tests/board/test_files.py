@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bayesplate.board.board_card import load_board, load_board_in, read_board_text
+from bayesplate.board.board import Board
 from bayesplate.board.coefficients import load_coefficients
 from bayesplate.board.prior import load_prior
 from bayesplate.board.shelf import card_names
@@ -38,15 +38,15 @@ def refused(message: str) -> object:
 def test_a_missing_file_names_the_path_and_the_folder(tmp_path: Path) -> None:
     path = tmp_path / "nowhere.toml"
     with refused(f"{path}: wanted a card, got no such file (looked in {tmp_path})"):
-        load_board(str(path))
+        Board.from_toml(str(path))
 
 
 @pytest.mark.parametrize(
     ("load", "kind", "name", "meant"),
     [
-        (load_board, "board", "finish-spruce-cantilever", "finnish-spruce-cantilever"),
-        (load_board, "board", "fiemme", "fiemme-spruce-clamped"),
-        (load_board, "board", "2r", "spruce-free-2R"),
+        (Board.from_toml, "board", "finish-spruce-cantilever", "finnish-spruce-cantilever"),
+        (Board.from_toml, "board", "fiemme", "fiemme-spruce-clamped"),
+        (Board.from_toml, "board", "2r", "spruce-free-2R"),
         (load_prior, "prior", "spruse", "spruce"),
         (load_coefficients, "coefficient", "paper-clampd", "paper-clamped"),
     ],
@@ -62,14 +62,14 @@ def test_a_misspelt_name_names_the_shelf_and_the_nearest_card(
 
 def test_a_part_of_several_names_stands_for_none():
     with refused("(a card in") as caught:
-        load_board("free")
+        Board.from_toml("free")
     assert "did you mean" not in str(caught.value)  # type: ignore[attr-defined]
 
 
 def test_a_name_far_from_all_others_names_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with refused(f"(a card in {tmp_path} is given as a path)"):
-        load_board("qqqq")
+        Board.from_toml("qqqq")
 
 
 def test_a_table_of_readings_is_no_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,39 +77,36 @@ def test_a_table_of_readings_is_no_card(tmp_path: Path, monkeypatch: pytest.Monk
     Path("peaks.csv").write_text("label,hz\n(1;1),35\n", encoding="utf-8")
     for name in ("peaks.csv", "./peaks.csv"):
         with refused("a card is a TOML file"):
-            load_board(name)
+            Board.from_toml(name)
 
 
 def test_a_file_of_that_name_here_is_offered(board_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(board_file.parent)
     with refused('(there is a file here: write "my-board.toml")'):
-        load_board("my-board")
-    assert load_board("my-board.toml").name == "my-board"
+        Board.from_toml("my-board")
+    assert Board.from_toml("my-board.toml").name == "my-board"
 
 
 @pytest.mark.parametrize("as_argument", [str, Path])
 def test_a_card_is_read_by_path(board_file: Path, as_argument: Callable[[Path], str | Path]) -> None:
-    card = load_board(as_argument(board_file))
+    card = Board.from_toml(as_argument(board_file))
 
-    assert card.path == board_file
+    assert (card.folder, card.file) == (board_file.parent, "my-board.toml")
     assert card.name == "my-board"
 
 
-def test_a_card_of_a_folder_is_the_card_of_its_path(board_file: Path) -> None:
-    one = load_board_in(board_file.parent, board_file.name)
-    assert (one.path, one.folder, one.file) == (board_file, board_file.parent, "my-board.toml")
-    assert one == load_board(board_file)
+def test_a_card_that_is_not_there_is_named_with_its_folder(board_file: Path) -> None:
     with refused(f"{board_file.parent}/other.toml: wanted a card, got no such file (looked in {board_file.parent})"):
-        load_board_in(board_file.parent, "other.toml")
+        Board.from_toml(board_file.with_name("other.toml"))
 
 
 def test_the_name_must_be_that_of_the_file(board_file: Path) -> None:
     other = board_file.rename(board_file.with_name("other.toml"))
     with refused('other.toml name: wanted "other", the name of the file, got "my-board"'):
-        load_board(other)
+        Board.from_toml(other)
     rule = "A-Z, a-z, 0-9, '.', '_' or '-', beginning with a letter or digit, at most 80 characters"
     with refused(f'my board.toml: wanted {rule}, got "my board" (rename the file to my-board.toml)'):
-        load_board(other.rename(board_file.with_name("my board.toml")))
+        Board.from_toml(other.rename(board_file.with_name("my board.toml")))
 
 
 def test_neither_shelf_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,7 +135,7 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, make: Callab
     make(path)
     begin = time.monotonic()
     with pytest.raises(InputError) as error:
-        load_board(path)
+        Board.from_toml(path)
     assert str(error.value) == f"{path}: wanted a regular file, got {kind}"
     assert time.monotonic() - begin < 1
 
@@ -146,7 +143,7 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, make: Callab
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
 def test_a_device_is_refused() -> None:
     with refused("/dev/zero: wanted a regular file, got a device"):
-        load_board("/dev/zero")
+        Board.from_toml("/dev/zero")
 
 
 def test_an_unreadable_file(board_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,22 +152,22 @@ def test_an_unreadable_file(board_file: Path, monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr("bayesplate.board.toml.os.open", denied)  # a file mode would not stop a test run by root
     with refused("my-board.toml: wanted a readable file, got permission denied"):
-        load_board(board_file)
+        Board.from_toml(board_file)
 
 
 @pytest.mark.parametrize("name", ["a\0b.toml", "./" + "a" * 5000 + ".toml"])
 def test_an_impossible_path(name: str) -> None:
     with refused(".toml: wanted a readable file, got"):
-        load_board(name)
+        Board.from_toml(name)
 
 
 @pytest.mark.parametrize("make", [lambda n: b"#" * n, lambda n: b"a = '" + b"x" * n])
 def test_a_large_file(write: Write, make: Callable[[int], bytes]) -> None:
     with refused("wanted a file of at most 1,000,000 bytes, got a larger one"):
-        load_board(write(make(1_000_001)))
+        Board.from_toml(write(make(1_000_001)))
 
 
-@pytest.mark.parametrize("load", [load_board, load_prior, load_coefficients])
+@pytest.mark.parametrize("load", [Board.from_toml, load_prior, load_coefficients])
 def test_no_more_of_a_large_file_is_read_than_a_card_may_hold(write: Write, load: Callable[[Path], object]) -> None:
     """Half a gigabyte of nothing costs as much memory as the largest card, a few times over at most."""
     path = write(b"")
@@ -227,7 +224,7 @@ def test_no_more_of_a_large_file_is_read_than_a_card_may_hold(write: Write, load
 def test_what_is_no_card(write: Write, content: bytes, message: str) -> None:
     begin = time.monotonic()
     with refused(message):
-        load_board(write(content))
+        Board.from_toml(write(content))
     assert time.monotonic() - begin < 5
 
 
@@ -235,27 +232,26 @@ def test_what_is_no_card(write: Write, content: bytes, message: str) -> None:
 def test_the_guard_against_long_keys_is_quick(write: Write, content: bytes) -> None:
     begin = time.monotonic()
     with refused("my-board.toml"):
-        load_board(write(content))
+        Board.from_toml(write(content))
     assert time.monotonic() - begin < 5
 
 
 def test_line_ends_and_byte_order_mark_change_nothing(write: Write, board_text: str) -> None:
-    plain = read_board_text(board_text, "my-board")
+    plain = Board.from_bytes(board_text, "my-board")
     for content in (
         board_text.replace("\n", "\r\n"),
         "\ufeff" + board_text,
         board_text.replace("\n", "  \n") + "\n\n",
     ):
-        other = load_board(write(content))
-        assert other.setups == plain.setups
-        assert other.plate == plain.plate
+        other = Board.from_toml(write(content))
+        assert other == plain
         assert other.sha256 != plain.sha256
 
 
 def test_nothing_in_a_card_is_executed(write: Write, tmp_path: Path, board_text: str) -> None:
     canary = tmp_path / "canary"
     code = f"__import__('pathlib').Path({str(canary)!r}).touch()"
-    card = load_board(write(board_text.replace("A test board", f"!!python/object/apply:eval [{code}] {{{code}}}")))
+    card = Board.from_toml(write(board_text.replace("A test board", f"!!python/object/apply:eval [{code}] {{{code}}}")))
 
     assert code in card.title
     assert not canary.exists()
@@ -264,13 +260,14 @@ def test_nothing_in_a_card_is_executed(write: Write, tmp_path: Path, board_text:
 def test_notes_are_free_text(write: Write, board_text: str) -> None:
     text = board_text.replace("title =", 'notes = "Küche, 21 °C, Tür zu"\ntitle =')
     text = text.replace('name = "cantilever"', 'name = "cantilever"\nnotes = "früh"')
-    card = load_board(write(text))
+    card = Board.from_toml(write(text))
 
-    assert (card.notes, card.setups[0].notes) == ("Küche, 21 °C, Tür zu", "früh")
+    assert card.card is not None
+    assert (card.card.table["notes"], card.card.table["setup"]["notes"]) == ("Küche, 21 °C, Tür zu", "früh")
 
 
 def test_strange_titles_are_kept_as_they_are(write: Write, board_text: str) -> None:
     title = "<script>alert(1)</script> $\\\\frac{1}{2}$ 🪵 \u202eabc"
-    card = load_board(write(board_text.replace("A test board", title)))
+    card = Board.from_toml(write(board_text.replace("A test board", title)))
 
     assert card.title == title.replace("\\\\", "\\")

@@ -111,7 +111,7 @@ def test_what_nobody_stated_is_that_of_the_prior_which_is_given_in_the_end():
     mine = prior(noise=noise, poisson_xy=ratio)
     fewer = replace(board(), setups=tuple(replace(one, readings=one.readings[:3]) for one in board().setups))
     for one in (board(), fewer, board(prior=mine), prepare("spruce-free-2R").stated):
-        text = one.to_card()
+        text = one.to_toml()
         assert not any(key in text for key in ("noise_percent", "poisson_xy"))
         found = prepare(one, prior=mine).board
         assert (found.inputs["poisson_xy"], found.setups[0].noise.median) == (ratio, pytest.approx(0.02))
@@ -150,12 +150,12 @@ def test_a_board_is_varied_by_replace_and_written_as_a_card(tmp_path):
     lighter = one.with_priors({"mass": Q.exact(0.040)})
     quieter = replace(one, setups=tuple(replace(held, noise=Q.from_median(0.001, 1.2)) for held in one.setups))
     path = tmp_path / "my-board.toml"
-    text = lighter.to_card(path)
+    text = lighter.to_toml(path)
 
     assert path.read_text(encoding="utf-8") == text
     assert prepare(path).board.inputs["mass"] == Q.exact(0.040)
     assert prepare(path).board.inputs["thickness"] == prepare(one).board.inputs["thickness"]
-    assert "noise_percent = { median = 0.1, factor = 1.2 }" in quieter.to_card()
+    assert "noise_percent = { median = 0.1, factor = 1.2 }" in quieter.to_toml()
 
 
 def test_another_length_of_a_clamp_reaches_the_card():
@@ -176,12 +176,12 @@ def test_a_number_is_exact_wherever_a_quantity_is_meant():
     assert replace(reading, frequency=135.0).frequency == Q.exact(135.0)
     assert replace(setup(), clamped={"x0": 0.001}).clamped == {"x0": exact}
     with pytest.raises(bayesplate.InputError, match="free noise: wanted a relative noise"):
-        board(setups=replace(setup(), noise=0.01)).to_card()
+        board(setups=replace(setup(), noise=0.01)).to_toml()
 
 
 def test_the_prior_of_a_board_is_named_by_a_path_too(tmp_path):
     path = tmp_path / "mine.toml"
-    prior(noise=Q.from_median(0.02, 1.3)).to_card(path)
+    prior(noise=Q.from_median(0.02, 1.3)).to_toml(path)
     for made in (board(prior=path), board(prior=str(path))):
         found = prepare(made)
         assert (found.prior.name, found.board.setups[0].noise.median) == ("mine", pytest.approx(0.02))
@@ -196,10 +196,10 @@ def test_the_prior_of_a_board_is_named_by_a_path_too(tmp_path):
 def test_a_card_is_not_written_over_another_one(tmp_path, place, force, said):
     (tmp_path / "my-board.toml").write_text("mine", encoding="utf-8")
     with pytest.raises(bayesplate.InputError, match=said):
-        board().to_card(tmp_path / place, force=force)
+        board().to_toml(tmp_path / place, force=force)
     assert [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()] == ["mine"]
-    board().to_card(tmp_path / "my-board.toml", force=True)
-    assert (tmp_path / "my-board.toml").read_text(encoding="utf-8") == board().to_card()
+    board().to_toml(tmp_path / "my-board.toml", force=True)
+    assert (tmp_path / "my-board.toml").read_text(encoding="utf-8") == board().to_toml()
 
 
 BAD = {
@@ -245,9 +245,9 @@ BAD = {
     "priors in a list": (lambda: board().with_priors([0.04]), ["my-board priors: wanted a dict of quantities by name"]),
     "a setup": (lambda: board().setup("fre"), ["setup: wanted one of free, got fre (did you mean free?)"]),
     "a parameter": (lambda: board().parameter("nu"), ["parameter: wanted one of length_x, length_y, thickness, mass"]),
-    "a bounded peak": (lambda: board(setups=setup(unlabelled=[Q.from_range(440.0, 450.0)])).to_card(),
+    "a bounded peak": (lambda: board(setups=setup(unlabelled=[Q.from_range(440.0, 450.0)])).to_toml(),
                        ["free peak 1: wanted a log-normal quantity without bounds, as cards state it, got"]),
-    "exact noise": (lambda: board(setups=replace(setup(), noise=Q.exact(0.005))).to_card(),
+    "exact noise": (lambda: board(setups=replace(setup(), noise=Q.exact(0.005))).to_toml(),
                     ["free noise: wanted a relative noise", "got an exact number"]),
     "physics": (lambda: bayesplate.check(board(mass=41.0)),
                 ["my-board.toml [plate] mass_g: wanted a density from 20 to 25000 kg/m3"]),
@@ -275,7 +275,7 @@ def test_a_prior_from_quantities_holds_them_and_becomes_a_card(tmp_path):
     sources = {"E_x": "a", "E_y": "b", "G_xy": "c", "noise": "d", "poisson_xy": "e"}
     noise, ratio = Q.from_median(0.005, 1.6), Q.from_mean(0.37, 0.05, "normal")
     one = bayesplate.PriorCard.from_quantities("mine", CONSTANTS, source=sources, noise=noise, poisson_xy=ratio)
-    one.to_card(tmp_path / "mine.toml")
+    one.to_toml(tmp_path / "mine.toml")
     again = load_prior(tmp_path / "mine.toml")
 
     assert one.constants == CONSTANTS
@@ -284,7 +284,7 @@ def test_a_prior_from_quantities_holds_them_and_becomes_a_card(tmp_path):
     more = {"noise": noise, "poisson_xy": ratio}
     assert bayesplate.PriorCard.from_quantities("mine", CONSTANTS, source=one.sources, **more) == one
     assert again == one
-    assert again.to_card() == one.to_card()
+    assert again.to_toml() == one.to_toml()
 
 
 @pytest.mark.parametrize("name", ["spruce", "weakly-informative"])

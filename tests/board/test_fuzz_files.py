@@ -11,12 +11,13 @@ import pytest
 from fuzzing import accepted_or_refused, fuzzed, stopped_if_it_hangs
 from hypothesis import strategies as st
 
-from bayesplate.board.board_card import read_board_text
+from bayesplate.board.board import Board
+from bayesplate.board.board_keys import CardFile
 from bayesplate.board.campaign import load_campaign
 from bayesplate.board.fragment import merged
 from bayesplate.board.shelf import shelf_folder
 from bayesplate.board.toml import read_table
-from bayesplate.board.writing import table_text, write_card
+from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import InputError
 from bayesplate.workflow.batch_boards import boards_of
 
@@ -105,15 +106,14 @@ def read_fragment(content: str | bytes) -> None:
     table = read_table(CARD.encode(), "board.toml")
 
     def read() -> Any:
-        text, _ = merged(table, "board.toml", path)
-        return read_board_text(text, BOARD)
+        return Board.from_table(CardFile(table, "board.toml"), BOARD, setup=path)
 
     accepted_or_refused(read, BENCH["folder"])
 
 
 def read_any_fragment(tree: dict[str, Any]) -> None:
     """A fragment with any tables: it is taken over as it is, and the card then says what is wrong with it."""
-    accepted_or_refused(lambda: read_fragment(table_text({"setup": tree})))
+    accepted_or_refused(lambda: read_fragment(toml_text({"setup": tree})))
 
 
 def read_campaign(content: str | bytes) -> None:
@@ -146,7 +146,7 @@ def read_folder(content: str | bytes) -> None:
 
 def written_and_read(tree: dict[str, Any]) -> None:
     """What is written as TOML is read again as it was."""
-    found = read_table(table_text({"tree": tree}).encode("utf-8"), "a.toml")
+    found = read_table(toml_text({"tree": tree}).encode("utf-8"), "a.toml")
     assert in_order(found) == in_order({"tree": tree})
 
 
@@ -164,7 +164,7 @@ b,2.9;3.0;3.1,,,second,52,,310
 CELLS = [",", '"', "\n", "\r", ";", "nan", "inf", "1e999", "1_000", "=cmd()", "\0", "\x7f", "\x1b[2J", "../x", "a", "٣"]
 BYTES = st.binary(max_size=80)
 NAMED = st.dictionaries(KEYS, TREES, max_size=4)
-CARDS = [BYTES, spliced(CARD), NAMED.map(table_text), spliced(CARD.replace("length_x_mm = 253", "length_x_mm = 1"))]
+CARDS = [BYTES, spliced(CARD), NAMED.map(toml_text), spliced(CARD.replace("length_x_mm = 253", "length_x_mm = 1"))]
 
 
 @st.composite
@@ -189,8 +189,8 @@ test_toml, test_toml_at_length = fuzzed(written_and_read, 100, tree=NAMED)
 def test_what_is_spoilt_here_was_sound():
     """The negative control."""
     table = read_table(CARD.encode(), "board.toml")
-    text, _ = merged(table, "board.toml", written("fragment.toml", FRAGMENT))
-    assert len(read_board_text(text, BOARD).setups[0].frequencies_hz) == 1
+    whole, _ = merged(table, "board.toml", written("fragment.toml", FRAGMENT))
+    assert len(Board.from_bytes(toml_text(whole), BOARD).setups[0].readings) == 1
     assert load_campaign(written("together.toml", CAMPAIGN)).name == "together"
     boards = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
     assert [boards.card(at).name for at in range(len(boards.names))] == ["a", "b"]
@@ -216,12 +216,14 @@ def test_a_huge_number_beside_a_fragment_or_a_table_is_a_fault_of_its_key(tmp_pa
     text = CARD.replace("length_x_mm = 253", f"length_x_mm = {HUGE}")
     table = read_table(text.encode(), "board.toml")
     (tmp_path / "fragment.toml").write_text(FRAGMENT)
-    merged_text, _ = merged(table, "board.toml", tmp_path / "fragment.toml")
     (tmp_path / "template.toml").write_text(TEMPLATE.replace("length_x_mm = 253", f"length_x_mm = {HUGE}"))
     (tmp_path / "boards.csv").write_text(ROWS)
     boards = boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
 
-    for read in (lambda: read_board_text(merged_text, BOARD), lambda: boards.card(0)):
+    for read in (
+        lambda: Board.from_table(CardFile(table, "board.toml"), BOARD, setup=tmp_path / "fragment.toml"),
+        lambda: boards.card(0),
+    ):
         with pytest.raises(InputError, match=r"length_x_mm: wanted a number from .*, got a whole number of 20000 bits"):
             read()
 

@@ -6,7 +6,7 @@ import pytest
 from made_isotropic import sheet
 
 import bayesplate
-from bayesplate.board.board_card import read_board_text
+from bayesplate.board.board import Board
 from bayesplate.board.prior import load_prior, read_prior_text
 from bayesplate.board.quantity import Quantity
 from bayesplate.campaigns.population import require_moduli
@@ -17,13 +17,13 @@ OF_E = 'format = 1\nname = "metals"\n[E]\ndistribution = "log-normal"\nmedian_gp
 
 
 def card(**more):
-    return sheet(HZ, **more).to_card()
+    return sheet(HZ, **more).to_toml()
 
 
 @pytest.mark.parametrize("written", ['"yes"', "1", "[]"])
 def test_anything_but_true_or_false_is_refused(written):
     with pytest.raises(InputError, match=r"sheet.toml \[material\] isotropic: wanted true or false, got"):
-        read_board_text(card().replace("isotropic = true", f"isotropic = {written}"), "sheet")
+        Board.from_bytes(card().replace("isotropic = true", f"isotropic = {written}"), "sheet")
 
 
 @pytest.mark.parametrize(("nu", "is_possible"), [(0.5, True), (0.51, False), (-0.99, True), (-1.0, False)])
@@ -69,9 +69,9 @@ def test_a_prior_of_one_modulus_comes_back_from_its_card():
     made = bayesplate.PriorCard.from_quantities("metals", {"E": Quantity.from_median(70e9, 2.0)}, source="a test")
 
     assert made == read_prior_text(OF_E, "metals")
-    assert read_prior_text(made.to_card(), "metals") == made
+    assert read_prior_text(made.to_toml(), "metals") == made
     whole = load_prior("weakly-informative")
-    assert read_prior_text(whole.to_card(), whole.name) == whole
+    assert read_prior_text(whole.to_toml(), whole.name) == whole
 
 
 def test_the_prior_that_a_problem_has_may_be_given_again():
@@ -83,7 +83,7 @@ def test_the_prior_that_a_problem_has_may_be_given_again():
 
 def test_a_population_of_three_constants_takes_no_isotropic_board(tmp_path):
     for i in (1, 2):
-        text = sheet({label: hz * (1.0 + 0.001 * i) for label, hz in HZ.items()}).to_card()
+        text = sheet({label: hz * (1.0 + 0.001 * i) for label, hz in HZ.items()}).to_toml()
         (tmp_path / f"board-{i}.toml").write_text(text.replace('"sheet"', f'"board-{i}"'))
     path = tmp_path / "together.toml"
     head = 'format = 1\nname = "together"\nboards = ["./board-1.toml", "./board-2.toml"]\n'

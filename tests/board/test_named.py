@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bayesplate.board.board_card import load_board, read_board_text
+from bayesplate.board.board import Board
 from bayesplate.board.named import load_named
 from bayesplate.board.shelf import shelf_folder
 
@@ -30,7 +30,7 @@ def test_cards_that_are_not_there(
 ) -> None:
     for old, new in changes:
         board_text = spoiled(old, new, board_text)
-    named = load_named(read_board_text(board_text, "my-board"))
+    named = load_named(Board.from_bytes(board_text, "my-board"))
 
     assert [fault.place for fault in named.faults] == places
     assert (named.prior is None) == (NO_PRIOR in changes)
@@ -41,13 +41,13 @@ def test_they_are_found_beside_the_board(board_file: Path, spoiled: Spoil, board
     """Wherever the program was started: a relative path begins at the folder of the board card."""
     text = spoiled("poisson_xy = 0.51", 'prior = "./mine.toml"', board_text)
     board_file.write_text(spoiled(RESOLUTION, RESOLUTION + 'published_coefficients = "sub/own.toml"\n', text))
-    missing = load_named(load_board(board_file))
+    missing = load_named(Board.from_toml(board_file))
     (board_file.parent / "sub").mkdir()
     shipped = (("priors", "spruce", "mine.toml", "mine"), ("coefficients", "paper-cantilever", "sub/own.toml", "own"))
     for kind, name, target, own in shipped:
         text = (shelf_folder(kind) / f"{name}.toml").read_text(encoding="utf-8")
         (board_file.parent / target).write_text(text.replace(f'name = "{name}"', f'name = "{own}"'), encoding="utf-8")
-    found = load_named(load_board(board_file))
+    found = load_named(Board.from_toml(board_file))
 
     assert [fault.got for fault in missing.faults] == ["no such file", "no such file"]
     assert found.faults == ()
@@ -60,10 +60,10 @@ def test_they_are_found_beside_the_board(board_file: Path, spoiled: Spoil, board
 def test_the_text_of_a_card_is_what_its_hash_is_of(board_file: Path, board_text: str, end: str, mark: str) -> None:
     """Also when the file is changed or taken away after it was read."""
     board_file.write_text(mark + board_text, encoding="utf-8", newline=end)
-    card = load_board(board_file)
+    card = Board.from_toml(board_file)
     board_file.unlink()
 
     assert hashlib.sha256(card.text.encode("utf-8")).hexdigest() == card.sha256
     assert card.text.removeprefix("\ufeff").replace("\r\n", "\n") == board_text
-    again = read_board_text(card.text, "my-board")
+    again = Board.from_bytes(card.text, "my-board")
     assert (again.sha256, again.text) == (card.sha256, card.text)

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from bayesplate.board.board_card import read_board_text
-from bayesplate.board.from_card import board_from_card
+from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.setup import Setup
 from bayesplate.errors import InputError
@@ -35,12 +34,12 @@ HINT = " (a probability: 98 % is 0.98)"
 
 
 def setup_of(text: str) -> Setup:
-    return board_from_card(read_board_text(text, "my-board")).setups[0]
+    return Board.from_bytes(text, "my-board").setups[0]
 
 
 def refusals(text: str) -> list[str]:
     with pytest.raises(InputError) as caught:
-        read_board_text(text, "my-board")
+        Board.from_bytes(text, "my-board")
     return [str(fault) for fault in caught.value.faults]
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bayesplate.board.board_card import read_board_text
-from bayesplate.board.physical import physical_faults
+from bayesplate.board.board import Board
+from bayesplate.board.checks import physical_faults
 from bayesplate.errors import Fault
 
 Spoil = Callable[..., str]
@@ -44,7 +44,7 @@ CASES = [
 
 
 def faults_of(text: str) -> list[Fault]:
-    return physical_faults(read_board_text(text, "my-board"))
+    return physical_faults(Board.from_bytes(text, "my-board"))
 
 
 def test_a_sound_card_has_none(board_text: str) -> None:

@@ -8,9 +8,8 @@ import ritz
 from made_boards import board_of, setup_of
 from scipy import integrate, stats
 
-from bayesplate.board.board_card import load_board
+from bayesplate.board.board import Board
 from bayesplate.board.densities import DEGREES_OF_FREEDOM
-from bayesplate.board.from_card import board_from_card
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading_errors import ReadingErrors, reading_sd
 from bayesplate.diagnosis.shifts.baseline import baseline_at
@@ -338,7 +337,7 @@ def test_a_list_of_readings_joins_its_standard_error_with_the_rounding_of_the_se
     path = tmp_path / "lists.toml"
     said = "" if resolution is None else f"resolution_hz = {resolution}"
     path.write_text(CARD.format(frequency=frequency, resolution=said), encoding="utf-8")
-    (setup,) = board_from_card(load_board(path)).setups
+    (setup,) = Board.from_toml(path).setups
     read, plain = (reading.frequency for reading in setup.readings)
     assert (read.mean, read.sd**2) == pytest.approx((mean, variance), rel=1e-12)
     assert plain.is_exact

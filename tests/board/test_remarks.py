@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bayesplate.board.board_card import read_board_text
-from bayesplate.board.remarks import remarks
+from bayesplate.board.board import Board
+from bayesplate.board.checks import remarks
 from bayesplate.workflow.prepare import prepare
 
 Spoil = Callable[..., str]
@@ -46,7 +46,7 @@ THICK = "more than a tenth: transverse shear matters"
     ],
 )
 def test_what_is_assumed_or_doubtful_is_told(spoiled: Spoil, old, new, effects, said) -> None:
-    found = remarks(read_board_text(spoiled(old, new), "my-board"), effects)
+    found = remarks(Board.from_bytes(spoiled(old, new), "my-board"), effects)
 
     assert len(found) == bool(said)
     for passage in said:

@@ -9,8 +9,9 @@ from collections.abc import Callable
 import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from stated import frequencies
 
-from bayesplate.board.board_card import read_board_text
+from bayesplate.board.board import Board
 from bayesplate.board.repeated import (
     FURTHEST_FREQUENCIES,
     FURTHEST_SIZES,
@@ -58,7 +59,7 @@ HONEST = [
 @pytest.mark.parametrize(("old", "new", "remedy"), COMMAS)
 def test_decimal_commas_are_refused_with_the_numbers_that_were_meant(spoiled: Spoil, old, new, remedy) -> None:
     with pytest.raises(InputError, match=re.escape(remedy)) as caught:
-        read_board_text(spoiled(old, new), "my-board")
+        Board.from_bytes(spoiled(old, new), "my-board")
     (fault,) = caught.value.faults
     assert fault.wanted == "numbers without commas inside them"
 
@@ -66,12 +67,12 @@ def test_decimal_commas_are_refused_with_the_numbers_that_were_meant(spoiled: Sp
 @pytest.mark.parametrize(("old", "new", "got"), STRAYS)
 def test_readings_that_are_not_of_one_thing_are_refused(spoiled: Spoil, old, new, got) -> None:
     with pytest.raises(InputError, match=re.escape(f"the smallest, got {got} (")):
-        read_board_text(spoiled(old, new), "my-board")
+        Board.from_bytes(spoiled(old, new), "my-board")
 
 
 @pytest.mark.parametrize(("old", "new"), HONEST)
 def test_honest_lists_are_read(spoiled: Spoil, old, new) -> None:
-    read_board_text(spoiled(old, new), "my-board")
+    Board.from_bytes(spoiled(old, new), "my-board")
 
 
 FURTHEST = st.sampled_from([FURTHEST_SIZES, FURTHEST_FREQUENCIES])
@@ -119,22 +120,22 @@ def test_peaks_in_ascending_order_are_never_refused(peaks) -> None:
         ("mass_g = 41.0", "mass_g = [41, 41]", 1.0),
         ("clamped_mm = { x0 = 30 }", "clamped_mm = { x0 = [30, 30] }", 1.0),
         ("mass_g = { mean = 0.6, sd = 0.1 }", "mass_g = [0.6, 0.6]", 0.1),
-        (REPEATED, '"(1,1)" = [98, 98]', 0.0),
+        (REPEATED, '"(1,1)" = [98, 98]', 1.0),  # that of its setup
         (THICKNESS, "2.8", 0.0),
     ],
 )
 def test_readings_that_are_all_alike_are_as_uncertain_as_their_instrument(spoiled: Spoil, old, new, step) -> None:
     """sd = step / sqrt(12), by default that of a caliper, a rule or scales; a plain number stays exact."""
-    card = read_board_text(spoiled(old, new), "my-board")
-    plate, setup = card.plate, card.setups[0]
-    told = {
-        THICKNESS: plate.thickness_mm,
-        "length_x_mm = 253": plate.length_x_mm,
-        "mass_g = 41.0": plate.mass_g,
-        "clamped_mm = { x0 = 30 }": setup.clamped_mm.get("x0"),
-        "mass_g = { mean = 0.6, sd = 0.1 }": setup.attached[0].mass_g,
-        REPEATED: setup.frequencies_hz.get((1, 1)),
+    card = Board.from_bytes(spoiled(old, new), "my-board")
+    inputs, setup = card.inputs, card.setups[0]
+    told, unit = {
+        THICKNESS: (inputs["thickness"], 1e-3),
+        "length_x_mm = 253": (inputs["length_x"], 1e-3),
+        "mass_g = 41.0": (inputs["mass"], 1e-3),
+        "clamped_mm = { x0 = 30 }": (setup.clamped.get("x0"), 1e-3),
+        "mass_g = { mean = 0.6, sd = 0.1 }": (setup.attached[0].mass, 1e-3),
+        REPEATED: (frequencies(setup).get((1, 1)), 1.0),
     }[old]
 
     assert told is not None
-    assert told.sd == pytest.approx(step / math.sqrt(12), rel=1e-12)
+    assert told.sd == pytest.approx(unit * step / math.sqrt(12), rel=1e-12)

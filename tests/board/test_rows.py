@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
+from stated import frequencies
 
-from bayesplate.board.copies import readings_sha256
+from bayesplate.board.checks import readings_sha256
 from bayesplate.board.csv_table import csv_table
 from bayesplate.board.rows import Columns
 from bayesplate.board.template import Template
@@ -59,9 +60,9 @@ def test_a_header_that_would_mean_something_else_is_refused(tmp_path, header, ca
 
 def test_a_template_may_have_readings_that_every_row_replaces(tmp_path):
     own = columns(tmp_path, 'name,"(1,1)","(3,0)","(1,2)"', READ.replace("unlabelled_hz = [300]\n", ""))
-    frequencies = own.card(["a", "52", "", "175"]).setups[0].frequencies_hz
+    (setup,) = own.board(["a", "52", "", "175"]).setups
 
-    assert {str(label): hertz.mean for label, hertz in frequencies.items()} == {"(1,1)": 52.0, "(1,2)": 175.0}
+    assert {str(label): hertz.mean for label, hertz in frequencies(setup).items()} == {"(1,1)": 52.0, "(1,2)": 175.0}
 
 
 ROWS = [
@@ -82,29 +83,32 @@ def test_a_row_that_would_mean_something_else_is_refused(tmp_path, row, said):
     own = columns(tmp_path, 'name,thickness_mm,thickness_mm sd,"(1,1)",')
     full = [*row[:4], "", row[4]] if "decimal" in said else row
     with pytest.raises(InputError, match=re.escape(said)):
-        own.card(full)
+        own.board(full)
 
 
 def test_texts_stay_texts_and_what_is_empty_is_nothing(tmp_path):
     own = columns(tmp_path, 'name,title,notes,prior,,"(1,1)",,')
     for name, expected in (("007", "007"), ("1e5", "1e5"), ("nan", "nan"), (101, "101"), (101.0, "101")):
-        card = own.card([name, "12", "3;4", "spruce", "", "51.8", "", None, " ", ""])
-        assert (card.name, card.title, card.notes, card.material.prior) == (expected, "12", "3;4", "spruce")
+        card = own.board([name, "12", "3;4", "spruce", "", "51.8", "", None, " ", ""])
+        assert (card.name, card.title, card.card.table["notes"], card.prior) == (expected, "12", "3;4", "spruce")
 
 
 def test_what_was_not_read_on_a_board_is_left_out_with_all_that_is_said_of_it(tmp_path):
-    signed = columns(tmp_path, 'name,"(1,1)","(2,0)","(0,2)"', SIGNED).card(["a", "51.8", "", "140"]).setups[0]
-    assert (list(map(str, signed.signs)), list(map(str, signed.label_confidence))) == (["(1,1)"], ["(1,1)"])
+    signed = columns(tmp_path, 'name,"(1,1)","(2,0)","(0,2)"', SIGNED).board(["a", "51.8", "", "140"]).setups[0]
+    assert [(str(one.label), one.sign, one.confidence) for one in signed.readings] == [
+        ("(1,1)", "+", 0.9),
+        ("(0,2)", "", 1.0),
+    ]
     twice = columns(tmp_path, 'name,"one (1,1)","one (2,0)","two (1,1)"', TWICE)
-    assert [one.name for one in twice.card(["a", "51.8", "72", ""]).setups] == ["one"]
-    assert [one.name for one in twice.card(["a", "51.8", "72", "51"]).setups] == ["one", "two"]
+    assert [one.name for one in twice.board(["a", "51.8", "72", ""]).setups] == ["one"]
+    assert [one.name for one in twice.board(["a", "51.8", "72", "51"]).setups] == ["one", "two"]
     with pytest.raises(InputError, match=r'\[\[setup\]\] 1 "one" frequencies_hz: wanted measured frequencies'):
-        twice.card(["a", "", "", ""])
+        twice.board(["a", "", "", ""])
 
 
 def test_boards_of_other_names_with_the_same_readings_are_known(tmp_path):
     own = columns(tmp_path, 'name,title,mass_g,"(1,1)","(2,0)"')
     rows = [["a", "x", "240", "51.8", "72"], ["b", "", "240.0", "51.80", "72"], ["c", "", "241", "51.8", "72"]]
-    one, copy, other = (readings_sha256(own.card(row)) for row in rows)
+    one, copy, other = (readings_sha256(own.board(row)) for row in rows)
 
     assert one == copy != other

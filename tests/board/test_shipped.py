@@ -8,12 +8,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from stated import frequencies, millimetres
 
-from bayesplate.board.board_card import load_board, read_board_text
+from bayesplate.board.board import Board
 from bayesplate.board.campaign import load_campaign
+from bayesplate.board.checks import board_mass, physical_faults
 from bayesplate.board.coefficients import load_coefficients
-from bayesplate.board.physical import physical_faults, plate_mass_g
 from bayesplate.board.prior import load_prior
+from bayesplate.board.quantity import Quantity
+from bayesplate.board.setup_keys import edge_letters
 from bayesplate.board.shelf import card_names, shelf_folder
 from bayesplate.labels import Label
 from bayesplate.workflow.prepare import prepare
@@ -38,11 +41,11 @@ def test_the_shelf() -> None:
 
 @pytest.mark.parametrize("name", card_names("boards"))
 def test_a_shipped_board_is_sound_and_names_no_effect(name: str) -> None:
-    card = load_board(name)
+    card = Board.from_toml(name)
 
     assert physical_faults(card) == []
     assert card.effects == ()
-    assert card.material.prior == "weakly-informative"
+    assert card.prior == "weakly-informative"
     assert card.source
 
 
@@ -59,25 +62,22 @@ def test_what_a_shipped_board_declares_by_what_it_states(name: str) -> None:
 
 @pytest.mark.parametrize("name", PAPER)
 def test_the_boards_of_the_paper(name: str) -> None:
-    labels, frequencies, (length, width, thickness, density) = PAPER[name]
-    card = load_board(name)
+    labels, hertz, (length, width, thickness, density) = PAPER[name]
+    card = Board.from_toml(name)
     (setup,) = card.setups
-    plate = card.plate
 
-    assert {label: quantity.mean for label, quantity in setup.frequencies_hz.items()} == dict(
-        zip(labels, frequencies, strict=True)
+    assert {label: quantity.mean for label, quantity in frequencies(setup).items()} == dict(
+        zip(labels, hertz, strict=True)
     )
-    assert (plate.length_x_mm.mean, plate.length_y_mm.mean, plate.thickness_mm.mean) == (length, width, thickness)
-    assert plate.density_kg_m3 is not None
-    assert plate.density_kg_m3.mean == density
-    assert card.material.poisson_xy.is_exact
-    assert card.material.poisson_xy.mean == 0.51
-    assert setup.resolution_hz == 1
-    table = load_coefficients(str(setup.published_coefficients))
-    free_length = length - sum(quantity.mean for quantity in setup.clamped_mm.values())
+    assert millimetres(card, "length_x", "length_y", "thickness") == (length, width, thickness)
+    assert card.inputs["density"].mean == density
+    assert card.inputs["poisson_xy"] == Quantity.exact(0.51)
+    assert setup.resolution == 1
+    table = load_coefficients(setup.table_name)
+    free_length = length - sum(1e3 * quantity.mean for quantity in setup.clamped.values())
     assert table.aspect_ratio == pytest.approx(free_length / width)
-    assert set(table.table) == set(setup.frequencies_hz)
-    assert (setup.noise_percent is not None) == name.endswith("-fe")
+    assert set(table.table) == set(setup.labels)
+    assert (not setup.is_noise_assumed) == name.endswith("-fe")
 
 
 @pytest.mark.parametrize(
@@ -98,19 +98,21 @@ def test_the_boards_of_the_paper(name: str) -> None:
 def test_the_free_boards(
     name: str, mass: float, labelled: int, unlabelled: int, some: dict[tuple[int, int], float], confidence: float
 ) -> None:
-    card = load_board(name)
+    card = Board.from_toml(name)
     (setup,) = card.setups
 
-    assert plate_mass_g(card) == pytest.approx(mass)
-    assert (len(setup.frequencies_hz), len(setup.peaks), setup.unlabelled_hz) == (labelled, unlabelled, ())
-    assert {setup.confidence_in(label) for label in setup.frequencies_hz} == {confidence}
-    assert {label: setup.frequencies_hz[Label(*label)].mean for label in some} == some
-    assert setup.resolution_hz is None
-    assert setup.edges.letters == "FFFF"
-    assert len(card.plate.length_y_mm.at_x) == 5
-    assert len(card.plate.thickness_mm.at_x) == len(card.plate.thickness_mm.at_y) == 10
+    assert 1e3 * board_mass(card) == pytest.approx(mass)
+    assert (len(setup.readings), len(setup.peaks)) == (labelled, unlabelled)
+    assert {reading.confidence for reading in setup.readings} == {confidence}
+    assert {label: frequencies(setup)[Label(*label)].mean for label in some} == some
+    assert setup.resolution == 0
+    assert edge_letters(setup.edges) == "FFFF"
+    assert len(card.inputs["length_y"].at_x) == 5
+    thickness = card.inputs["thickness"]
+    assert len(thickness.at_x) == len(thickness.at_y) == 10
     # opposite corners: the residue is positive where m + n is even, whatever the board
-    assert setup.signs == {label: "+" if sum(label) % 2 == 0 else "-" for label in setup.frequencies_hz}
+    signs = {reading.label: reading.sign for reading in setup.readings}
+    assert signs == {label: "+" if sum(label) % 2 == 0 else "-" for label in setup.labels}
 
 
 PEAKS = {
@@ -131,13 +133,13 @@ PEAKS = {
 @pytest.mark.parametrize("name", FREE)
 def test_peaks_of_the_free_boards(name: str) -> None:
     """The sd is half the spread of the fit, and at least 0.1 Hz; the peaks ascend, and none is a labelled mode."""
-    (setup,) = load_board(name).setups
-    read = {peak.hz.mean: (peak.hz.sd, peak.sign, peak.damping_percent) for peak in setup.peaks}
+    (setup,) = Board.from_toml(name).setups
+    read = {peak.frequency.mean: (peak.frequency.sd, peak.sign, round(100 * peak.damping, 9)) for peak in setup.peaks}
 
     assert {hertz: read[hertz] for hertz in PEAKS[name]} == PEAKS[name]
     assert list(read) == sorted(read)
     assert min(sd for sd, _, _ in read.values()) >= 0.1
-    assert not {quantity.mean for quantity in setup.frequencies_hz.values()} & set(read)
+    assert not {*setup.measured} & set(read)
 
 
 RIGID = {
@@ -149,35 +151,31 @@ RIGID = {
 
 @pytest.mark.parametrize("name", FREE)
 def test_the_bounce_of_the_free_boards_is_one_of_two_peaks(name: str) -> None:
-    (setup,) = load_board(name).setups
-    assert setup.support is not None
-    bounce = setup.support.bounce_hz
+    (setup,) = Board.from_toml(name).setups
+    bounce = setup.bounce
     assert bounce is not None
     assert (bounce.mean - bounce.sd, bounce.mean + bounce.sd) == RIGID[name[-2:]]
 
 
 def test_the_panels() -> None:
     """Ratios of the steel's frequencies in air and in water, the even modes of the others, the exciter's parts."""
-    air, water = load_board("steel-air-water").setups
-    added = [
-        (air.frequencies_hz[label].mean / water.frequencies_hz[label].mean) ** 2 - 1 for label in air.frequencies_hz
-    ]
+    air, water = Board.from_toml("steel-air-water").setups
+    added = [(frequencies(air)[label].mean / frequencies(water)[label].mean) ** 2 - 1 for label in air.labels]
     assert [round(share, 3) for share in added] == [0.663, 0.533, 0.488, 0.573, 0.480]
     for name, count in (("foam-panel-exciter", 7), ("acrylic-panel", 10)):
-        card = load_board(name)
+        card = Board.from_toml(name)
         (setup,) = card.setups
-        assert len(setup.frequencies_hz) == count
-        assert all(label.m % 2 == label.n % 2 == 0 for label in setup.frequencies_hz)
+        assert len(setup.labels) == count
+        assert all(label.m % 2 == label.n % 2 == 0 for label in setup.labels)
         (exciter,) = setup.attached
-        plate = card.plate
-        assert exciter.at_mm == ((plate.length_x_mm.mean / 2, plate.length_y_mm.mean / 2),)
-        assert exciter.suspension_n_per_m is not None
-        assert exciter.suspension_n_per_m.mean == pytest.approx(1000 / 0.37, abs=1.0)
+        assert exciter.places == ((card.inputs["length_x"].mean / 2, card.inputs["length_y"].mean / 2),)
+        assert exciter.suspension is not None
+        assert exciter.suspension.mean == pytest.approx(1000 / 0.37, abs=1.0)
         assert exciter.magnet == "held"
-    (setup,) = load_board("fiemme-spruce-clamped").setups
+    (setup,) = Board.from_toml("fiemme-spruce-clamped").setups
     (exciter,) = setup.attached
-    assert exciter.mass_g is not None
-    assert (exciter.kind, exciter.at_mm, exciter.mass_g.mean) == ("exciter", (), 48)
+    assert exciter.mass is not None
+    assert (exciter.kind, exciter.places, exciter.mass.mean) == ("exciter", (), 0.048)
 
 
 def test_the_campaigns_of_the_half_tops() -> None:
@@ -189,14 +187,14 @@ def test_the_campaigns_of_the_half_tops() -> None:
 
 def test_the_board_of_three_sessions() -> None:
     """Peaks alone; each of the six spreads by the per cent of the source, largest less smallest over the mean."""
-    card = load_board("nemus-D")
-    sessions = [[peak.mean for peak in setup.unlabelled_hz] for setup in card.setups]
+    card = Board.from_toml("nemus-D")
+    sessions = [list(setup.unlabelled) for setup in card.setups]
     spread = [100 * (max(hertz) - min(hertz)) / (sum(hertz) / 3) for hertz in zip(*sessions, strict=True)]
 
     assert [setup.name for setup in card.setups] == ["session-1", "session-2", "session-3"]
-    assert {setup.edges.letters for setup in card.setups} == {"CFFF"}
+    assert {edge_letters(setup.edges) for setup in card.setups} == {"CFFF"}
     assert [round(percent, 1) for percent in spread] == [2.4, 2.4, 2.0, 0.9, 2.0, 1.0]
-    assert all(not setup.frequencies_hz for setup in card.setups)
+    assert all(not setup.readings for setup in card.setups)
 
 
 @pytest.mark.parametrize("name", card_names("priors"))
@@ -215,13 +213,13 @@ def readme_examples() -> list[str]:
 def test_the_examples_of_the_readme_are_cards(tmp_path: Path) -> None:
     board, profile, sections, setups, prior, table, campaign = readme_examples()
 
-    card = read_board_text(board, "my-board")
+    card = Board.from_bytes(board, "my-board")
     assert physical_faults(card) == []
     more = sections.replace('"(1,1)" = "+"', '"(1,0)" = "+"').replace("at_mm = [20, 20]", "at_mm = [60, 20]")
-    assert physical_faults(read_board_text(board + more, "my-board")) == []
+    assert physical_faults(Board.from_bytes(board + more, "my-board")) == []
     narrow = re.sub(r"length_y_mm = 114.*\nthickness_mm = .*\n", profile.replace("580", "250"), board)
-    assert read_board_text(narrow, "my-board").plate.thickness_mm.has_profile
-    two = read_board_text(board[: board.index("[setup]")] + setups, "my-board")
+    assert Board.from_bytes(narrow, "my-board").inputs["thickness"].has_profile
+    two = Board.from_bytes(board[: board.index("[setup]")] + setups, "my-board")
     assert [setup.name for setup in two.setups] == ["clamped", "free"]
     (tmp_path / "my-prior.toml").write_text(prior, encoding="utf-8")
     assert load_prior(tmp_path / "my-prior.toml").noise_percent is not None

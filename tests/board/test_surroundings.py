@@ -8,12 +8,10 @@ from pathlib import Path
 import pytest
 
 import bayesplate
-from bayesplate.board.board_card import read_board_text
+from bayesplate.board.board import Board
 from bayesplate.board.campaign import load_campaign
-from bayesplate.board.from_card import board_from_card
-from bayesplate.board.physical import physical_faults
+from bayesplate.board.checks import physical_faults, remarks
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.remarks import remarks
 from bayesplate.board.words import EFFECT_NAMES
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import implied_effects
@@ -26,13 +24,13 @@ SETUP = "my-board.toml [setup] "
 
 
 def read(text):
-    return board_from_card(read_board_text(text, "my-board"))
+    return Board.from_bytes(text, "my-board")
 
 
 def told(text):
     """Every fault of a card: of its writing, or else of its meaning."""
     try:
-        card = read_board_text(text, "my-board")
+        card = Board.from_bytes(text, "my-board")
     except InputError as error:
         return [str(fault) for fault in error.faults]
     return [str(fault) for fault in physical_faults(card)]
@@ -83,8 +81,8 @@ def test_what_no_board_is_warped_by(spoiled, warp):
 
 
 def test_readings_of_a_warp_that_are_all_alike_are_rounded_to_a_feeler_gauge(spoiled):
-    card = read_board_text(spoiled(PLATE, f"{PLATE}\nwarp_mm = {{ cup = [0.8, 0.8], bow = [1.0, 1.1] }}"), "my-board")
-    assert card.plate.warp_mm["cup"].sd == pytest.approx(0.1 / 12**0.5)
+    card = Board.from_bytes(spoiled(PLATE, f"{PLATE}\nwarp_mm = {{ cup = [0.8, 0.8], bow = [1.0, 1.1] }}"), "my-board")
+    assert card.warp["cup"].sd == pytest.approx(1e-4 / 12**0.5)
     assert any("taken as rounded, cup to 0.1 mm; " in one for one in remarks(card, ()))
 
 
@@ -144,7 +142,7 @@ def test_from_numbers_takes_all_of_it():
     sizes = {"length_x": 0.253, "length_y": 0.114, "thickness": 3e-3, "mass": 0.041, "setups": setup}
     board = bayesplate.Board.from_numbers("my-board", warp={"bow": -1e-3, "cup": [8e-4, 9e-4]}, **sizes)
     assert board.warp["cup"].lower == 0.0
-    again = read(board.to_card())
+    again = read(board.to_toml())
     assert again.setups == board.setups
     assert again.warp["bow"] == board.warp["bow"]
     assert again.warp["cup"].readings == pytest.approx(board.warp["cup"].readings, rel=1e-12)
@@ -186,7 +184,7 @@ def test_an_empty_list_of_effects_declares_nothing_not_even_what_is_implied(spoi
     prepared = prepare(none)
     assert prepared.board.effects == ()
     assert "fluid_loading" in forms(prepared.board)
-    assert "\neffects = []\n" in none.to_card()
+    assert "\neffects = []\n" in none.to_toml()
     assert prepare(prepared.board).board.effects == ()
     taken = prepare(read(spoiled(stated, "")), effects=[]).board
     assert (taken.effects, prepare(taken).board.effects) == ((), ())

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesplate.board.board import made_board
-from bayesplate.board.board_card import read_board_text
-from bayesplate.board.board_text import card_text
-from bayesplate.board.from_card import board_from_card
+from bayesplate.board.attached import AttachedItem, DeclaredFluid
+from bayesplate.board.board import Board, made_board
 from bayesplate.board.named import load_named
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak, Reading
-from bayesplate.board.setup import AttachedItem, DeclaredFluid, Setup
+from bayesplate.board.setup import Setup
 from bayesplate.board.shelf import card_names
 from bayesplate.errors import InputError
 from bayesplate.labels import Label
@@ -40,22 +38,23 @@ def assert_same(one, other):
 
 
 def again(board):
-    read = read_board_text(card_text(board), board.name)
+    read = Board.from_bytes(board.to_toml(), board.name)
     named = load_named(read)
-    return board_from_card(read, named.prior, named.tables)
+    return read.assuming(named.prior, named.tables)
 
 
 def comparable(board):
-    """Without what a card does not hold: notes on what it left out, and parameters of effects, which it names."""
+    """Without what a card does not hold: its own file, notes, and parameters of effects, which it names."""
     own = tuple(one for one in board.parameters if not one.is_of_effect)
-    return {**{k: v for k, v in vars(board).items() if k in board.__dataclass_fields__}, "notes": (), "parameters": own}
+    fields = {k: v for k, v in vars(board).items() if k in board.__dataclass_fields__}
+    return fields | {"card": None, "notes": (), "parameters": own}
 
 
 @pytest.mark.parametrize("name", card_names("boards"))
 def test_every_shipped_board_comes_back(name):
     board = prepare(name).board
     assert comparable(again(board)) == comparable(board)
-    assert card_text(again(board)) == card_text(board)
+    assert again(board).to_toml() == board.to_toml()
 
 
 def everything():
@@ -122,7 +121,7 @@ def test_every_key_comes_back():
     first = again(everything())
     assert_same(comparable(first), comparable(everything()))
     assert comparable(again(first)) == comparable(first)
-    assert card_text(again(first)) == card_text(first)
+    assert again(first).to_toml() == first.to_toml()
 
 
 def test_a_changed_number_does_not_come_back_as_the_same():
@@ -137,7 +136,7 @@ def test_what_no_card_can_state_is_refused(name):
     """A log-uniform thickness or a bounded ratio would come back as something else."""
     known = {"thickness": Quantity.from_range(2e-3, 4e-3), "poisson_xy": Quantity.from_mean(0.4, 0.1, "normal", 0.0)}
     with pytest.raises(InputError, match=f"{name}: wanted a .*normal quantity without bounds, as cards state it, got"):
-        card_text(everything().with_priors({name: known[name]}))
+        everything().with_priors({name: known[name]}).to_toml()
 
 
 @pytest.mark.parametrize(
@@ -150,16 +149,16 @@ def test_what_no_card_can_state_is_refused(name):
 )
 def test_a_warp_of_another_density_is_refused(name, rise):
     with pytest.raises(InputError, match=f"warp {name}: wanted a normal quantity (from 0 on|without bounds), as cards"):
-        card_text(replace(everything(), warp={name: rise}))
+        replace(everything(), warp={name: rise}).to_toml()
 
 
 def test_peaks_and_what_is_believed_of_them_are_written_where_they_say_something():
     """The bare ones first as a list, then tables, in their order; the confidence of some labels by label."""
-    text, bare = card_text(everything()), card_text(replace(everything(), setups=everything().setups[:1]))
+    text, bare = everything().to_toml(), replace(everything(), setups=everything().setups[:1]).to_toml()
 
     assert "unlabelled_hz = [448.8, { readings = [594.1, 594.4], resolution = 0.5 }]" in text
-    first = '{ hz = { mean = 671.2, sd = 0.3 }, sign = "-", amplitude = 0.25, damping_percent = 1.23 }'
-    assert f"peaks = [{first}, {{ hz = 707.0, amplitude = 3.0 }}]" in text
+    first = '[[setup.peaks]]\nhz = { mean = 671.2, sd = 0.3 }\nsign = "-"\namplitude = 0.25\ndamping_percent = 1.23\n'
+    assert f"{first}\n[[setup.peaks]]\nhz = 707.0\namplitude = 3.0\n" in text
     assert 'label_confidence = { "(1,0)" = 0.9, "(2,0)" = 0.75 }' in text
     assert "missed_probability = 0.1\nspurious_probability = 0.05\n" in text
     assert not any(key in bare for key in ("unlabelled", "peaks", "confidence", "missed", "spurious"))
@@ -178,7 +177,7 @@ def test_a_confidence_that_all_labels_share_is_one_number(confidence, written):
     readings = tuple(replace(one, confidence=c) for one, c in zip(setup.readings, confidence, strict=True))
     board = replace(everything(), setups=(replace(setup, readings=readings),))
 
-    assert written in card_text(board)
+    assert written in board.to_toml()
     assert tuple(one.confidence for one in again(board).setups[0].readings) == confidence
 
 

@@ -17,8 +17,8 @@ from generator.known_boards import BEAMS, FIEMME, FINNISH, FREE
 from generator.plate import Plate
 from generator.plate import solve as solve_generator
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import AttachedItem
 from bayesplate.effects.attached_items import Item, base_diameter
 from bayesplate.effects.attached_mass import HEAVIEST_ROVING, AttachedMass
 from bayesplate.modes.line import line

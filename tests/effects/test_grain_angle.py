@@ -11,8 +11,8 @@ from effect_plates import MADE, SHEAR, hertz, hertz_apart, modes_of, posed, setu
 from generator.known_boards import BEAMS, FINNISH, FREE
 from made_boards import board_of
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import AttachedItem
 from bayesplate.effects.attached_items import Item
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.grain_angle import GrainAngle

@@ -15,11 +15,11 @@ from generator.plate import FINE_SHEAR
 from generator.plate import solve as solve_generator
 from made_boards import board_of
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import density, vibrating_lengths
 from bayesplate.board.parameter import BOARD
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.random_field import Surface
-from bayesplate.board.setup import AttachedItem
 from bayesplate.effects.attached_items import Item
 from bayesplate.effects.attached_mass import AttachedMass
 from bayesplate.effects.field_components import FieldProfile

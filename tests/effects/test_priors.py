@@ -18,10 +18,9 @@ from effect_plates import SETUP, setup_of
 from generator.known_boards import FIEMME, FREE
 from made_boards import board_of
 
-from bayesplate.board.board_card import read_board_text
-from bayesplate.board.from_card import board_from_card
+from bayesplate.board.attached import AttachedItem
+from bayesplate.board.board import Board
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import AttachedItem
 from bayesplate.diagnosis.shifts.forms import forms
 from bayesplate.effects import EFFECTS
 from bayesplate.effects.attached_items import item_on_board
@@ -198,7 +197,7 @@ edges = {{ x0 = "{}", x1 = "free", y0 = "free", y1 = "free" }}
 
 @pytest.mark.parametrize(("edge", "median"), [("free", 0.003), ("supported", 0.003), ("clamped", 0.008)])
 def test_noise_and_poisson_ratio_of_a_card_that_states_neither(edge, median):
-    board = board_from_card(read_board_text(CARD.format(edge), "b"))
+    board = Board.from_bytes(CARD.format(edge), "b")
 
     assert same(board.setups[0].noise, "log-normal", median, 0.5, ANY)
     assert same(board.inputs["poisson_xy"], "normal", 0.4, 0.08, ANY)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.reading import Peak
-from bayesplate.board.setup import AttachedItem
 from bayesplate.board.shelf import shelf_folder
 from bayesplate.errors import InputError
 from bayesplate.estimates.coefficients import coefficient_faults

@@ -11,12 +11,12 @@ from generator.naming import frequencies
 from generator.plate import Plate
 from made_boards import setup_of
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import made_board
 from bayesplate.board.material import rigidities
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import unknown_discrepancies, with_discrepancies
-from bayesplate.board.setup import AttachedItem
 from bayesplate.planning.assembled import bench_of
 from bayesplate.planning.before import prior_beliefs
 from bayesplate.planning.modes_read import station_readings

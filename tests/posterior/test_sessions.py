@@ -11,12 +11,13 @@ import ritz
 from made_boards import CANTILEVER_LABELS, NARROW, board_of, models_at, peaks_of, setup_of
 from normal_case import NormalCase, differences, draws_of
 
+from bayesplate.board.attached import AttachedItem, DeclaredFluid
 from bayesplate.board.board import Board, made_board
 from bayesplate.board.parameter import BOARD
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.sessions import discrepancy_names, sessions, with_discrepancies
-from bayesplate.board.setup import DEFAULT_NOISE, AttachedItem, DeclaredFluid
+from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.diagnosis.evidence.search import prepare_search, search
 from bayesplate.diagnosis.shifts import baseline as home
 from bayesplate.diagnosis.shifts.baseline import baseline_of
@@ -74,7 +75,7 @@ def test_setups_that_hold_and_load_the_board_alike_are_sessions():
     assert found.inputs["discrepancy[one to third day]"] == DEFAULT_NOISE
     assert len(found.parameters) == len(made.parameters) + 1 + len(CANTILEVER_LABELS)
     assert with_discrepancies(found) == found
-    assert found.to_card() == made.to_card()
+    assert found.to_toml() == made.to_toml()
     alone = board_of(ritz.FINNISH, [one, *others[1:6]])
     assert with_discrepancies(alone) == alone
 

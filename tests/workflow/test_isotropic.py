@@ -290,10 +290,10 @@ def test_a_board_comes_back_from_its_card():
     board = sheet(sheet_hz(70e9, 0.3), effects=("transverse_shear",))
     problem = bayesplate.Problem.from_card(board)
 
-    assert "isotropic = true" in board.to_card()
+    assert "isotropic = true" in board.to_toml()
     assert problem.board.isotropic
-    assert problem.board.to_card() == board.to_card()
-    assert "isotropic" not in replace(board, isotropic=False).to_card()
+    assert problem.board.to_toml() == board.to_toml()
+    assert "isotropic" not in replace(board, isotropic=False).to_toml()
 
 
 def test_the_poisson_ratio_of_nobody_is_that_of_its_kind():

@@ -11,9 +11,9 @@ from generator.boards import plant
 from scipy import stats
 
 from bayesplate import Board, Setup
+from bayesplate.board.attached import DeclaredFluid
 from bayesplate.board.prior import load_prior
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import DeclaredFluid
 from bayesplate.diagnosis.decision.stated import judge_stated, stated_claims
 from bayesplate.diagnosis.evidence.combinations import stated_effects
 from bayesplate.diagnosis.evidence.known import known_fit

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from made_searches import NOISE, bare, baseline, ground_of, one_level, table, with_readings
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.setup import AttachedItem
 from bayesplate.diagnosis.evidence.folds import left_out, nested
 from bayesplate.diagnosis.evidence.hypotheses import (
     RELABELLING,

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesplate.board.attached import AttachedItem
 from bayesplate.board.board import made_board
 from bayesplate.board.parameter import BOARD
-from bayesplate.board.setup import AttachedItem
 from bayesplate.diagnosis.shifts.forms import forms, with_forms
 from bayesplate.diagnosis.shifts.tables import COARSE, FINE, cells_along
 from bayesplate.effects import EFFECTS, effects_of
