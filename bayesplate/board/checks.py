@@ -26,8 +26,8 @@ MOST_WARP = 0.1  # of the side: a shallow shell, of which the effect is computed
 THICKEST_SHARE = 0.5  # of the shorter side; beyond it no plate theory holds
 ISOTROPIC_RANGE = (-1.0, 0.5)
 """Between which the Poisson ratio of a solid that is alike in all directions lies."""
-_THOU, _THINNEST_IN_THOU = 2.54e-5, 20.0
-"""A thickness in thousandths of an inch is a number of tens and more: veneer of half a millimetre has 20."""
+_INCH, _THINNEST_IN_THOU, _LONGEST_IN_INCHES = 25.4, 20.0, 60.0
+"""mm of an inch; a thickness in thousandths of it is a number of tens: veneer of half a millimetre has 20."""
 THICK_SHARE = 0.1
 """Thickness over the shorter free side beyond which a thin plate is too stiff."""
 LARGE_NOISE = 0.2
@@ -116,15 +116,17 @@ def _plate(board: Board) -> Iterator[Row]:
     heaviness, thickness = float(density(board.nominal())), inputs["thickness"].mean
     key, remedy = "density_kg_m3", "mass in g, density in kg/m3, lengths in mm"
     if "mass" in inputs:
-        key, remedy = "mass_g", next(_in_other_units(1e3 * inputs["mass"].mean, heaviness), remedy)
+        key, remedy = "mass_g", next(_in_other_units(inputs, heaviness), remedy)
     limits = f"a density from {LIGHTEST:g} to {HEAVIEST:g} kg/m3"
     yield f"{section} {key}", LIGHTEST <= heaviness <= HEAVIEST, limits, f"{heaviness:.3g} kg/m3", remedy
 
     sides = {"cup": inputs["length_y"].mean, "bow": inputs["length_x"].mean}
     thickest = THICKEST_SHARE * min(sides.values())
-    remedy, thou = "no plate is so thick", 1e3 * thickness * _THOU
+    remedy, thou = "no plate is so thick", thickness * _INCH / 1e3
     if 1e3 * thickness >= _THINNEST_IN_THOU and thou <= thickest:
         remedy += f"; {1e3 * thickness:g} thousandths of an inch would be {1e3 * thou:.3g} mm"
+    elif thickness <= _INCH * thickest and (sides_told := _sides_in_inches(inputs)):
+        remedy += f"; {sides_told}"
     wanted = f"at most half the shorter side, {1e3 * thickest:g} mm"
     yield f"{section} thickness_mm", thickness <= thickest + _NEARLY, wanted, f"{1e3 * thickness:g} mm", remedy
 
@@ -143,11 +145,22 @@ def _plate(board: Board) -> Iterator[Row]:
                 yield where, 0 <= value <= most + _NEARLY, wanted, f"{1e3 * value:g} mm", ""
 
 
-def _in_other_units(mass: float, heaviness: float) -> Iterator[str]:
-    """What a mass would be in g, had it been written in another unit of a balance: as far as a board can weigh that."""
+def _in_other_units(inputs: Mapping[str, Quantity], heaviness: float) -> Iterator[str]:
+    """What the mass would be in g, or the sides in mm, had they another unit, as far as a board can weigh that."""
+    mass = 1e3 * inputs["mass"].mean
     for unit, grams in (("kg", 1000.0), ("oz", 28.3495)):
         if _LIGHT <= heaviness * grams <= _HEAVY:
             yield f"{mass:g} {unit} is {mass * grams:.4g} g"
+    sides = _sides_in_inches(inputs)
+    if sides and any(_LIGHT <= heaviness / _INCH**sizes <= _HEAVY for sizes in (2, 3)):
+        yield sides
+
+
+def _sides_in_inches(inputs: Mapping[str, Quantity]) -> str:
+    """What the sides would be in mm, had they been written in inches; empty where the board would be too long."""
+    x, y = (1e3 * inputs[f"length_{axis}"].mean for axis in "xy")
+    told = f"sides of {x:g} and {y:g} inches would be {_INCH * x:.4g} and {_INCH * y:.4g} mm"
+    return told if max(x, y) <= _LONGEST_IN_INCHES else ""
 
 
 def _isotropic(board: Board) -> Iterator[Row]:

@@ -11,7 +11,18 @@ from typing import Any
 from bayesplate.board.quantity import Kind, Quantity
 from bayesplate.board.repeated import are_alike, comma_complaint, scatter_complaint
 from bayesplate.board.units import SI, in_unit, median_and_factor
-from bayesplate.board.values import Complaint, Key, Number, Refusal, Whole, read_each, read_list, read_table, refuse
+from bayesplate.board.values import (
+    Complaint,
+    Key,
+    Number,
+    Refusal,
+    Whole,
+    read_each,
+    read_list,
+    read_table,
+    refuse,
+    strange_character,
+)
 from bayesplate.board.words import quoted, shown
 from bayesplate.errors import InputError
 from bayesplate.labels import HIGHEST_FIRST, Label
@@ -169,7 +180,7 @@ def read_label(text: str) -> Label:
     except InputError as error:
         fault = error.faults[0]
         slipped = re.fullmatch(r"[a-z][a-z0-9_]*", text)
-        remedy = "a key of [setup] stands above the table of labels" if slipped else fault.remedy
+        remedy = "a key of [setup] stands above the table of labels" if slipped else strange_character(text)
         raise Refusal(Complaint(fault.wanted, fault.got, remedy, (text,))) from None
 
 

@@ -18,6 +18,7 @@ from bayesplate.errors import Fault, InputError
 
 Kind = Literal["normal", "log-normal", "log-uniform"]
 Floats = NDArray[np.float64]
+_BETWEEN = math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0)
 _LOG_ROOT_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 
 
@@ -372,14 +373,15 @@ class Quantity:
         Returns
         -------
         array of the same shape, no unit
+            Finite at 0 and 1 too, where it is that of the nearest number between them.
         """
         share = np.asarray(probability, dtype=np.float64)
         low, high = self.standard_bounds
         if low > 0:  # probabilities next to 1 have lost their digits: the same from the other end
             above, beyond = float(ndtr(-low)), float(ndtr(-high))
-            return np.asarray(-ndtri(beyond + (above - beyond) * (1.0 - share)))[()]
+            return np.asarray(-ndtri(np.clip(beyond + (above - beyond) * (1.0 - share), *_BETWEEN)))[()]
         below, within = float(ndtr(low)), float(ndtr(high))
-        return np.asarray(ndtri(below + (within - below) * share))[()]
+        return np.asarray(ndtri(np.clip(below + (within - below) * share, *_BETWEEN)))[()]
 
     def quantile(self, probability: ArrayLike) -> Floats:
         """The value below which the quantity lies with a given probability.

@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, NoReturn
 
-from bayesplate.board.syntax import syntax_remedy
+from bayesplate.board.values import number_hint, strange_character, two_readings
 from bayesplate.board.words import quoted
 from bayesplate.errors import Fault, InputError, plain
 
@@ -18,6 +18,13 @@ DEEPEST_NESTING = 20
 _POSITION = re.compile(r"^(.*) \(at (?:line (\d+), column \d+|end of document)\)$", re.DOTALL)
 _KEY_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{DEEPEST_NESTING},}}")
+
+_COMMA = re.compile(r"=\s*([+-]?[0-9]+,[0-9]+)")
+_COMMA_IN_LIST = re.compile(r"[\[,]\s*[0-9]+,0[0-9]")  # TOML has no numbers like 05
+_LABEL = re.compile(r"(\(\s*[0-9]+\s*,\s*[0-9]+\s*\))\s*(?:=\s*(.+))?")
+_CURLY = re.compile("[\u201c\u201d\u201e\u2018\u2019\u201a\u00ab\u00bb]")
+_WITH_UNIT = re.compile(r"(?:_(mm|g))?\s*=\s*([+-]?[0-9.]+\s*[A-Za-z]+)")
+_QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
 
 
 def read_file(path: str | Path) -> bytes:
@@ -114,8 +121,33 @@ def _syntax_fault(message: str, text: str, file: str) -> Fault:
     reason = match[1] if match else message
     is_twice = bool(re.match(r"Cannot (overwrite|declare|mutate)", reason))
     wanted = "each key and each table once" if is_twice else "TOML"
-    remedy = syntax_remedy(line, file, is_twice=is_twice)
+    remedy = _remedy(line, file, is_twice=is_twice)
     return Fault(f"{file} line {number}", wanted, f"{quoted(line)}: {plain(reason)}", remedy)
+
+
+def _remedy(line: str, file: str, *, is_twice: bool) -> str:
+    """What to write instead of a line at which the reader stopped; empty if it does not tell what was meant."""
+    if is_twice:
+        setup = re.match(r"\[\s*setup\b", line)
+        return "several setups are written [[setup]], in double brackets, each with a name" if setup else ""
+    if _CURLY.search(line):
+        straight = _CURLY.sub('"', line)
+        return f"straight quotes: {straight[:80]}"
+    if strange := strange_character(_QUOTED.sub("", line)):
+        return strange
+    label = _LABEL.match(line)
+    if label:
+        return f'a label stands in quotes: "{label[1]}" = {(label[2] or "52")[:40]}'
+    comma = _COMMA.search(line)
+    if comma or _COMMA_IN_LIST.search(line):
+        return (two_readings(comma[1]) if comma else "") or "a number has a decimal point, not a comma"
+    if stated := _WITH_UNIT.search(line):
+        return number_hint(stated[2], stated[1] or "") or "the unit stands in the key: write the number alone"
+    if re.fullmatch(r"[^=\[#{]*[,;\t][^=]*", line) or not file.endswith(".toml"):
+        return "a card is a TOML file with lines like length_x_mm = 550; bayesplate new writes a first one"
+    if re.fullmatch(r"[^=]*=\s*", line):
+        return "a value after the sign, or leave the line out"
+    return "a text stands in quotes" if re.search(r"=\s*[^\W\d]", line) else ""
 
 
 def _depth_exceeds(table: dict[str, Any], limit: int) -> bool:

@@ -127,7 +127,7 @@ class Number:
 
     def __call__(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise Refusal(Complaint("a number", shown(value), _number_hint(value, self.unit)))
+            raise Refusal(Complaint("a number", shown(value), number_hint(value, self.unit)))
         if isinstance(value, float) and not math.isfinite(value):
             raise Refusal(Complaint("a finite number", shown(value)))
         if value <= 0 < self.low:
@@ -149,7 +149,7 @@ class Number:
         return Key(lambda value: self(value) * self.si, lambda value: in_unit(value, self.si))
 
 
-def _number_hint(value: object, unit: str) -> str:
+def number_hint(value: object, unit: str) -> str:
     """How to write the number that a text seems to mean."""
     if not isinstance(value, str):
         return ""

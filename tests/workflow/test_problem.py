@@ -240,6 +240,13 @@ def test_points_outside_the_cube_are_refused(clamped):
         clamped.prior_transform([0.5, 1.5, 0.5, 0.5])
 
 
+def test_the_corners_of_the_cube_are_points_too(clamped):
+    for u in (0.0, 1.0):
+        theta = clamped.prior_transform(np.full(clamped.n_dim, u))
+        assert np.isfinite(theta).all()
+        assert not np.isnan(clamped.log_prob(theta))
+
+
 def test_the_plates_are_solved_once_and_not_before_they_are_needed(monkeypatch):
     from bayesplate.workflow import problem as module
 
