@@ -13,7 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.board.board_keys import WARPS, BoardKeys, CardFile, MaterialKeys, PlateKeys, read_board
+from bayesplate.board.board_keys import WARPS, BoardKeys, MaterialKeys, PlateKeys, read_board
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.material import ISOTROPIC, ORTHOTROPIC, Symmetry
 from bayesplate.board.parameter import BOARD, Parameter
@@ -21,12 +22,10 @@ from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Kind, Quantity
 from bayesplate.board.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
 from bayesplate.board.setup import NOISE_WANTED, Setup
-from bayesplate.board.shelf import find
 from bayesplate.board.stated import are, quantity_of, unstatable, wrong_types
-from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.words import did_you_mean, effect_named
 from bayesplate.board.writing import toml_text, write_card
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.errors import Fault, InputError
 
 Values = Mapping[str, NDArray[np.float64]]
 """Values of named quantities, SI: each a number or an (n_draws,) array."""
@@ -305,35 +304,19 @@ class Board:
             If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at
             once.
         """
-        path = find("boards", name_or_path)
-        return cls.from_bytes(read_file(path), path.stem, path.parent, may_lack_frequencies, setup)
+        return cls.from_card(CardFile.load("boards", name_or_path), may_lack_frequencies, setup)
 
     @classmethod
-    def from_bytes(
-        cls,
-        content: bytes | str,
-        name: str,
-        folder: Path | None = None,
-        may_lack_frequencies: bool = False,
-        setup: str | os.PathLike[str] | None = None,
-    ) -> Board:
-        """The same from what stands, or might stand, in the file NAME.toml of a folder."""
-        data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
-        name = name.removesuffix(".toml")
-        file = plain(f"{name}.toml")
-        table = read_table(data, file)
-        return cls.from_table(CardFile(table, file, folder, data.decode("utf-8")), name, may_lack_frequencies, setup)
+    def from_text(cls, text: str, name: str, may_lack_frequencies: bool = False) -> Board:
+        """The same from what might stand in the file NAME.toml."""
+        return cls.from_card(CardFile.of(text, f"{name.removesuffix('.toml')}.toml"), may_lack_frequencies)
 
     @classmethod
-    def from_table(
-        cls,
-        card: CardFile,
-        name: str,
-        may_lack_frequencies: bool = False,
-        setup: str | os.PathLike[str] | None = None,
+    def from_card(
+        cls, card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
     ) -> Board:
         """The same from the table of a card."""
-        keys, card = read_board(card, name, may_lack_frequencies, setup)
+        keys, card = read_board(card, may_lack_frequencies, setup)
         plate, material = keys.plate, keys.material
         inputs = {**dict(plate), "poisson_xy": material.poisson_xy}
         return made_board(
@@ -443,7 +426,7 @@ class Board:
     @property
     def file(self) -> str:
         """The name of its card, as messages show it."""
-        return self.card.file if self.card is not None else f"{self.name}.toml"
+        return self.card.shown if self.card is not None else f"{self.name}.toml"
 
     @property
     def folder(self) -> Path | None:

@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property, partial
-from hashlib import sha256
-from pathlib import Path
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.fragment import merged
 from bayesplate.board.measures import DENSITY, POISSON, QuantityReader
 from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import CALIPER, FEELER, FURTHEST_SIZES, RULE, SCALES
-from bayesplate.board.schema import Section, name_faults, place, validated
+from bayesplate.board.schema import Section, place, validated
 from bayesplate.board.setup_keys import SetupKeys
 from bayesplate.board.shelf import CAMPAIGN_REMEDY
 from bayesplate.board.values import (
@@ -35,7 +33,6 @@ from bayesplate.board.values import (
     read_text,
 )
 from bayesplate.board.words import quoted, shown
-from bayesplate.board.writing import toml_text
 from bayesplate.errors import Fault, InputError
 
 DEFAULT_PRIOR = "weakly-informative"
@@ -128,50 +125,14 @@ class BoardKeys(Section):
     )
 
 
-@dataclass(frozen=True)
-class CardFile:
-    """Where a board was read: its table as the file states it, before anything was assumed.
-
-    Attributes
-    ----------
-    table : dict
-    file : str
-        Name of the file, as messages show it.
-    folder : Path or None
-        In which cards are looked for that it names by a relative path; None: the working directory.
-    read : str
-        The text of the file; empty where the table was made otherwise.
-    """
-
-    table: Mapping[str, Any]
-    file: str
-    folder: Path | None = None
-    read: str = ""
-
-    @cached_property
-    def text(self) -> str:
-        """The file as it was read: in UTF-8 it is the bytes that `sha256` is of, whatever the file holds by now."""
-        return self.read or toml_text(self.table)
-
-    @cached_property
-    def sha256(self) -> str:
-        """Hexadecimal SHA-256 of the file's bytes."""
-        return sha256(self.text.encode("utf-8")).hexdigest()
-
-
 def read_board(
-    card: CardFile,
-    stem: str,
-    may_lack_frequencies: bool = False,
-    setup: str | os.PathLike[str] | None = None,
+    card: CardFile, may_lack_frequencies: bool = False, setup: str | os.PathLike[str] | None = None
 ) -> tuple[BoardKeys, CardFile]:
     """The keys of a card, and the card with a fragment that completes it.
 
     Parameters
     ----------
     card : CardFile
-    stem : str
-        The name that the board must have.
     may_lack_frequencies : bool
         Whether a board that was not measured yet will do.
     setup : str or path, optional
@@ -182,7 +143,7 @@ def read_board(
     InputError
         With every fault of the card at once.
     """
-    table, file = card.table, card.file
+    table, file = card.table, card.shown
     if {*table} == {"setup"} and isinstance(table["setup"], dict):
         remedy = f"it completes a card: CARD --setup {file}"
         raise InputError(Fault(file, "a card, which has a [plate]", "a [setup] alone, as pick writes it", remedy))
@@ -190,14 +151,13 @@ def read_board(
         raise InputError(Fault(file, "a board card", "a campaign", CAMPAIGN_REMEDY))
     if setup is not None:
         table, file = merged(table, file, setup)
-        card = CardFile(table, card.file, card.folder)
-    faults = [*name_faults(table, file, stem), *_mass_faults(table, file), *_setup_name_faults(table, file)]
+        card = CardFile(table, card.name, card.folder)
     context = {"may_lack_frequencies": may_lack_frequencies}
-    return validated(BoardKeys, table, file, context, faults), card
+    return validated(BoardKeys, card, _faults_beside, context, file), card
 
 
-# These compare keys with one another. They look at the raw table, so that they are reported together with the faults
-# of single keys.
+def _faults_beside(table: Mapping[str, Any], file: str) -> list[Fault]:
+    return [*_mass_faults(table, file), *_setup_name_faults(table, file)]
 
 
 def _mass_faults(table: Mapping[str, Any], file: str) -> list[Fault]:

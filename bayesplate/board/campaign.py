@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,8 +9,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PrivateAttr
 
-from bayesplate.board.schema import Section, name_faults, place, validated
-from bayesplate.board.shelf import card_names, find
+from bayesplate.board.card_file import CardFile
+from bayesplate.board.schema import Section, place, validated
+from bayesplate.board.shelf import card_names
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.values import (
     Choice,
@@ -87,30 +87,26 @@ class CampaignCard(Section):
     effects: Annotated[tuple[str, ...], Key(read_effects)] = ()
     shared: Annotated[tuple[SharedSection, ...], BeforeValidator(_as_list)] = ()
     population: PopulationSection | None = None
-    _path: Path = PrivateAttr(Path())
-    _sha256: str = PrivateAttr("")
-    _text: str = PrivateAttr("")
+    _card: CardFile = PrivateAttr()
 
     def model_post_init(self, context: Any) -> None:
         """Keep where the card comes from."""
-        self._path = (context or {}).get("path", Path())
-        self._sha256 = (context or {}).get("sha256", "")
-        self._text = (context or {}).get("text", "")
+        self._card = context["card"]
 
     @property
     def path(self) -> Path:
         """The card's file."""
-        return self._path
+        return self._card.path
 
     @property
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the file's bytes."""
-        return self._sha256
+        return self._card.sha256
 
     @property
     def text(self) -> str:
         """The file as it was read."""
-        return self._text
+        return self._card.text
 
     def board_path(self, board: str) -> str | Path:
         """What finds a board of the campaign: a shipped card's name, or a path from this card's folder."""
@@ -134,13 +130,7 @@ def load_campaign(name_or_path: str | os.PathLike[str]) -> CampaignCard:
     InputError
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
-    path = find("campaigns", name_or_path)
-    data = read_file(path)
-    file = plain(path.name)
-    table = read_table(data, file)
-    faults = [*name_faults(table, file, path.stem), *_twice(table, file)]
-    context = {"path": path, "sha256": hashlib.sha256(data).hexdigest(), "text": data.decode("utf-8")}
-    return validated(CampaignCard, table, file, context, faults)
+    return validated(CampaignCard, CardFile.load("campaigns", name_or_path), _twice)
 
 
 def is_campaign(name_or_path: object) -> bool:

@@ -10,12 +10,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.measures import FIRST_LABEL, LARGEST_POISSON, by_label
 from bayesplate.board.reading import NO_OFFSET
-from bayesplate.board.schema import Section, name_faults, validated
+from bayesplate.board.schema import Section, validated
 from bayesplate.board.setup_keys import Edges
-from bayesplate.board.shelf import find
-from bayesplate.board.toml import read_file, read_table
 from bayesplate.board.values import (
     Complaint,
     Key,
@@ -25,11 +24,10 @@ from bayesplate.board.values import (
     read_format,
     read_list,
     read_name,
+    read_table,
     read_text,
 )
-from bayesplate.board.values import read_table as read_entries
 from bayesplate.board.words import shown
-from bayesplate.errors import plain
 from bayesplate.labels import Label
 
 Coefficients = tuple[float, float, float]
@@ -63,7 +61,7 @@ def _read_row(value: object) -> _Row:
     if not isinstance(value, dict):
         raise Refusal(Complaint("{ a, b, c, r_squared }", shown(value)))
     readers = {"a": _COEFFICIENT, "b": _COEFFICIENT, "c": _COEFFICIENT, "r_squared": Number(0, 1)}
-    return _Row(**read_entries(value, readers, needed=("a", "b", "c")))
+    return _Row(**read_table(value, readers, needed=("a", "b", "c")))
 
 
 _ROWS = by_label(Key(_read_row))
@@ -140,7 +138,4 @@ def load_coefficients(name_or_path: str | os.PathLike[str], beside: Path | None 
     InputError
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
-    path = find("coefficients", name_or_path, beside)
-    file = plain(path.name)
-    table = read_table(read_file(path), file)
-    return validated(CoefficientCard, table, file, faults=name_faults(table, file, path.stem))
+    return validated(CoefficientCard, CardFile.load("coefficients", name_or_path, beside))

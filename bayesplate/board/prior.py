@@ -11,13 +11,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.measures import DENSITY, POISSON, QuantityReader, read_factor, read_noise_percent, written_noise
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.schema import Section, name_faults, validated
-from bayesplate.board.shelf import find
+from bayesplate.board.schema import Section, validated
 from bayesplate.board.stated import wrong_types
-from bayesplate.board.toml import read_file
-from bayesplate.board.toml import read_table as read_toml
 from bayesplate.board.units import in_unit, median_and_factor
 from bayesplate.board.values import (
     Choice,
@@ -32,7 +30,7 @@ from bayesplate.board.values import (
 )
 from bayesplate.board.words import did_you_mean, shown
 from bayesplate.board.writing import toml_text, write_card
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.errors import Fault, InputError
 
 ELASTIC = ("E_x", "E_y", "G_xy")
 RIGIDITY = ("D_x", "D_y", "D_s")
@@ -209,7 +207,7 @@ class PriorCard(Section):
             for key, one in stated.items()
         }
         made = cls.model_construct(format=1, name=name, title=title, **priors)
-        return _read_prior(made.table(), f"{plain(name)}.toml", name)
+        return validated(cls, CardFile(made.table(), f"{name}.toml"), _set_faults)
 
     def table(self) -> dict[str, Any]:
         """The table of the card."""
@@ -306,19 +304,12 @@ def load_prior(name_or_path: str | os.PathLike[str], beside: Path | None = None)
     InputError
         If there is no such card, it cannot be read, or it does not follow the format; lists every such fault at once.
     """
-    path = find("priors", name_or_path, beside)
-    file = plain(path.name)
-    return _read_prior(read_toml(read_file(path), file), file, path.stem)
+    return validated(PriorCard, CardFile.load("priors", name_or_path, beside), _set_faults)
 
 
 def read_prior_text(text: str, name: str) -> PriorCard:
     """Read a prior card from a text, as if it stood in NAME.toml; raises InputError like `load_prior`."""
-    file = f"{plain(name)}.toml"
-    return _read_prior(read_toml(text.encode("utf-8", "surrogatepass"), file), file, name)
-
-
-def _read_prior(table: Mapping[str, Any], file: str, stem: str) -> PriorCard:
-    return validated(PriorCard, table, file, faults=[*name_faults(table, file, stem), *_set_faults(table, file)])
+    return validated(PriorCard, CardFile.of(text, f"{name}.toml"), _set_faults)
 
 
 def _is_of_a_card(quantity: object, kinds: tuple[str, ...]) -> bool:

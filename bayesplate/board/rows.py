@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from bayesplate.board.board import Board
-from bayesplate.board.board_keys import BoardKeys, CardFile
+from bayesplate.board.board_keys import BoardKeys
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.cells import Cell, is_empty, value, word
 from bayesplate.board.schema import sections_of
 from bayesplate.board.template import Inside, Template
 from bayesplate.board.words import did_you_mean, quoted
-from bayesplate.errors import Fault, InputError, plain
+from bayesplate.errors import Fault, InputError
 
 _TEXTS = ("name", "title", "source", "notes")
 _WORDS = (*_TEXTS, "prior")
@@ -140,8 +141,8 @@ class Columns:
             faults.append(Fault("name", "a name", "an empty cell"))
         if faults:
             raise InputError(faults)
-        card = CardFile(self.template.filled(values), f"{plain(name)}.toml", self.template.path.parent)
-        return Board.from_table(card, name)
+        card = CardFile(self.template.filled(values), f"{name}.toml", self.template.card.folder)
+        return Board.from_card(card)
 
     def _values(self, row: Sequence[Cell]) -> tuple[dict[Inside, Any], list[Fault]]:
         """What a row says by the keys of a card, and what is wrong with its cells beside one another."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.values import Complaint, Refusal
 from bayesplate.board.words import did_you_mean, name_complaint, quoted, shown
 from bayesplate.errors import Fault, InputError
@@ -30,40 +31,41 @@ CardModel = TypeVar("CardModel", bound=Section)
 
 def validated(
     model: type[CardModel],
-    table: Mapping[str, Any],
-    file: str,
+    card: CardFile,
+    faults_of: Callable[[Mapping[str, Any], str], Iterable[Fault]] = lambda table, file: (),
     context: Mapping[str, Any] | None = None,
-    faults: Sequence[Fault] = (),
+    file: str = "",
 ) -> CardModel:
     """A card from the table of its file.
 
     Parameters
     ----------
     model : subclass of Section
-    table : dict
-        What the TOML reader returned.
-    file : str
-        The file's name, as messages show it.
+    card : CardFile
+    faults_of : callable
+        What is wrong with keys beside one another, from the raw table and the file's name as messages show it: these
+        faults are reported together with those of single keys.
     context : mapping, optional
-        Handed to the model: where the card comes from.
-    faults : sequence of Fault
-        Faults already found, reported together with those found here.
+        Handed to the model.
+    file : str
+        In place of the file's name in messages.
 
     Raises
     ------
     InputError
         With every fault of the card at once, the first fifty written out.
     """
-    found = list(faults)
+    table, file = card.table, file or card.shown
+    found = [*_name_faults(table, file, card.stem), *faults_of(table, file)]
     try:
-        card = model.model_validate(table, context=dict(context or {}))
+        read = model.model_validate(table, context={"card": card, **(context or {})})
     except ValidationError as error:
         details = error.errors(include_url=False)
         found += [fault for detail in details[:MOST_FAULTS] for fault in _faults(model, table, file, detail)]
         more = len(details) - MOST_FAULTS
     else:
         if not found:
-            return card
+            return read
         more = 0
     more = max(more, 0) + len(found[MOST_FAULTS:])
     listed = found[:MOST_FAULTS]
@@ -162,7 +164,7 @@ def _models_in(annotation: Any) -> Iterator[type]:
         yield from _models_in(part)
 
 
-def name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
+def _name_faults(table: Mapping[str, Any], file: str, stem: str) -> list[Fault]:
     """The name of a card must be the name of its file."""
     name = table.get("name")
     if not isinstance(name, str) or name == stem:

@@ -7,9 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from bayesplate.board.shelf import find
-from bayesplate.board.toml import read_file, read_table
-from bayesplate.errors import plain
+from bayesplate.board.card_file import CardFile
 
 _WEIGHED = ("mass_g", "density_kg_m3")
 _UNLABELLED = ("unlabelled_hz", "peaks")
@@ -33,9 +31,8 @@ class Template:
     """
 
     def __init__(self, card: str | Path) -> None:
-        self.path = find("boards", card)
-        self.file = plain(self.path.name)
-        self.content = read_table(read_file(self.path), self.file)
+        self.card = CardFile.load("boards", card)
+        self.file, self.content = self.card.shown, self.card.table
         self.setups = [_name_of(one) for one in _setups_of(self.content)]
 
     def readings(self) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -58,7 +55,7 @@ class Template:
             By the keys that lead there. None leaves what is there, but a mode was not read then; a setup of which
             nothing was read is left out, unless it is the only one.
         """
-        content = copy.deepcopy(self.content)
+        content = copy.deepcopy({**self.content})
         plate = content.get("plate")
         if isinstance(plate, dict) and any(values.get(("plate", key)) is not None for key in _WEIGHED):
             for key in _WEIGHED:

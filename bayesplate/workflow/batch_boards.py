@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bayesplate.board.board import Board
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.cells import Cell, is_empty
 from bayesplate.board.csv_table import csv_table
 from bayesplate.board.rows import Columns
@@ -87,7 +88,7 @@ class Folder:
             wanted, remedy = "a card in the folder of the batch", "copy the card"
             raise InputError(Fault(plain(file), wanted, "a link that leads out of it", remedy))
         data = read_file(os.path.join(self._path, file))  # no Path: Python keeps every name that stood in one
-        return Board.from_bytes(data, os.path.splitext(file)[0], self._path)
+        return Board.from_card(CardFile.of(data, file, self._path))
 
     def place(self, at: int) -> str:
         """Nothing: the faults of a card name its file."""

@@ -85,7 +85,7 @@ def _problem(board: Board, prior: PriorCard, request: FitRequest) -> Problem:
 
 
 def _prepared(board: Board, prior: PriorCard, request: FitRequest) -> Prepared:
-    if board.card is None or board != Board.from_table(board.card, board.name):
+    if board.card is None or board != Board.from_card(board.card):
         return prepare(board, request.effects, prior=prior)
     lacking = tuple(
         Fault(

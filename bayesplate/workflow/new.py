@@ -150,7 +150,7 @@ def _number(value: float | str) -> float | str:
 def _faults(text: str, name: str) -> list[Fault]:
     """Everything that a card is held to."""
     try:
-        read = Board.from_bytes(text, name, may_lack_frequencies=True)
+        read = Board.from_text(text, name, may_lack_frequencies=True)
     except InputError as error:
         return list(error.faults)
     return physical_faults(read) or label_faults(read.assuming(load_prior(read.prior)))

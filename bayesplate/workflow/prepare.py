@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from bayesplate.board.board import Board, assumed_notes
-from bayesplate.board.board_keys import CardFile
 from bayesplate.board.campaign import is_campaign
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.checks import physical_faults, remarks
 from bayesplate.board.named import NamedCards, load_named
 from bayesplate.board.prior import PriorCard, load_prior
@@ -116,8 +116,7 @@ def prepare(
     if not isinstance(card, Board):
         read = Board.from_toml(card, may_lack_frequencies=may_lack_frequencies, setup=setup)
         return prepared_card(read, load_named(read, given), effects)
-    own = CardFile(card.table(), f"{card.name}.toml", card.folder)
-    read = Board.from_table(own, card.name, may_lack_frequencies, setup)
+    read = Board.from_card(CardFile(card.table(), f"{card.name}.toml", card.folder), may_lack_frequencies, setup)
     found = {one.name: one.published_coefficients for one in card.setups if one.published_coefficients is not None}
     prepared = prepared_card(read, load_named(read, given, found), effects)
     lost = list(_lost(card, prepared.board)) if setup is None else []

@@ -187,7 +187,7 @@ def search(n_modes: int, tried: Sequence[str] | None = None) -> tuple[int, float
     from generator.designs import DESIGNS
 
     text = plant(np.random.default_rng(1), DESIGNS["free-12"], [], 1.0, 5.0, name="free").card_text()
-    card = Board.from_bytes(text, "free")
+    card = Board.from_text(text, "free")
     prepared = prepared_card(card, load_named(card), [])
     (setup,) = prepared.board.setups
     board = replace(prepared.board, setups=(replace(setup, readings=setup.readings[:n_modes]),))

@@ -241,7 +241,7 @@ def test_the_guard_against_long_keys_is_quick(write: Write, content: bytes) -> N
 
 
 def test_line_ends_and_byte_order_mark_change_nothing(write: Write, board_text: str) -> None:
-    plain = Board.from_bytes(board_text, "my-board")
+    plain = Board.from_text(board_text, "my-board")
     for content in (
         board_text.replace("\n", "\r\n"),
         "\ufeff" + board_text,

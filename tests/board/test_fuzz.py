@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bayesplate.board.board import Board
-from bayesplate.board.board_keys import CardFile
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.checks import physical_faults
 from bayesplate.board.shelf import shelf_folder
 from bayesplate.board.toml import read_table
@@ -66,7 +66,7 @@ def test_random_bytes(data: bytes) -> None:
 def test_mutated_text(start: int, length: int, pieces: list[str]) -> None:
     text = SEED[:start] + "".join(pieces) + SEED[start + length :]
     try:
-        card = Board.from_bytes(text, "finnish-spruce-cantilever")
+        card = Board.from_text(text, "finnish-spruce-cantilever")
     except InputError as error:
         check(error.faults)
     else:
@@ -97,7 +97,7 @@ def mutated_tables(draw: st.DrawFn) -> dict[str, Any]:
 @given(mutated_tables())
 def test_mutated_tables(table: dict[str, Any]) -> None:
     try:
-        card = Board.from_table(CardFile(table, "fuzz.toml"), str(table.get("name")))
+        card = Board.from_card(CardFile(table, f"{table.get('name')}.toml"))
     except InputError as error:
         check(error.faults)
     else:

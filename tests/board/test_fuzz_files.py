@@ -12,8 +12,8 @@ from fuzzing import accepted_or_refused, fuzzed, stopped_if_it_hangs
 from hypothesis import strategies as st
 
 from bayesplate.board.board import Board
-from bayesplate.board.board_keys import CardFile
 from bayesplate.board.campaign import load_campaign
+from bayesplate.board.card_file import CardFile
 from bayesplate.board.fragment import merged
 from bayesplate.board.shelf import shelf_folder
 from bayesplate.board.toml import read_table
@@ -106,7 +106,7 @@ def read_fragment(content: str | bytes) -> None:
     table = read_table(CARD.encode(), "board.toml")
 
     def read() -> Any:
-        return Board.from_table(CardFile(table, "board.toml"), BOARD, setup=path)
+        return Board.from_card(CardFile(table, f"{BOARD}.toml"), setup=path)
 
     accepted_or_refused(read, BENCH["folder"])
 
@@ -190,7 +190,7 @@ def test_what_is_spoilt_here_was_sound():
     """The negative control."""
     table = read_table(CARD.encode(), "board.toml")
     whole, _ = merged(table, "board.toml", written("fragment.toml", FRAGMENT))
-    assert len(Board.from_bytes(toml_text(whole), BOARD).setups[0].readings) == 1
+    assert len(Board.from_text(toml_text(whole), BOARD).setups[0].readings) == 1
     assert load_campaign(written("together.toml", CAMPAIGN)).name == "together"
     boards = boards_of(written("boards.csv", ROWS), BENCH["folder"] / "template.toml")
     assert [boards.card(at).name for at in range(len(boards.names))] == ["a", "b"]
@@ -221,7 +221,7 @@ def test_a_huge_number_beside_a_fragment_or_a_table_is_a_fault_of_its_key(tmp_pa
     boards = boards_of(tmp_path / "boards.csv", tmp_path / "template.toml")
 
     for read in (
-        lambda: Board.from_table(CardFile(table, "board.toml"), BOARD, setup=tmp_path / "fragment.toml"),
+        lambda: Board.from_card(CardFile(table, f"{BOARD}.toml"), setup=tmp_path / "fragment.toml"),
         lambda: boards.card(0),
     ):
         with pytest.raises(InputError, match=r"length_x_mm: wanted a number from .*, got a whole number of 20000 bits"):

@@ -23,7 +23,7 @@ def card(**more):
 @pytest.mark.parametrize("written", ['"yes"', "1", "[]"])
 def test_anything_but_true_or_false_is_refused(written):
     with pytest.raises(InputError, match=r"sheet.toml \[material\] isotropic: wanted true or false, got"):
-        Board.from_bytes(card().replace("isotropic = true", f"isotropic = {written}"), "sheet")
+        Board.from_text(card().replace("isotropic = true", f"isotropic = {written}"), "sheet")
 
 
 @pytest.mark.parametrize(("nu", "is_possible"), [(0.5, True), (0.51, False), (-0.99, True), (-1.0, False)])

@@ -30,7 +30,7 @@ def test_cards_that_are_not_there(
 ) -> None:
     for old, new in changes:
         board_text = spoiled(old, new, board_text)
-    named = load_named(Board.from_bytes(board_text, "my-board"))
+    named = load_named(Board.from_text(board_text, "my-board"))
 
     assert [fault.place for fault in named.faults] == places
     assert (named.prior is None) == (NO_PRIOR in changes)
@@ -65,5 +65,5 @@ def test_the_text_of_a_card_is_what_its_hash_is_of(board_file: Path, board_text:
 
     assert hashlib.sha256(card.text.encode("utf-8")).hexdigest() == card.sha256
     assert card.text.removeprefix("\ufeff").replace("\r\n", "\n") == board_text
-    again = Board.from_bytes(card.text, "my-board")
+    again = Board.from_text(card.text, "my-board")
     assert (again.sha256, again.text) == (card.sha256, card.text)

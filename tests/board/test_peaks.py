@@ -34,12 +34,12 @@ HINT = " (a probability: 98 % is 0.98)"
 
 
 def setup_of(text: str) -> Setup:
-    return Board.from_bytes(text, "my-board").setups[0]
+    return Board.from_text(text, "my-board").setups[0]
 
 
 def refusals(text: str) -> list[str]:
     with pytest.raises(InputError) as caught:
-        Board.from_bytes(text, "my-board")
+        Board.from_text(text, "my-board")
     return [str(fault) for fault in caught.value.faults]
 
 

@@ -51,7 +51,7 @@ CASES = [
 
 
 def faults_of(text: str) -> list[Fault]:
-    return physical_faults(Board.from_bytes(text, "my-board"))
+    return physical_faults(Board.from_text(text, "my-board"))
 
 
 def test_a_sound_card_has_none(board_text: str) -> None:

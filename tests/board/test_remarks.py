@@ -46,7 +46,7 @@ THICK = "more than a tenth: transverse shear matters"
     ],
 )
 def test_what_is_assumed_or_doubtful_is_told(spoiled: Spoil, old, new, effects, said) -> None:
-    found = remarks(Board.from_bytes(spoiled(old, new), "my-board"), effects)
+    found = remarks(Board.from_text(spoiled(old, new), "my-board"), effects)
 
     assert len(found) == bool(said)
     for passage in said:

@@ -59,7 +59,7 @@ HONEST = [
 @pytest.mark.parametrize(("old", "new", "remedy"), COMMAS)
 def test_decimal_commas_are_refused_with_the_numbers_that_were_meant(spoiled: Spoil, old, new, remedy) -> None:
     with pytest.raises(InputError, match=re.escape(remedy)) as caught:
-        Board.from_bytes(spoiled(old, new), "my-board")
+        Board.from_text(spoiled(old, new), "my-board")
     (fault,) = caught.value.faults
     assert fault.wanted == "numbers without commas inside them"
 
@@ -67,12 +67,12 @@ def test_decimal_commas_are_refused_with_the_numbers_that_were_meant(spoiled: Sp
 @pytest.mark.parametrize(("old", "new", "got"), STRAYS)
 def test_readings_that_are_not_of_one_thing_are_refused(spoiled: Spoil, old, new, got) -> None:
     with pytest.raises(InputError, match=re.escape(f"the smallest, got {got} (")):
-        Board.from_bytes(spoiled(old, new), "my-board")
+        Board.from_text(spoiled(old, new), "my-board")
 
 
 @pytest.mark.parametrize(("old", "new"), HONEST)
 def test_honest_lists_are_read(spoiled: Spoil, old, new) -> None:
-    Board.from_bytes(spoiled(old, new), "my-board")
+    Board.from_text(spoiled(old, new), "my-board")
 
 
 FURTHEST = st.sampled_from([FURTHEST_SIZES, FURTHEST_FREQUENCIES])
@@ -126,7 +126,7 @@ def test_peaks_in_ascending_order_are_never_refused(peaks) -> None:
 )
 def test_readings_that_are_all_alike_are_as_uncertain_as_their_instrument(spoiled: Spoil, old, new, step) -> None:
     """sd = step / sqrt(12), by default that of a caliper, a rule or scales; a plain number stays exact."""
-    card = Board.from_bytes(spoiled(old, new), "my-board")
+    card = Board.from_text(spoiled(old, new), "my-board")
     inputs, setup = card.inputs, card.setups[0]
     told, unit = {
         THICKNESS: (inputs["thickness"], 1e-3),

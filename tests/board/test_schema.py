@@ -152,7 +152,7 @@ LABELS = ["10", "(1;0)", "(1.0,0)", "(-1,0)", "(12,0)", "resolution_hz"]
 
 def assert_refused(text: str, place: str, wanted: str, got: str) -> None:
     with pytest.raises(InputError, match=re.escape(f"my-board.toml {place}: wanted {wanted}")) as caught:
-        Board.from_bytes(text, "my-board")
+        Board.from_text(text, "my-board")
     assert any(str(fault).startswith(f"my-board.toml {place}: wanted {wanted}") and f", got {got}" in str(fault)
                for fault in caught.value.faults)  # fmt: skip
 
@@ -180,14 +180,14 @@ def test_labels_have_one_grammar(spoiled: Spoil, label: str) -> None:
 
 def test_a_key_below_the_table_of_labels_is_explained(spoiled: Spoil) -> None:
     with pytest.raises(InputError, match=re.escape("(a key of [setup] stands above the table of labels)")):
-        Board.from_bytes(spoiled(MODE, MODE + "\nresolution_hz = 1"), "my-board")
+        Board.from_text(spoiled(MODE, MODE + "\nresolution_hz = 1"), "my-board")
 
 
 def test_no_modes_at_all(spoiled: Spoil, board_text: str) -> None:
     start, end = board_text.index("[setup.frequencies_hz]"), board_text.index("[setup.hammer]")
     text = board_text[:start] + board_text[end:]
 
-    assert Board.from_bytes(text, "my-board").setups[0].readings == ()
+    assert Board.from_text(text, "my-board").setups[0].readings == ()
     assert_refused(spoiled("unlabelled_hz = [448.8, 594.1]\n", "", text), "[setup] frequencies_hz",
                    'measured frequencies, "(1,0)" = 52', "no modes")  # fmt: skip
 
@@ -205,7 +205,7 @@ def test_all_faults_are_reported_at_once(spoiled: Spoil) -> None:
     text = spoiled('baffle = "none"', 'bafle = "none"', text)
 
     with pytest.raises(InputError, match="length_x_mm") as caught:
-        Board.from_bytes(text, "my-board")
+        Board.from_text(text, "my-board")
 
     assert sorted(fault.place for fault in caught.value.faults) == [
         "my-board.toml [plate]",
@@ -220,7 +220,7 @@ def test_a_flood_of_faults_is_cut(spoiled: Spoil) -> None:
     flood = "\n".join(f"key{number} = 1" for number in range(500))
 
     with pytest.raises(InputError, match="450 more faults, not listed") as caught:
-        Board.from_bytes(spoiled("[setup.fluid]", f"[setup.air]\n{flood}"), "my-board")
+        Board.from_text(spoiled("[setup.fluid]", f"[setup.air]\n{flood}"), "my-board")
 
     assert len(caught.value.faults) == 51
 
@@ -262,7 +262,7 @@ def test_missing_sections(text: str, place: str, wanted: str, got: str) -> None:
 
 
 def test_a_sound_card_is_read(board_text: str) -> None:
-    card = Board.from_bytes(board_text, "my-board")
+    card = Board.from_text(board_text, "my-board")
     setup = card.setup("cantilever")
 
     assert (card.inputs["thickness"].mean, card.inputs["thickness"].sd) == pytest.approx((3.0e-3, 0.03e-3))
@@ -283,8 +283,8 @@ def test_defaults(spoiled: Spoil) -> None:
         ratio = card.parameter("poisson_xy")
         return ratio.prior.mean, ratio.prior.sd, ratio.prior.kind, ratio.is_assumed
 
-    bare = Board.from_bytes(HEAD + FREE.replace('name = "free"\n', ""), "my-board")
-    stated = Board.from_bytes(spoiled("poisson_xy = 0.51", "poisson_xy = { mean = 0.4, sd = 0.08 }"), "my-board")
+    bare = Board.from_text(HEAD + FREE.replace('name = "free"\n', ""), "my-board")
+    stated = Board.from_text(spoiled("poisson_xy = 0.51", "poisson_xy = { mean = 0.4, sd = 0.08 }"), "my-board")
 
     assert poisson(bare) == (0.4, 0.08, "normal", True)
     assert poisson(stated) == (0.4, 0.08, "normal", False)
@@ -297,17 +297,17 @@ def test_defaults(spoiled: Spoil) -> None:
 def test_spaces_in_labels_change_nothing(spoiled: Spoil, board_text: str) -> None:
     spaced = spoiled(MODE + "\n", '" ( 1 , 0 ) " = 52\n')
 
-    assert Board.from_bytes(spaced, "my-board").setups == Board.from_bytes(board_text, "my-board").setups
+    assert Board.from_text(spaced, "my-board").setups == Board.from_text(board_text, "my-board").setups
 
 
 def test_one_setup_may_be_written_as_a_list(board_text: str) -> None:
     listed = board_text.replace("[setup]", "[[setup]]")
 
-    assert Board.from_bytes(listed, "my-board").setups == Board.from_bytes(board_text, "my-board").setups
+    assert Board.from_text(listed, "my-board").setups == Board.from_text(board_text, "my-board").setups
 
 
 def test_a_card_cannot_be_changed(board_text: str) -> None:
-    card = Board.from_bytes(board_text, "my-board")
+    card = Board.from_text(board_text, "my-board")
 
     with pytest.raises(FrozenInstanceError):
         card.name = "other"  # type: ignore[misc]

@@ -213,13 +213,13 @@ def readme_examples() -> list[str]:
 def test_the_examples_of_the_readme_are_cards(tmp_path: Path) -> None:
     board, profile, sections, setups, prior, table, campaign = readme_examples()
 
-    card = Board.from_bytes(board, "my-board")
+    card = Board.from_text(board, "my-board")
     assert physical_faults(card) == []
     more = sections.replace('"(1,1)" = "+"', '"(1,0)" = "+"').replace("at_mm = [20, 20]", "at_mm = [60, 20]")
-    assert physical_faults(Board.from_bytes(board + more, "my-board")) == []
+    assert physical_faults(Board.from_text(board + more, "my-board")) == []
     narrow = re.sub(r"length_y_mm = 114.*\nthickness_mm = .*\n", profile.replace("580", "250"), board)
-    assert Board.from_bytes(narrow, "my-board").inputs["thickness"].has_profile
-    two = Board.from_bytes(board[: board.index("[setup]")] + setups, "my-board")
+    assert Board.from_text(narrow, "my-board").inputs["thickness"].has_profile
+    two = Board.from_text(board[: board.index("[setup]")] + setups, "my-board")
     assert [setup.name for setup in two.setups] == ["clamped", "free"]
     (tmp_path / "my-prior.toml").write_text(prior, encoding="utf-8")
     assert load_prior(tmp_path / "my-prior.toml").noise_percent is not None

@@ -24,13 +24,13 @@ SETUP = "my-board.toml [setup] "
 
 
 def read(text):
-    return Board.from_bytes(text, "my-board")
+    return Board.from_text(text, "my-board")
 
 
 def told(text):
     """Every fault of a card: of its writing, or else of its meaning."""
     try:
-        card = Board.from_bytes(text, "my-board")
+        card = Board.from_text(text, "my-board")
     except InputError as error:
         return [str(fault) for fault in error.faults]
     return [str(fault) for fault in physical_faults(card)]
@@ -81,7 +81,7 @@ def test_what_no_board_is_warped_by(spoiled, warp):
 
 
 def test_readings_of_a_warp_that_are_all_alike_are_rounded_to_a_feeler_gauge(spoiled):
-    card = Board.from_bytes(spoiled(PLATE, f"{PLATE}\nwarp_mm = {{ cup = [0.8, 0.8], bow = [1.0, 1.1] }}"), "my-board")
+    card = Board.from_text(spoiled(PLATE, f"{PLATE}\nwarp_mm = {{ cup = [0.8, 0.8], bow = [1.0, 1.1] }}"), "my-board")
     assert card.warp["cup"].sd == pytest.approx(1e-4 / 12**0.5)
     assert any("taken as rounded, cup to 0.1 mm; " in one for one in remarks(card, ()))
 

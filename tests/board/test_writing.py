@@ -38,7 +38,7 @@ def assert_same(one, other):
 
 
 def again(board):
-    read = Board.from_bytes(board.to_toml(), board.name)
+    read = Board.from_text(board.to_toml(), board.name)
     named = load_named(read)
     return read.assuming(named.prior, named.tables)
 

@@ -197,7 +197,7 @@ edges = {{ x0 = "{}", x1 = "free", y0 = "free", y1 = "free" }}
 
 @pytest.mark.parametrize(("edge", "median"), [("free", 0.003), ("supported", 0.003), ("clamped", 0.008)])
 def test_noise_and_poisson_ratio_of_a_card_that_states_neither(edge, median):
-    board = Board.from_bytes(CARD.format(edge), "b")
+    board = Board.from_text(CARD.format(edge), "b")
 
     assert same(board.setups[0].noise, "log-normal", median, 0.5, ANY)
     assert same(board.inputs["poisson_xy"], "normal", 0.4, 0.08, ANY)

@@ -117,7 +117,7 @@ def test_one_board_is_a_pure_function_that_travels(two, one):
     """What the table says of a board, and its files, are what `fit_board` gives with its seed; nothing is changed by
     the way to another process."""
     row = rows_of(two.table.read_bytes())["b"]
-    board, prior = Board.from_bytes(card_text("b", 1.01), "b"), load_prior("weakly-informative")
+    board, prior = Board.from_text(card_text("b", 1.01), "b"), load_prior("weakly-informative")
     with pytest.raises(InputError, match="request tables clamped: wanted the published coefficients"):
         bayesplate.fit_board(board, prior)
     request = bayesplate.FitRequest(seed=int(row["seed"]), tables=load_named(board).tables)

@@ -50,8 +50,8 @@ def test_the_line_for_peaks_without_a_label_can_be_used():
     line, *_ = (line for line in path.read_text(encoding="utf-8").splitlines() if "unlabelled_hz" in line)
     text = path.read_text(encoding="utf-8").replace(line, line.removeprefix("# "))
 
-    assert Board.from_bytes(path.read_text(encoding="utf-8"), "a").setups[0].unlabelled == ()
-    assert Board.from_bytes(text, "a").setups[0].unlabelled == (404, 448.8)
+    assert Board.from_text(path.read_text(encoding="utf-8"), "a").setups[0].unlabelled == ()
+    assert Board.from_text(text, "a").setups[0].unlabelled == (404, 448.8)
 
 
 def test_every_question_can_be_skipped_and_modes_works_on_the_card():
