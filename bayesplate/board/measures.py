@@ -64,7 +64,7 @@ class QuantityReader:
 
     def __call__(self, value: object) -> Quantity:
         found, scale = self._as_written(value), self.number.si
-        return found if scale == 1.0 else found.scaled(scale).with_places_scaled(SI["mm"])
+        return found if scale == 1.0 else found.scaled(scale, SI["mm"])
 
     def written(self, one: Quantity) -> Any:
         """A quantity in the unit of its key, in the shortest form that says all of it."""

@@ -400,13 +400,15 @@ class Quantity:
         """Draws of the quantity: (n,) array in its unit."""
         return np.asarray(self.quantile(rng.uniform(size=n)))
 
-    def scaled(self, factor: float) -> Quantity:
+    def scaled(self, factor: float, place_factor: float = 1.0) -> Quantity:
         """The same quantity in another unit.
 
         Parameters
         ----------
         factor : float
-            Positive. It multiplies mean, sd, bounds, readings and resolution; the places keep their unit.
+            Positive. It multiplies mean, sd, bounds, readings and resolution.
+        place_factor : float
+            The same for the places of the readings.
         """
         if not factor > 0:
             raise ValueError(f"factor: wanted a positive number, got {factor}")
@@ -418,15 +420,9 @@ class Quantity:
             upper=self.upper * factor,
             readings=tuple(value * factor for value in self.readings),
             resolution=self.resolution * factor,
-        )
-
-    def with_places_scaled(self, factor: float) -> Quantity:
-        """The same quantity with the places of its readings in another unit."""
-        return replace(
-            self,
-            at_x=tuple(place * factor for place in self.at_x),
-            at_y=tuple(place * factor for place in self.at_y),
-            place_sd=self.place_sd * factor,
+            at_x=tuple(place * place_factor for place in self.at_x),
+            at_y=tuple(place * place_factor for place in self.at_y),
+            place_sd=self.place_sd * place_factor,
         )
 
 

@@ -27,6 +27,8 @@ Ends = tuple[End, End]
 DEFAULT_NOISE = Quantity.from_median(0.003, np.exp(0.5))
 CLAMPED_NOISE = Quantity.from_median(0.008, np.exp(0.5))
 """Relative noise of a frequency: free boards settle at 0.24-0.30 %; re-clamping one board spreads it by 1-2.4 %."""
+_ALIKE = ("name", "clamped", "first_label", "resolution", "missed", "spurious", "attached")
+"""What a setup has as its table states it."""
 NOISE_WANTED = "a relative noise and how far it may be off: Quantity.from_median(0.005, 2)"
 
 
@@ -234,9 +236,9 @@ class Setup:
     @classmethod
     def from_keys(cls, keys: SetupKeys) -> Setup:
         """The setup that a table [setup] of a card states; its published coefficients are still to be read."""
-        edges, first, around = keys.edges, keys.first_label, keys.fluid or keys.air
+        edges, first = keys.edges, keys.first_label
         made = cls(
-            name=keys.name,
+            **{name: getattr(keys, name) for name in _ALIKE},
             ends_x=(edges.x0, edges.x1),
             ends_y=(edges.y0, edges.y1),
             readings=tuple(
@@ -250,18 +252,12 @@ class Setup:
                 for label, frequency in keys.frequencies.items()
             ),
             noise=DEFAULT_NOISE if keys.noise is None else keys.noise,
-            clamped=keys.clamped,
-            resolution=keys.resolution,
             peaks=tuple(
                 replace(peak, frequency=_joined_with_rounding(peak.frequency, keys.resolution))
                 for peak in (*map(Peak, keys.unlabelled), *keys.peaks)
             ),
-            missed=keys.missed,
-            spurious=keys.spurious,
-            first_label=first,
-            attached=keys.attached,
             hammer=None if keys.hammer is None else keys.hammer.place,
-            fluid=around,
+            fluid=keys.fluid or keys.air,
             bounce=None if keys.support is None else keys.support.bounce,
             table_name=keys.published_coefficients,
         )
@@ -283,19 +279,15 @@ class Setup:
         bare = tuple(takewhile(lambda peak: peak.is_bare, self.peaks))
         published = self.published_coefficients
         keys = SetupKeys.model_construct(
+            None,
+            **{name: getattr(self, name) for name in _ALIKE},
             edges=Edges.model_construct(None, **self.edges),
-            clamped=self.clamped,
-            first_label=self.first_label,
-            resolution=self.resolution,
             published_coefficients=self.table_name if published is None else published.name,
             noise=None if self.is_noise_assumed else self.noise,
             unlabelled=tuple(peak.frequency for peak in bare),
             peaks=self.peaks[len(bare) :],
-            missed=self.missed,
-            spurious=self.spurious,
             signs={reading.label: reading.sign for reading in self.readings if reading.sign},
             label_confidence=next(iter(doubted.values())) if is_alike else doubted or 1.0,
-            attached=self.attached,
             hammer=None if self.hammer is None else HammerKeys.model_construct(place=self.hammer),
             support=None if self.bounce is None else SupportKeys.model_construct(bounce=self.bounce),
             fluid=self.fluid,

@@ -9,10 +9,8 @@ from typing import Any, Protocol
 
 from bayesplate.board.board import Board
 from bayesplate.board.card_file import CardFile
-from bayesplate.board.cells import Cell, is_empty
 from bayesplate.board.csv_table import csv_table
-from bayesplate.board.rows import Columns
-from bayesplate.board.template import Template
+from bayesplate.board.rows import Cell, Columns, is_empty
 from bayesplate.board.toml import read_file, read_table
 from bayesplate.errors import Fault, InputError, plain
 from bayesplate.results.board_table import parquet_library
@@ -123,7 +121,7 @@ class Table:
     def __init__(self, path: Path, template: str | Path) -> None:
         self._file = plain(path.name)
         header, self._rows = _read_parquet(path) if _ending(path) == ".parquet" else _read_csv(path)
-        self._columns = Columns(Template(template), header, self._file)
+        self._columns = Columns(template, header, self._file)
         filled = [i for i, row in enumerate(self._rows, start=1) if not all(map(is_empty, row))]
         if not filled:
             raise InputError(Fault(self._file, "a row for each board", "no row"))

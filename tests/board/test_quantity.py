@@ -64,7 +64,7 @@ def test_readings_at_different_places_are_rounded_each_on_its_own() -> None:
     assert together.sd**2 == pytest.approx(np.var(readings, ddof=1) / 4 + 0.01 / 12)
     assert apart.has_profile
     assert apart.scaled(1e-3).place_sd == 5
-    assert apart.with_places_scaled(1e-3).place_sd == pytest.approx(0.005)
+    assert apart.scaled(1.0, 1e-3).place_sd == pytest.approx(0.005)
 
 
 def test_rounding_is_not_averaged_away() -> None:
@@ -136,7 +136,7 @@ def test_scaled_changes_the_unit_of_all_but_the_places() -> None:
     assert metres.resolution == pytest.approx(1e-4)
     assert metres.log_sd == pytest.approx(millimetres.log_sd)
     assert metres.at_x == (0, 100)
-    assert metres.with_places_scaled(1e-3).at_x == pytest.approx((0, 0.1))
+    assert metres.scaled(1.0, 1e-3).at_x == pytest.approx((0, 0.1))
 
 
 def test_scaled_bounds_keep_the_density() -> None:

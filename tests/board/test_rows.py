@@ -11,7 +11,6 @@ from stated import frequencies
 from bayesplate.board.checks import readings_sha256
 from bayesplate.board.csv_table import csv_table
 from bayesplate.board.rows import Columns
-from bayesplate.board.template import Template
 from bayesplate.errors import InputError
 
 FREE = 'edges = { x0 = "free", x1 = "free", y0 = "free", y1 = "free" }'
@@ -34,7 +33,7 @@ READ = CARD + 'unlabelled_hz = [300]\n[setup.frequencies_hz]\n"(1, 1)" = 51.8\n"
 def columns(tmp_path: Path, header: str, card: str = CARD) -> Columns:
     """The columns of a header beside a template."""
     (tmp_path / "template.toml").write_text(card)
-    return Columns(Template(tmp_path / "template.toml"), csv_table(header.encode(), "t.csv")[0], "t.csv")
+    return Columns(tmp_path / "template.toml", csv_table(header.encode(), "t.csv")[0], "t.csv")
 
 
 HEADERS = [
