@@ -22,7 +22,7 @@ from bayesplate.board.prior import PriorCard, load_prior
 from bayesplate.board.quantity import Kind, Quantity
 from bayesplate.board.random_field import PlacedReadings, conditioned, thickness_readings, width_readings
 from bayesplate.board.setup import NOISE_WANTED, Setup
-from bayesplate.board.stated import are, quantity_of, unstatable, wrong_types
+from bayesplate.board.stated import are, quantities_of, unstatable, wrong_types
 from bayesplate.board.words import did_you_mean, effect_named
 from bayesplate.board.writing import toml_text, write_card
 from bayesplate.errors import Fault, InputError
@@ -39,6 +39,7 @@ INPUTS = {
     "poisson_xy": ("1", "Poisson ratio nu_xy"),
 }
 """What a card states of a board: unit, and what people call it."""
+_KINDS: Mapping[str, Kind] = {"poisson_xy": "normal"}
 DEFAULT_POISSON = Quantity.from_mean(0.4, 0.08, "normal")
 ISOTROPIC_POISSON = Quantity.from_mean(0.3, 0.06, "normal")
 """Of an isotropic board: foams and glass lie near 0.2, most metals near 0.3, acrylic near 0.37."""
@@ -143,7 +144,7 @@ class Board:
         if not isinstance(priors, Mapping):
             raise InputError(wrong_types(self.name, [("priors", priors, False, "a dict of quantities by name")]))
         faults = [_unknown("priors", name, self.inputs) for name in priors if name not in self.inputs]
-        stated, unread = _quantities(priors, "priors")
+        stated, unread = quantities_of(priors, "priors", "SI", _KINDS)
         if faults or unread:
             raise InputError([*faults, *unread])
         return replace(
@@ -253,7 +254,7 @@ class Board:
         }  # fmt: skip
         needed = ("length_x", "length_y", "thickness")
         values = {key: one for key, one in stated.items() if one is not None or key in needed}
-        quantities, unread = _quantities(values, str(name))
+        quantities, unread = quantities_of(values, str(name), "SI", _KINDS)
         warps, faulty = _warps(warp, str(name)) if isinstance(warp, Mapping) else ({}, [])
         unread += faulty
         if faults or unread:
@@ -454,35 +455,15 @@ class Board:
         return self.reading_names if len(self.setups) > 1 else tuple(map(str, self.setups[0].labels))
 
 
-def _quantities(
-    stated: Mapping[str, Quantity | ArrayLike | None], place: str
-) -> tuple[dict[str, Quantity], list[Fault]]:
-    """Quantities by name from what was stated of them, and what cannot be one."""
-    found: dict[str, Quantity] = {}
-    faults: list[Fault] = []
-    for name, value in stated.items():
-        kind: Kind = "normal" if name == "poisson_xy" else "log-normal"
-        try:
-            found[name] = quantity_of(value, f"{place} {name}", "SI", kind)
-        except InputError as error:
-            faults += error.faults
-    return found, faults
-
-
 def _warps(stated: Mapping[str, Quantity | ArrayLike], place: str) -> tuple[dict[str, Quantity], list[Fault]]:
     """Heights by name from what was stated of them, cup and twist from zero on, and what cannot be one."""
-    found: dict[str, Quantity] = {}
-    faults = [_unknown(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
-    for key in WARPS:
-        if key in stated:
-            try:
-                one = quantity_of(stated[key], f"{place} warp {key}", "in m", "normal")
-            except InputError as error:
-                faults += error.faults
-                continue
-            is_open = one.kind == "normal" and not one.is_exact and one.lower == -math.inf
-            found[key] = replace(one, lower=WARPS[key]) if is_open else one
-    return found, faults
+    unknown = [_unknown(f"{place} warp", key, WARPS) for key in stated if key not in WARPS]
+    known = {key: stated[key] for key in WARPS if key in stated}
+    found, faults = quantities_of(known, f"{place} warp", "in m", dict.fromkeys(WARPS, "normal"))
+    for key, one in found.items():
+        if one.kind == "normal" and not one.is_exact and one.lower == -math.inf:
+            found[key] = replace(one, lower=WARPS[key])
+    return found, [*unknown, *faults]
 
 
 def _unknown(place: str, name: object, known: Iterable[str]) -> Fault:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -14,7 +13,6 @@ from bayesplate.board.quantity import Quantity
 from bayesplate.board.repeated import FURTHEST_FREQUENCIES
 from bayesplate.board.stated import quantity_of
 from bayesplate.board.values import Choice, Key, Number
-from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
 
 NO_OFFSET = Label(0, 0)
@@ -127,31 +125,6 @@ class Peak:
     def is_bare(self) -> bool:
         """Whether nothing but its frequency is known."""
         return not self.sign and self.amplitude is None and self.damping is None
-
-
-def peaks_of(stated: Sequence[Peak | Quantity | ArrayLike], name: str) -> tuple[tuple[Peak, ...], list[Fault]]:
-    """Peaks from what somebody stated of them, and what cannot be one.
-
-    Parameters
-    ----------
-    stated : sequence of Peak, Quantity, number or array of readings, Hz
-    name : str
-        Of the setup, for the faults.
-
-    Returns
-    -------
-    peaks : tuple of Peak
-    faults : list of Fault
-    """
-    peaks: list[Peak] = []
-    faults: list[Fault] = []
-    for number, one in enumerate(stated, start=1):
-        place = f"{name} unlabelled {number}"
-        try:
-            peaks.append(one if isinstance(one, Peak) else Peak(quantity_of(one, place, "in Hz, or a Peak")))
-        except InputError as error:
-            faults += error.faults
-    return tuple(peaks), faults
 
 
 def label_text(label: str | tuple[int, int]) -> str:

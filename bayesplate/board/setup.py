@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from numbers import Real
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +16,9 @@ from bayesplate.board.coefficients import CoefficientCard
 from bayesplate.board.parameter import Owner, Parameter, shown_name
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading import FREQUENCY, NO_OFFSET, Peak, Reading, label_text, peaks_of
+from bayesplate.board.reading import FREQUENCY, NO_OFFSET, Peak, Reading, label_text
 from bayesplate.board.setup_keys import MISSED, SPURIOUS, Edges, End, HammerKeys, SetupKeys, SupportKeys
-from bayesplate.board.stated import are, is_place, quantity_of, wrong_types
+from bayesplate.board.stated import are, is_place, quantities_of, quantity_of, wrong_types
 from bayesplate.board.words import EDGES
 from bayesplate.errors import Fault, InputError
 from bayesplate.labels import Label
@@ -195,43 +195,45 @@ class Setup:
             faults.append(Fault(f"{name} edges", "a word for each of x0, x1, y0, y1", ", ".join(edges) or "none"))
         words = dict.fromkeys(EDGES, edges) if isinstance(edges, str) else {edge: edges.get(edge, "") for edge in EDGES}
         told = {Label.parse(label_text(label)): sign for label, sign in (signs or {}).items()}
-        readings = []
+        read: dict[Label, Quantity] = {}
         for label, frequency in frequencies.items():
             try:
-                one = Reading.of(label, frequency, first_label=first_label)
-                readings.append(replace(one, sign=told.pop(one.label, "")))
+                one = Reading.of(label, frequency)
             except InputError as error:
                 faults += [replace(fault, place=f"{name} {fault.place}") for fault in error.faults]
-        faults += [Fault(f"{name} signs", "a label among the frequencies", str(label)) for label in told]
-        covered: dict[str, Quantity] = {}
-        for edge, length in (clamped or {}).items():
-            if edge not in EDGES:
-                faults.append(Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(edge)))
-            try:
-                covered[edge] = quantity_of(length, f"{name} clamped {edge}", "in m")
-            except InputError as error:
-                faults += error.faults
-        peaks, no_peaks = peaks_of(unlabelled, name)
-        faults += no_peaks
+                continue
+            if one.label in read:
+                faults.append(Fault(f"{name} frequencies", f"the label {one.label} once", f"{label!r} again"))
+            read[one.label] = one.frequency
+        stray = [label for label in told if label not in read]
+        faults += [Fault(f"{name} signs", "a label among the frequencies", str(label)) for label in stray]
+        faults += [
+            Fault(f"{name} clamped", "one of x0, x1, y0, y1", str(one)) for one in clamped or {} if one not in EDGES
+        ]
+        covered, no_lengths = quantities_of(clamped or {}, f"{name} clamped", "in m")
+        peaks = {i: one for i, one in enumerate(unlabelled, start=1) if isinstance(one, Peak)}
+        others = {i: one for i, one in enumerate(unlabelled, start=1) if not isinstance(one, Peak)}
+        hertz, no_peaks = quantities_of(others, f"{name} unlabelled", "in Hz, or a Peak")
+        peaks |= {i: Peak(one) for i, one in hertz.items()}
+        faults += [*no_lengths, *no_peaks]
         if faults:
             raise InputError(faults)
-        made = cls(
+        keys = SetupKeys.model_construct(
             name=name,
-            ends_x=(cast(End, words["x0"]), cast(End, words["x1"])),
-            ends_y=(cast(End, words["y0"]), cast(End, words["y1"])),
-            readings=tuple(readings),
-            noise=DEFAULT_NOISE if noise is None else noise,
+            edges=Edges.model_construct(None, **words),
             clamped=covered,
-            resolution=float(resolution),
-            peaks=peaks,
             first_label=Label(*first_label),
-            published_coefficients=published_coefficients,
+            resolution=float(resolution),
+            noise=noise,
+            peaks=tuple(peaks[i] for i in sorted(peaks)),
+            frequencies=read,
+            signs=told,
             attached=tuple(attached),
-            hammer=hammer,
+            hammer=None if hammer is None else HammerKeys.model_construct(place=hammer),
+            support=None if bounce is None else SupportKeys.model_construct(bounce=bounce),
             fluid=fluid,
-            bounce=None if bounce is None else quantity_of(bounce, f"{name} bounce", "in Hz"),
         )
-        return made.assuming_noise() if noise is None else made
+        return replace(cls.from_keys(keys), published_coefficients=published_coefficients)
 
     @classmethod
     def from_keys(cls, keys: SetupKeys) -> Setup:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from bayesplate.board.quantity import Kind, Quantity
 from bayesplate.errors import Fault, InputError
 
+Name = TypeVar("Name", str, int)
 _LONGEST = 100
 
 
@@ -27,6 +29,20 @@ def quantity_of(value: Quantity | ArrayLike | None, place: str, unit: str, kind:
             for one in error.faults
         )
         raise InputError(faults) from None
+
+
+def quantities_of(
+    stated: Mapping[Name, Quantity | ArrayLike | None], place: str, unit: str, kinds: Mapping[Name, Kind] | None = None
+) -> tuple[dict[Name, Quantity], list[Fault]]:
+    """Quantities by name from what was stated of them, log-normal unless said otherwise, and what cannot be one."""
+    found: dict[Name, Quantity] = {}
+    faults: list[Fault] = []
+    for name, value in stated.items():
+        try:
+            found[name] = quantity_of(value, f"{place} {name}", unit, (kinds or {}).get(name, "log-normal"))
+        except InputError as error:
+            faults += error.faults
+    return found, faults
 
 
 def wrong_types(place: str, given: Iterable[tuple[str, object, bool, str]]) -> Iterator[Fault]:

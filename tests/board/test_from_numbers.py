@@ -130,7 +130,8 @@ def test_what_nobody_stated_is_that_of_the_prior_which_is_given_in_the_end():
 def test_peaks_are_numbers_readings_quantities_or_peaks():
     vague = bayesplate.Peak(Q.from_mean(671.2, 0.3), "-", amplitude=0.4, damping=0.005)
     one = setup(unlabelled=[448.8, [594.0, 595.0], Q.from_mean(640.0, 1.0), vague, bayesplate.Peak(707)])
-    numbers = (Q.exact(448.8), Q.from_readings([594, 595]), Q.from_mean(640.0, 1.0), vague.frequency, Q.exact(707))
+    read = Q.from_readings([594, 595], 1.0)  # rounded as the setup says
+    numbers = (Q.exact(448.8), read, Q.from_mean(640.0, 1.0), vague.frequency, Q.exact(707))
 
     assert tuple(peak.frequency for peak in one.peaks) == numbers
     assert one.peaks[3] == vague
@@ -212,6 +213,8 @@ BAD = {
                           'setup mode label: wanted two whole numbers from 0 to 11, written like "(1,0)", got "1,1"',
                           "setup frequency of (2,0): wanted a number, an array of readings or a Quantity, in Hz",
                           "setup clamped: wanted one of x0, x1, y0, y1, got z0"]),
+    "a label twice": (lambda: bayesplate.Setup.from_frequencies({"(1,1)": 134, (1, 1): 135}, edges="free"),
+                      ["setup frequencies: wanted the label (1,1) once, got (1, 1) again"]),
     "a sign without a frequency": (lambda: setup(signs={(3, 3): "+"}),
                                    ["free signs: wanted a label among the frequencies, got (3,3)"]),
     "what a card would refuse": (lambda: bayesplate.check(board(mass=None, setups=setup(edges="fixed"))),
