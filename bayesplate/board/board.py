@@ -80,7 +80,7 @@ class Board:
     notes : tuple of str
         What was assumed because the card does not say it.
     card : CardFile or None
-        Where it was read; None if it was made in Python.
+        Where it was read, or the board that it was made of; None if it was made in Python.
     """
 
     name: str

@@ -34,19 +34,22 @@ class Prepared:
 
     Attributes
     ----------
-    card : Board
-        As its card states it; a board made in Python is read from its own table.
     named : NamedCards
     stated : Board
-        With what its prior states of it: what to vary by `dataclasses.replace`.
+        As its card states it, and the prior what the card does not: what to vary by `dataclasses.replace`. A board made
+        in Python is read from its own table.
     board : Board
         With the parameters of its declared effects, those that its sensors and its air imply included.
     """
 
-    card: Board
     named: NamedCards
     stated: Board
     board: Board
+
+    @property
+    def card(self) -> Board:
+        """The board with its card."""
+        return self.stated
 
     @property
     def prior(self) -> PriorCard:
@@ -57,11 +60,11 @@ class Prepared:
     @property
     def card_text(self) -> str:
         """The card as it was read."""
-        return self.card.text
+        return self.stated.text
 
     def with_effects(self, effects: Sequence[str]) -> Prepared:
         """The same cards, not read again, with other declared effects; raises InputError as `prepare`."""
-        return prepared_card(self.card, self.named, effects)
+        return prepared_card(self.stated, self.named, effects)
 
 
 def default_folder(card: str | os.PathLike[str]) -> Path:
@@ -148,7 +151,7 @@ def prepared_card(read: Board, named: NamedCards, effects: Sequence[str] | None 
         raise InputError(faults)
     require_plausible(board, named.prior, np.random.default_rng(0))
     told = (*assumed_notes(board), *remarks(board, board.effects), *notes(board), *session_notes(board))
-    return Prepared(read, named, stated, declare(replace(board, notes=told)))
+    return Prepared(named, stated, declare(replace(board, notes=told)))
 
 
 def _lost(given: Board, prepared: Board) -> Iterator[Fault]:

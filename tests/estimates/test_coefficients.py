@@ -78,7 +78,7 @@ def test_sensitivity_inverts_its_own_plate(estimates, effects):
 def test_a_table_beside_the_card_is_read_once_from_there(estimates, tmp_path, monkeypatch):
     """Wherever the program was started, and whatever becomes of the file; its numbers are those of the shipped one."""
     (shipped,) = prepare(FINNISH).card.setups
-    text = (shelf_folder("coefficients") / f"{shipped.table_name}.toml").read_text(encoding="utf-8")
+    text = (shelf_folder("coefficients") / f"{shipped.published_coefficients.name}.toml").read_text(encoding="utf-8")
     table = tmp_path / "cards" / "mine.toml"
     table.parent.mkdir()
     table.write_text(text.replace('"paper-cantilever"', '"mine"'), encoding="utf-8")
