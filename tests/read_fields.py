@@ -13,11 +13,11 @@ from made_boards import FREE_LABELS, NARROW
 from bayesplate.board.board import Board
 from bayesplate.board.material import MODULI, moduli
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading_errors import reading_sd
 from bayesplate.effects import declare, effects_of
 from bayesplate.estimates.least_squares import log_measured, starting_rigidities
 from bayesplate.estimates.refit import design, refit
 from bayesplate.frequencies.model import setup_model
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.parameters import Parameters

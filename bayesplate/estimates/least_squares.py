@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import RIGIDITIES
-from bayesplate.board.reading_errors import reading_sd
 from bayesplate.board.setup import Setup
 from bayesplate.frequencies.model import SetupModel, setup_model
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
 from bayesplate.frequencies.terms import rayleigh_coefficients, rigidity_columns
 

@@ -18,12 +18,12 @@ from bayesplate.board.board import Board
 from bayesplate.board.material import moduli
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.reading import Reading
-from bayesplate.board.reading_errors import reading_sd
 from bayesplate.board.setup import Setup
 from bayesplate.estimates.least_squares import Estimate, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
 from bayesplate.estimates.unusual import MOST_ORTHOTROPIC
 from bayesplate.frequencies.prior_bands import prior_draws
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.spectrum import spectrum
 from bayesplate.frequencies.terms import rayleigh_coefficients, term_weights
 from bayesplate.labels import HIGHEST_INDEX, Label

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.material import RIGIDITIES
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.reading_errors import ReadingErrors
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.errors import BayesplateError
 from bayesplate.frequencies.prior_bands import prior_medians, with_rigidities
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import N_TERMS, NOTHING_LACKS, Beliefs, Explanation, moduli_at
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import levels

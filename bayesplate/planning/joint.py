@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from bayesplate.board.board import Board, Values
 from bayesplate.board.prior import PriorCard
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.board.sessions import shared_share
 from bayesplate.campaigns.given import GivenShared
 from bayesplate.campaigns.scatter import expected_width
 from bayesplate.campaigns.shared import Shared
 from bayesplate.estimates.least_squares import weighted_least_squares
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import moduli_at
 from bayesplate.planning.station_laws import BareLaw, bare_law
 from bayesplate.planning.stations import new_stations, stations

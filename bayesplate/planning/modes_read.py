@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.board.sessions import shared_share, unknown_discrepancies
 from bayesplate.diagnosis.evidence.search import Found
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.beliefs import Beliefs, Explanation
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.looks import members_of

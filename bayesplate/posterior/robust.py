@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
-from bayesplate.board.densities import STUDENT
-from bayesplate.board.reading_errors import reading_sd
 from bayesplate.estimates.least_squares import Estimate
+from bayesplate.frequencies.densities import STUDENT
+from bayesplate.frequencies.reading_errors import reading_sd
 
 Floats = NDArray[np.float64]
 

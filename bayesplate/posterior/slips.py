@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from bayesplate.board.board import Board
-from bayesplate.board.reading_errors import reading_sd
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.marginal import log_probability
 from bayesplate.estimates.refit import Bounds, most_likely, normal_misfit, sensitivities
 from bayesplate.frequencies.model import setup_model
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.reading_errors import reading_sd
 from bayesplate.frequencies.system import system_of
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.target import Posterior

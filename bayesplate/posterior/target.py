@@ -12,10 +12,10 @@ from bayesplate.board.board import Board, Values
 from bayesplate.board.material import MODULI, RIGIDITIES, isotropic_moduli, moduli, rigidities
 from bayesplate.board.prior import PriorCard
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.frequencies.laws import LawName, cents
 from bayesplate.frequencies.model import SetupModel, log_frequencies_of_board
 from bayesplate.frequencies.peaks import PeakLikelihood
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.parameters import Parameters
 
 LINEAR_SHARE = 0.25

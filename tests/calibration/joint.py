@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading_errors import ReadingErrors
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.mixture import Mixture
 from bayesplate.posterior.moves import IndependentMove
 from bayesplate.posterior.target import Posterior

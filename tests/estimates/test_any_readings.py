@@ -13,7 +13,6 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from scipy import optimize
 
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.estimates.least_squares import log_measured
 from bayesplate.estimates.leave_one_out import prediction_errors
 from bayesplate.estimates.refit import (
@@ -25,6 +24,7 @@ from bayesplate.estimates.refit import (
     refit,
 )
 from bayesplate.estimates.side_by_side import most_likely_of_each
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.modes.terms import Weights
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose

@@ -7,8 +7,6 @@ import pytest
 from bars import meets
 from scipy import optimize, stats
 
-from bayesplate.board.densities import DEGREES_OF_FREEDOM
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.leave_one_out import (
     CarryingMode,
@@ -22,6 +20,8 @@ from bayesplate.estimates.leave_one_out import (
     united,
 )
 from bayesplate.estimates.refit import design, deviance_misfit, most_likely, normal_misfit, refit
+from bayesplate.frequencies.densities import DEGREES_OF_FREEDOM
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare

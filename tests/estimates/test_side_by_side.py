@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.estimates import side_by_side
 from bayesplate.estimates.least_squares import log_measured, weighted_least_squares
 from bayesplate.estimates.refit import Bounds, deviance_misfit, most_likely, normal_misfit
 from bayesplate.estimates.side_by_side import curvatures, most_likely_of_each
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.posterior.laplace import predictor
 from bayesplate.posterior.posing import pose
 from bayesplate.workflow.prepare import prepare

@@ -12,10 +12,10 @@ from made_boards import CANTILEVER_LABELS, board_of, setup_of
 
 from bayesplate.board.parameter import Owner
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.board.sessions import shared_share
 from bayesplate.board.setup import DEFAULT_NOISE
 from bayesplate.diagnosis.evidence.hypotheses import Swap
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.planning.gains import Readings
 from bayesplate.planning.modes_read import REPEATED, _as_read, _given_first
 

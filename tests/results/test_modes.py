@@ -16,7 +16,7 @@ from made_reports import fitted
 from made_summaries import SUMMARY
 
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading_errors import ReadingErrors
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.report.content import summary_sentences
 from bayesplate.results.contract import json_text
 from bayesplate.results.modes import mode_rows

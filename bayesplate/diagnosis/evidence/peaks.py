@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.diagnosis.evidence.draws import TermDraws, draw_hypothesis
 from bayesplate.diagnosis.evidence.hypotheses import Hypothesis
 from bayesplate.diagnosis.evidence.search import Ground
 from bayesplate.diagnosis.shifts.baseline import Baseline
 from bayesplate.estimates.labelling import LIKELY
+from bayesplate.frequencies.reading_errors import ReadingErrors
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from bayesplate.board.board import Board
-from bayesplate.board.reading_errors import reading_sd
 from bayesplate.diagnosis.evidence.noise_grid import noise_grid, reach_of
 from bayesplate.estimates.marginal import log_probability
+from bayesplate.frequencies.reading_errors import reading_sd
 
 Floats = NDArray[np.float64]
 Group = Sequence[int]

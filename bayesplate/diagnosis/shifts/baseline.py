@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesplate.board.board import Board
-from bayesplate.board.reading_errors import ReadingErrors
 from bayesplate.board.sessions import same_modes, under_prior_scales
 from bayesplate.diagnosis.shifts.spectrum import Spectrum
 from bayesplate.estimates.least_squares import Estimate, log_measured, reading_scales
 from bayesplate.estimates.refit import Predict, refit, sensitivities
 from bayesplate.frequencies.model import SetupModel
 from bayesplate.frequencies.predictor import Predictor
+from bayesplate.frequencies.reading_errors import ReadingErrors
 from bayesplate.modes.naming import Place
 from bayesplate.posterior.laplace import every_predictor
 from bayesplate.posterior.parameters import Parameters

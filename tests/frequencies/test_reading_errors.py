@@ -9,11 +9,11 @@ from made_boards import board_of, setup_of
 from scipy import integrate, stats
 
 from bayesplate.board.board import Board
-from bayesplate.board.densities import DEGREES_OF_FREEDOM
 from bayesplate.board.quantity import Quantity
-from bayesplate.board.reading_errors import ReadingErrors, reading_sd
 from bayesplate.diagnosis.shifts.baseline import baseline_at
 from bayesplate.estimates.least_squares import reading_scales, weighted_least_squares
+from bayesplate.frequencies.densities import DEGREES_OF_FREEDOM
+from bayesplate.frequencies.reading_errors import ReadingErrors, reading_sd
 
 EPS = np.finfo(float).eps
 LAWS = {False: stats.norm, True: stats.t(DEGREES_OF_FREEDOM)}

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesplate.board.densities import NORMAL, STUDENT, Density
 from bayesplate.board.setup import Setup
+from bayesplate.frequencies.densities import NORMAL, STUDENT, Density
 
 Floats = NDArray[np.float64]
 
