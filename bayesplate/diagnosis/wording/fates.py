@@ -8,7 +8,7 @@ from bayesplate.diagnosis.decision.verdict import Answer, Verdict, answer_words,
 from bayesplate.diagnosis.evidence.predictive import PASSES
 from bayesplate.diagnosis.evidence.search import Found
 from bayesplate.diagnosis.wording.candidates import Fate
-from bayesplate.posterior.doubts import times
+from bayesplate.posterior.slips import times
 
 _LIKELY = 0.1
 """Probability from which on an effect that is hardly visible by itself is told as any other."""
